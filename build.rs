@@ -1,0 +1,3 @@
+//! Turns the service definitions in `jsidl/services` into typed messages.
+
+fn main() {}

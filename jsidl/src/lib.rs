@@ -1,0 +1,7 @@
+//! JSIDL (AS5684), the language in which JAUS services are defined.
+#![forbid(unsafe_code)]
+
+mod library;
+pub mod model;
+
+pub use library::Library;

@@ -1,0 +1,447 @@
+//! The resolved language: what a definition means once every reference has been followed.
+//!
+//! Nothing here remembers XML. The reader, the resolver and the checker build these types; the
+//! emitters and the dynamic codec only read them. A [`Service`] holds the messages that it
+//! declares itself; those of the services it inherits from are reached through [`Library`].
+//!
+//! On the wire a message is `code ++ header ++ body ++ footer`, little-endian, without padding.
+
+use std::fmt;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Where something was declared: a file with the line and column (both from 1) in it.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Location {
+    /// The file as it was named to the loader.
+    pub file: Arc<Path>,
+    /// Line, counted from 1.
+    pub line: u32,
+    /// Column in characters, counted from 1.
+    pub column: u32,
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.file.display(), self.line, self.column)
+    }
+}
+
+/// A service's version, `major.minor`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Version {
+    /// Raised by incompatible changes.
+    pub major: u8,
+    /// Raised by additions.
+    pub minor: u8,
+}
+
+impl fmt::Display for Version {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.major, self.minor)
+    }
+}
+
+/// What identifies a service, a type set or a constant set: its URN and version.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Id {
+    /// For example `urn:jaus:jss:core:Discovery`.
+    pub urn: Arc<str>,
+    /// For example `1.1`.
+    pub version: Version,
+}
+
+impl fmt::Display for Id {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.urn, self.version)
+    }
+}
+
+/// Another service that a service names in its `references`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reference {
+    /// The local alias, which qualifies the names of states and actions.
+    pub name: String,
+    /// The service meant.
+    pub id: Id,
+    /// Where it is named.
+    pub location: Location,
+}
+
+/// A `service_def`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Service {
+    /// For example `Discovery`.
+    pub name: String,
+    /// URN and version.
+    pub id: Id,
+    /// The author's text, white space folded.
+    pub description: String,
+    /// The service that this one extends, if any.
+    pub inherits_from: Option<Reference>,
+    /// Services whose messages this one uses as a client.
+    pub client_of: Vec<Reference>,
+    /// Messages that the service receives; inherited ones are not repeated.
+    pub inputs: Vec<Arc<Message>>,
+    /// Messages that the service sends; inherited ones are not repeated.
+    pub outputs: Vec<Arc<Message>>,
+    /// Where the `service_def` stands.
+    pub location: Location,
+}
+
+impl Service {
+    /// Inputs, then outputs; a message in both sets comes twice.
+    pub fn messages(&self) -> impl Iterator<Item = &Arc<Message>> {
+        self.inputs.iter().chain(&self.outputs)
+    }
+}
+
+/// A `message_def`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Message {
+    /// For example `ReportIdentification`.
+    pub name: String,
+    /// The message code, for example 0x4B00: the first two octets, little-endian.
+    pub code: u16,
+    /// `is_command`: only the controlling client may send it.
+    pub is_command: bool,
+    /// The author's text, white space folded.
+    pub description: String,
+    /// What stands between the code and the body. `None` for the usual header, whose only field is
+    /// the code itself.
+    pub header: Option<Item>,
+    /// A group, list or variant that is not optional; `None` if the body is empty.
+    pub body: Option<Item>,
+    /// As [`body`](Self::body); empty in every published definition.
+    pub footer: Option<Item>,
+    /// Where the `message_def` stands.
+    pub location: Location,
+}
+
+/// A named member of a message: a field or a composite of fields.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Item {
+    /// The JSIDL name, for example `Latitude` or `ComponentList`.
+    pub name: String,
+    /// Whether the presence vector of the enclosing group governs it.
+    pub optional: bool,
+    /// The author's `interpretation`, white space folded; empty if there is none.
+    pub interpretation: String,
+    /// What it looks like on the wire.
+    pub shape: Shape,
+    /// Where it is declared. For a reference, where the reference stands.
+    pub location: Location,
+}
+
+/// The constructs of the language.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Shape {
+    /// `record` and `sequence`: members one after the other.
+    Group(Group),
+    /// `list`: a count, then that many elements.
+    List(List),
+    /// `variant`: a tag, then the alternative it names.
+    Variant(Variant),
+    /// `fixed_field`.
+    Scalar(Scalar),
+    /// `bit_field`.
+    Bits(BitField),
+    /// `fixed_length_string`: exactly this many octets, padded with zeros.
+    FixedString {
+        /// Octets.
+        length: u32,
+    },
+    /// `variable_length_string`: a count of octets, then the octets.
+    VariableString {
+        /// The octet count.
+        count: Count,
+    },
+    /// `variable_length_field`: a count of octets, then raw octets.
+    Blob {
+        /// The octet count.
+        count: Count,
+        /// The declared format, for example `JAUS MESSAGE`; not on the wire.
+        format: String,
+    },
+    /// `variable_format_field`: a format index (one octet), a count of octets, then raw octets.
+    FormattedBlob {
+        /// The formats that may be chosen.
+        formats: Vec<Format>,
+        /// The octet count.
+        count: Count,
+    },
+    /// `variable_field`: an index (one octet) that chooses type and units, then the value.
+    Measure {
+        /// What may be chosen; `index` is what stands on the wire, not the position.
+        choices: Vec<Choice>,
+    },
+    /// `array`: elements back to back without a count; the first dimension varies fastest.
+    Array(Array),
+}
+
+/// `record` (members are fields) or `sequence` (members are composites): one layout.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// Which of the two the definition says.
+    pub kind: GroupKind,
+    /// Present exactly if some member is optional; bit *i* is the *i*-th optional member.
+    pub presence: Option<Unsigned>,
+    /// In wire order.
+    pub members: Vec<Item>,
+}
+
+/// The two spellings of [`Group`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GroupKind {
+    /// `record`
+    Record,
+    /// `sequence`
+    Sequence,
+}
+
+/// `list`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct List {
+    /// Number of elements.
+    pub count: Count,
+    /// The one element type; never optional.
+    pub element: Box<Item>,
+}
+
+/// `variant`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variant {
+    /// Type of the tag, which is the zero-based position of the alternative.
+    pub tag: Unsigned,
+    /// Never optional. May be empty: then the variant is its tag alone, 0.
+    pub alternatives: Vec<Item>,
+}
+
+/// `fixed_field`, or the value of a `variable_field`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scalar {
+    /// How it stands on the wire.
+    pub number: Number,
+    /// For example `meter` or `one`.
+    pub units: String,
+    /// What the number means.
+    pub meaning: Meaning,
+}
+
+/// What a number on the wire stands for.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Meaning {
+    /// Itself.
+    Plain,
+    /// A real number in a range (`scale_range`); only with unsigned integers.
+    Scaled(Scale),
+    /// One of a set of values (`value_set`). Other values occur and are kept.
+    Values(ValueSet),
+}
+
+/// `scale_range`: `value = raw * (upper - lower) / (2^n - 1) + lower`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Value of raw 0.
+    pub lower: f64,
+    /// Value of the largest raw number; greater than `lower`.
+    pub upper: f64,
+    /// How a real number becomes an integer.
+    pub rounding: Rounding,
+}
+
+/// `integer_function`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rounding {
+    /// To the nearest integer, halves up; the only one in published definitions.
+    Round,
+    /// Down.
+    Floor,
+    /// Up.
+    Ceiling,
+}
+
+/// `value_set`: the union of its ranges and its named values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ValueSet {
+    /// `value_range`s.
+    pub ranges: Vec<ValueRange>,
+    /// `value_enum`s, in document order.
+    pub values: Vec<NamedValue>,
+}
+
+/// `value_range`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ValueRange {
+    /// Least value.
+    pub lower: f64,
+    /// Greatest value.
+    pub upper: f64,
+    /// Whether `lower` itself is left out.
+    pub lower_exclusive: bool,
+    /// Whether `upper` itself is left out.
+    pub upper_exclusive: bool,
+    /// The author's text.
+    pub interpretation: String,
+}
+
+/// `value_enum`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedValue {
+    /// What stands on the wire.
+    pub index: u64,
+    /// `enum_const`: the author's text, which need not be an identifier.
+    pub name: String,
+    /// The author's text.
+    pub interpretation: String,
+}
+
+/// `bit_field`: sub-fields in one unsigned integer, bit 0 the least significant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BitField {
+    /// The integer on the wire.
+    pub base: Unsigned,
+    /// In document order; they do not overlap.
+    pub fields: Vec<SubField>,
+}
+
+/// `sub_field` of a [`BitField`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct SubField {
+    /// The JSIDL name.
+    pub name: String,
+    /// Lowest bit, from 0.
+    pub from: u8,
+    /// Highest bit, inclusive.
+    pub to: u8,
+    /// The values it may take.
+    pub values: ValueSet,
+    /// The author's text.
+    pub interpretation: String,
+}
+
+/// A count that precedes its elements or octets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Count {
+    /// How the count stands on the wire.
+    pub unsigned: Unsigned,
+    /// Least count; 0 if the definition says nothing.
+    pub min: u64,
+    /// Greatest count; the type's maximum if the definition says nothing.
+    pub max: u64,
+}
+
+/// `format_enum` of a `variable_format_field`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Format {
+    /// What stands on the wire.
+    pub index: u8,
+    /// `field_format`, for example `JPEG`.
+    pub name: String,
+}
+
+/// `type_and_units_enum` of a `variable_field`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Choice {
+    /// What stands on the wire.
+    pub index: u8,
+    /// The name, which only newer definitions give.
+    pub name: Option<String>,
+    /// Type, units and meaning of the value.
+    pub scalar: Scalar,
+}
+
+/// `array`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Array {
+    /// Sizes, in document order; the first varies fastest on the wire.
+    pub dimensions: Vec<u32>,
+    /// The element type: a field, never optional.
+    pub element: Box<Item>,
+}
+
+/// The numbers of `fixed_field`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Number {
+    /// An unsigned integer.
+    Unsigned(Unsigned),
+    /// A two's complement integer.
+    Signed(Signed),
+    /// `float`: IEEE 754, 4 octets.
+    F32,
+    /// `long float`: IEEE 754, 8 octets.
+    F64,
+}
+
+impl Number {
+    /// Octets on the wire.
+    pub const fn size(self) -> usize {
+        match self {
+            Self::Unsigned(u) => u.size(),
+            Self::Signed(s) => s.size(),
+            Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+/// Unsigned integers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Unsigned {
+    /// `unsigned byte`
+    U8,
+    /// `unsigned short integer`
+    U16,
+    /// `unsigned integer`
+    U32,
+    /// `unsigned long integer`
+    U64,
+}
+
+impl Unsigned {
+    /// Octets on the wire.
+    pub const fn size(self) -> usize {
+        match self {
+            Self::U8 => 1,
+            Self::U16 => 2,
+            Self::U32 => 4,
+            Self::U64 => 8,
+        }
+    }
+
+    /// The largest number that fits.
+    pub const fn max(self) -> u64 {
+        match self {
+            Self::U8 => u8::MAX as u64,
+            Self::U16 => u16::MAX as u64,
+            Self::U32 => u32::MAX as u64,
+            Self::U64 => u64::MAX,
+        }
+    }
+}
+
+/// Signed integers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Signed {
+    /// `byte`
+    I8,
+    /// `short integer`
+    I16,
+    /// `integer`
+    I32,
+    /// `long integer`
+    I64,
+}
+
+impl Signed {
+    /// Octets on the wire.
+    pub const fn size(self) -> usize {
+        match self {
+            Self::I8 => 1,
+            Self::I16 => 2,
+            Self::I32 => 4,
+            Self::I64 => 8,
+        }
+    }
+}

@@ -1,0 +1,2 @@
+//! A node stack for SAE JAUS.
+#![forbid(unsafe_code)]
