@@ -1,0 +1,192 @@
+//! Putting IP fragments together, within bounds.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::net::IpAddr;
+
+/// Datagrams that may wait for fragments at a time; then the one that waits longest is given up.
+const MOST_WAITING: usize = 64;
+/// No IP packet is longer.
+const LONGEST: usize = 65_535;
+
+/// What the fragments of one packet have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Key {
+    pub(super) addresses: [IpAddr; 2],
+    pub(super) identification: u32,
+}
+
+/// A piece of a packet's payload.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fragment<'a> {
+    pub(super) key: Key,
+    /// Where in the payload it belongs.
+    pub(super) offset: usize,
+    /// Whether others follow it.
+    pub(super) more: bool,
+    /// Whether the capture left out its end.
+    pub(super) cut: bool,
+    pub(super) octets: &'a [u8],
+}
+
+/// Packets of which something is missing, oldest first.
+#[derive(Debug, Default)]
+pub(super) struct Fragments {
+    waiting: VecDeque<Waiting>,
+    given_up: u64,
+}
+
+#[derive(Debug)]
+struct Waiting {
+    key: Key,
+    pieces: BTreeMap<usize, Vec<u8>>,
+    /// Length of the payload, once the last fragment is there.
+    length: Option<usize>,
+    /// A piece cannot be had any more.
+    spoiled: bool,
+}
+
+impl Fragments {
+    /// Packets given up, and those that still wait.
+    pub(super) fn incomplete(&self) -> u64 {
+        self.given_up + self.waiting.len() as u64
+    }
+
+    /// Adds a piece; the payload if nothing is missing now.
+    pub(super) fn insert(&mut self, fragment: Fragment<'_>) -> Option<Vec<u8>> {
+        let place = self.place_for(&fragment)?;
+        let waiting = &mut self.waiting[place];
+        waiting.spoiled |= fragment.cut;
+        if !fragment.more {
+            waiting.length = Some(fragment.offset + fragment.octets.len());
+        }
+        waiting
+            .pieces
+            .insert(fragment.offset, fragment.octets.to_vec());
+        let payload = waiting.payload()?;
+        self.waiting.remove(place);
+        Some(payload)
+    }
+
+    /// Where the packet of this fragment waits. One that contradicts what is there begins anew:
+    /// identifications are used again after a while.
+    fn place_for(&mut self, fragment: &Fragment<'_>) -> Option<usize> {
+        if fragment.offset + fragment.octets.len() > LONGEST {
+            self.given_up += 1;
+            return None;
+        }
+        let known = self.waiting.iter().position(|w| w.key == fragment.key);
+        match known {
+            Some(place) if self.waiting[place].accepts(fragment) => return Some(place),
+            Some(place) => {
+                self.waiting.remove(place);
+                self.given_up += 1;
+            }
+            None if self.waiting.len() == MOST_WAITING => {
+                self.waiting.pop_front();
+                self.given_up += 1;
+            }
+            None => {}
+        }
+        self.waiting.push_back(Waiting {
+            key: fragment.key,
+            pieces: BTreeMap::new(),
+            length: None,
+            spoiled: false,
+        });
+        Some(self.waiting.len() - 1)
+    }
+}
+
+impl Waiting {
+    /// Whether the fragment may belong to the same packet: a sender cuts without overlap, so a
+    /// piece is new, or there already with the same octets.
+    fn accepts(&self, fragment: &Fragment<'_>) -> bool {
+        let end = fragment.offset + fragment.octets.len();
+        let fits = match self.length {
+            Some(length) if fragment.more => end <= length,
+            Some(length) => end == length,
+            None => true,
+        };
+        let overlapped = self.pieces.range(..end).next_back();
+        fits && match overlapped {
+            Some((&offset, piece)) if offset == fragment.offset => piece == fragment.octets,
+            Some((&offset, piece)) => offset + piece.len() <= fragment.offset,
+            None => true,
+        }
+    }
+
+    /// The whole payload, if it is here.
+    fn payload(&self) -> Option<Vec<u8>> {
+        let length = self.length?;
+        let held: usize = self.pieces.values().map(Vec::len).sum();
+        (held == length && !self.spoiled).then(|| self.pieces.values().flatten().copied().collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fragment(identification: u32, offset: usize, more: bool, octets: &[u8]) -> Fragment<'_> {
+        Fragment {
+            key: Key {
+                addresses: [IpAddr::from([10, 0, 0, 1]), IpAddr::from([10, 0, 0, 2])],
+                identification,
+            },
+            offset,
+            more,
+            cut: false,
+            octets,
+        }
+    }
+
+    #[test]
+    fn fragments_in_any_order_make_the_packet() {
+        let mut fragments = Fragments::default();
+        assert_eq!(fragments.insert(fragment(1, 16, false, b"end")), None);
+        assert_eq!(fragments.insert(fragment(1, 0, true, b"01234567")), None);
+        assert_eq!(fragments.insert(fragment(1, 0, true, b"01234567")), None);
+        assert_eq!(
+            fragments.insert(fragment(1, 8, true, b"89abcdef")).unwrap(),
+            b"0123456789abcdefend"
+        );
+        assert_eq!(fragments.incomplete(), 0);
+    }
+
+    #[test]
+    fn an_identification_that_is_used_again_does_not_mix_two_packets() {
+        let mut fragments = Fragments::default();
+        fragments.insert(fragment(1, 0, true, b"old old "));
+        fragments.insert(fragment(1, 0, true, b"new new "));
+        assert_eq!(
+            fragments.insert(fragment(1, 8, false, b"!")).unwrap(),
+            b"new new !"
+        );
+        assert_eq!(fragments.incomplete(), 1);
+    }
+
+    #[test]
+    fn an_overlap_never_completes_a_packet() {
+        let mut fragments = Fragments::default();
+        fragments.insert(fragment(1, 0, true, &[0; 24]));
+        assert_eq!(fragments.insert(fragment(1, 8, false, &[1; 16])), None);
+        assert_eq!(fragments.insert(fragment(1, 0, true, &[2; 16])), None);
+    }
+
+    #[test]
+    fn waiting_packets_are_bounded() {
+        let mut fragments = Fragments::default();
+        for identification in 0..1000 {
+            fragments.insert(fragment(identification, 0, true, &[0; 8]));
+        }
+        assert_eq!(fragments.waiting.len(), MOST_WAITING);
+        assert_eq!(fragments.incomplete(), 1000);
+    }
+
+    #[test]
+    fn a_packet_beyond_the_longest_is_refused() {
+        let mut fragments = Fragments::default();
+        assert_eq!(fragments.insert(fragment(1, 65_528, false, &[0; 8])), None);
+        assert_eq!(fragments.incomplete(), 1);
+    }
+}

@@ -1,0 +1,112 @@
+//! The moment at which a packet was captured, with the precision that the capture keeps.
+
+use std::fmt;
+
+const NANOS_PER_SECOND: u32 = 1_000_000_000;
+const SECONDS_PER_DAY: i64 = 86_400;
+
+/// Time since 1970-01-01T00:00:00Z.
+///
+/// [`Display`](fmt::Display) writes RFC 3339 in UTC, with as many decimals as the capture keeps:
+/// `2015-06-07T14:03:21.068150Z`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Timestamp {
+    seconds: i64,
+    nanos: u32,
+    decimals: u8,
+}
+
+impl Timestamp {
+    /// `seconds` and `nanos` since 1970, of which the first `decimals` (at most 9) are known.
+    ///
+    /// Whole seconds in `nanos` are carried over.
+    pub fn new(seconds: i64, nanos: u32, decimals: u8) -> Self {
+        Self {
+            seconds: seconds.saturating_add(i64::from(nanos / NANOS_PER_SECOND)),
+            nanos: nanos % NANOS_PER_SECOND,
+            decimals: decimals.min(9),
+        }
+    }
+
+    /// Whole seconds since 1970.
+    pub fn seconds(self) -> i64 {
+        self.seconds
+    }
+
+    /// Nanoseconds beyond [`seconds`](Self::seconds).
+    pub fn subsec_nanos(self) -> u32 {
+        self.nanos
+    }
+}
+
+impl fmt::Display for Timestamp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (year, month, day) = civil_date(self.seconds.div_euclid(SECONDS_PER_DAY));
+        let second = self.seconds.rem_euclid(SECONDS_PER_DAY);
+        write!(
+            f,
+            "{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}",
+            second / 3600,
+            second / 60 % 60,
+            second % 60
+        )?;
+        if self.decimals > 0 {
+            let width = usize::from(self.decimals);
+            let digits = self.nanos / 10_u32.pow(u32::from(9 - self.decimals));
+            write!(f, ".{digits:0width$}")?;
+        }
+        f.write_str("Z")
+    }
+}
+
+/// Year, month and day of the proleptic Gregorian calendar, from days since 1970-01-01.
+///
+/// Counts in eras of 400 years that begin on 1 March, so that the leap day comes last.
+fn civil_date(days: i64) -> (i64, i64, i64) {
+    let days = days + 719_468;
+    let era = days.div_euclid(146_097);
+    let day_of_era = days.rem_euclid(146_097);
+    let year_of_era =
+        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month + 2) / 5 + 1;
+    let month = if month < 10 { month + 3 } else { month - 9 };
+    (era * 400 + year_of_era + i64::from(month <= 2), month, day)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_written_with_the_decimals_that_are_known() {
+        assert_eq!(Timestamp::new(0, 0, 0).to_string(), "1970-01-01T00:00:00Z");
+        assert_eq!(
+            Timestamp::new(1_433_685_801, 68_150_000, 6).to_string(),
+            "2015-06-07T14:03:21.068150Z"
+        );
+        assert_eq!(
+            Timestamp::new(951_782_400, 7, 9).to_string(),
+            "2000-02-29T00:00:00.000000007Z"
+        );
+        assert_eq!(
+            Timestamp::new(-1, 500_000_000, 3).to_string(),
+            "1969-12-31T23:59:59.500Z"
+        );
+    }
+
+    #[test]
+    fn every_day_of_four_centuries_follows_the_one_before() {
+        let mut before = civil_date(-1);
+        for day in 0..146_097 {
+            let now = civil_date(day);
+            assert!(
+                now > before && (1..=31).contains(&now.2),
+                "{before:?} {now:?}"
+            );
+            assert!(now.2 == before.2 + 1 || now.2 == 1);
+            before = now;
+        }
+    }
+}
