@@ -1,0 +1,115 @@
+//! What can go wrong when a link is opened, said so that a person can put it right.
+
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr};
+
+use super::holder::Holder;
+use super::interface::{Available, Interface};
+
+/// Why a link could not be opened. Nothing is left half open.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The name or address does not belong to this host.
+    #[error("there is no network interface `{wanted}` on this host; there are: {available}")]
+    NoSuchInterface {
+        /// As it was given.
+        wanted: String,
+        /// What could have been given.
+        available: Available,
+    },
+    /// The interface exists but is not up.
+    #[error(
+        "the network interface {interface} is not up: bring it up (`ip link set {name} up`) or \
+         choose another; there are: {available}",
+        name = interface.name
+    )]
+    InterfaceDown {
+        /// The one that was asked for.
+        interface: Interface,
+        /// What else there is.
+        available: Available,
+    },
+    /// No interface is left to open a link on.
+    #[error("no network interface can be used; there are: {0}")]
+    NoInterface(Available),
+    /// Multicast was asked for and none of the chosen interfaces carries it.
+    #[error(
+        "none of the chosen interfaces carries multicast ({0}), so this node could find nobody: \
+         choose another interface, or name peers by address, or turn the group off"
+    )]
+    NoMulticast(Available),
+    /// The group is not an IPv4 multicast address with a port.
+    #[error(
+        "{0} is no multicast group: the address must lie in 224.0.0.0 to 239.255.255.255 and the \
+         port must not be 0; the usual group for JAUS is 239.255.0.1:3794"
+    )]
+    InvalidGroup(SocketAddr),
+    /// The unicast address and port are in use.
+    #[error(
+        "UDP port {} of {} is taken{holder}. Each node of a host needs a port or an address for \
+         itself, because a datagram to a shared one reaches only one of them. Choose another port \
+         (0: any free one; peers answer to the port that they hear us from), or another address \
+         (on loopback any of 127.0.0.0/8, such as 127.0.0.2), or end the other program. \
+         {}",
+        .address.port(), .address.ip(), holder_hint(holder, *address)
+    )]
+    PortTaken {
+        /// What could not be bound.
+        address: SocketAddr,
+        /// Who has it, as far as this host tells.
+        holder: Holder,
+    },
+    /// Another program has the multicast group's port and does not share it.
+    #[error(
+        "the multicast group {group} cannot be received: UDP port {} is held{holder} for all \
+         addresses, without sharing. End that program, or move both to another group and port, \
+         or turn the group off and name peers by address. {}",
+        .group.port(), holder_hint(holder, *group)
+    )]
+    GroupTaken {
+        /// The group and its port.
+        group: SocketAddr,
+        /// Who has it, as far as this host tells.
+        holder: Holder,
+    },
+    /// This process may not do it.
+    #[error("this process lacks the right for {doing} ({source}){}", privileged(*port))]
+    Permission {
+        /// What was attempted.
+        doing: String,
+        /// The port in question.
+        port: u16,
+        /// The operating system's words.
+        source: io::Error,
+    },
+    /// The address went away between listing the interfaces and binding to one.
+    #[error("the address {0} is not (or no longer) an address of this host")]
+    AddressGone(Ipv4Addr),
+    /// Anything else the operating system refuses.
+    #[error("{doing} failed: {source}")]
+    Io {
+        /// What was attempted.
+        doing: String,
+        /// The operating system's words.
+        source: io::Error,
+    },
+}
+
+fn holder_hint(holder: &Holder, address: SocketAddr) -> String {
+    match holder {
+        Holder::Process { pid, .. } => format!("(`kill {pid}` asks it to end.)"),
+        _ => format!(
+            "(`sudo ss -ulpn 'sport = :{}'` shows who it is.)",
+            address.port()
+        ),
+    }
+}
+
+const fn privileged(port: u16) -> &'static str {
+    if port < 1024 && port != 0 {
+        ": ports below 1024 are for privileged processes, choose a higher one"
+    } else {
+        ": see the container's or the security module's settings"
+    }
+}

@@ -1,0 +1,35 @@
+//! Links: sockets, and nothing but sockets. Bytes in, bytes out, with the peer's address.
+//!
+//! A link knows no JAUS: what the bytes mean is the endpoint's business. There is one
+//! [`UdpLink`](udp::UdpLink) per network interface.
+//!
+//! # Several nodes on one host
+//!
+//! A link has two sockets, because the two kinds of datagram want opposite things:
+//!
+//! * the **unicast socket** is bound to one address of the interface and the node's port, for
+//!   itself alone. Everything leaves through it, so peers answer to it. Were it shared, each
+//!   datagram would reach only one of the sharers, and nobody could say which;
+//! * the **group socket** is bound to the multicast group and the group's port, shared
+//!   (`SO_REUSEADDR`). Every sharer gets a copy of every datagram.
+//!
+//! So the rule is: **all nodes of a host share the group, and each has an address and port of
+//! its own.** The first takes the standard port 3794; a second one on the same address gets
+//! [`Error::PortTaken`] and needs another port (0 for any free one) or another address. No peer
+//! has to be told: AS5669A peers (Junior, JAUS++ and this one) answer to the address and port
+//! that they hear a node from.
+//!
+//! A program that binds port 3794 of *all* addresses without sharing, as Junior does, leaves no
+//! room for either socket: one of the two has to move.
+#![expect(clippy::disallowed_types, reason = "this is where sockets live")]
+
+mod error;
+mod holder;
+pub mod interface;
+mod slab;
+pub mod udp;
+
+pub use error::Error;
+pub use holder::Holder;
+pub use interface::{Available, Interface, Interfaces};
+pub use slab::Slab;

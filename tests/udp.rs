@@ -1,0 +1,235 @@
+//! Real sockets on the loopback interface: what a link hears, what it leaves out, and what it
+//! says when it cannot be opened. Needs no network and no rights.
+#![cfg(feature = "node")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "a test with sockets"
+)]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test")]
+
+use std::future::poll_fn;
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::link::udp::{PortTaken, Settings, UdpLink};
+use jaus::link::{Error, Interface, Interfaces, Slab};
+
+/// Longer than anything takes; reached only when a test fails.
+const LIMIT: Duration = Duration::from_secs(20);
+
+/// A port that no test of this process gets twice and nothing else uses just now.
+fn free_port() -> u16 {
+    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
+    socket.local_addr().unwrap().port()
+}
+
+fn loopback() -> Interface {
+    Interfaces::Loopback.choose().unwrap().remove(0)
+}
+
+/// A free unicast port and a group of the test's own.
+fn settings() -> Settings {
+    let group = SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), free_port());
+    Settings {
+        port: 0,
+        group: Some(group),
+        ..Settings::default()
+    }
+}
+
+async fn receive(link: &mut UdpLink) -> (SocketAddr, Bytes) {
+    let mut slab = Slab::new();
+    tokio::time::timeout(LIMIT, poll_fn(|cx| link.poll_recv(cx, &mut slab)))
+        .await
+        .expect("nothing was received")
+}
+
+#[tokio::test]
+async fn links_of_one_host_hear_each_other_by_multicast_and_answer_by_unicast() {
+    let settings = settings();
+    let mut a = UdpLink::open(&loopback(), &settings).unwrap();
+    let mut b = UdpLink::open(&loopback(), &settings).unwrap();
+    let mut c = UdpLink::open(&loopback(), &settings).unwrap();
+
+    a.send_to_group(&Bytes::from_static(b"who is there?"));
+    for other in [&mut b, &mut c] {
+        let (from, datagram) = receive(other).await;
+        assert_eq!((from, &datagram[..]), (a.local(), &b"who is there?"[..]));
+        other.send_to(from, &Bytes::from_static(b"me"));
+    }
+    let mut answers = [receive(&mut a).await.0, receive(&mut a).await.0];
+    answers.sort();
+    let mut expected = [b.local(), c.local()];
+    expected.sort();
+    assert_eq!(answers, expected);
+}
+
+#[tokio::test]
+async fn a_link_does_not_hear_itself() {
+    let settings = settings();
+    let mut a = UdpLink::open(&loopback(), &settings).unwrap();
+    let mut b = UdpLink::open(&loopback(), &settings).unwrap();
+
+    a.send_to_group(&Bytes::from_static(b"from a"));
+    b.send_to_group(&Bytes::from_static(b"from b"));
+
+    assert_eq!(receive(&mut a).await.0, b.local());
+    assert_eq!(receive(&mut b).await.0, a.local());
+    // What a sent itself lies before what b sent, in the same socket's queue.
+    assert_eq!(a.counters().own_echo, 1);
+    assert_eq!(a.counters().received, 1);
+}
+
+#[tokio::test]
+async fn groups_with_other_ports_are_not_heard() {
+    let mut a = UdpLink::open(&loopback(), &settings()).unwrap();
+    let mut stranger = UdpLink::open(&loopback(), &settings()).unwrap();
+    stranger.send_to_group(&Bytes::from_static(b"not for a"));
+    stranger.send_to(a.local(), &Bytes::from_static(b"for a"));
+    assert_eq!(receive(&mut a).await.1, &b"for a"[..]);
+}
+
+#[tokio::test]
+async fn configured_peers_get_a_copy_of_what_goes_to_the_group() {
+    let mut deaf = UdpLink::open(
+        &loopback(),
+        &Settings {
+            group: None,
+            ..settings()
+        },
+    )
+    .unwrap();
+    let mut a = UdpLink::open(
+        &loopback(),
+        &Settings {
+            peers: vec![deaf.local()],
+            ..settings()
+        },
+    )
+    .unwrap();
+    a.send_to_group(&Bytes::from_static(b"hello"));
+    assert_eq!(
+        receive(&mut deaf).await,
+        (a.local(), Bytes::from_static(b"hello"))
+    );
+}
+
+#[tokio::test]
+async fn a_peer_that_is_gone_does_not_end_the_link() {
+    let mut a = UdpLink::open(&loopback(), &settings()).unwrap();
+    let mut b = UdpLink::open(&loopback(), &settings()).unwrap();
+    let nobody = SocketAddr::from((Ipv4Addr::LOCALHOST, free_port()));
+    let too_long = Bytes::from(vec![0; 70_000]);
+    for _ in 0..3 {
+        a.send_to(nobody, &Bytes::from_static(b"anyone?"));
+        a.send_to(b.local(), &too_long);
+    }
+    assert_eq!(a.counters().send_errors, 3);
+    b.send_to(a.local(), &Bytes::from_static(b"still there"));
+    assert_eq!(receive(&mut a).await.1, &b"still there"[..]);
+}
+
+#[tokio::test]
+async fn the_longest_datagram_arrives_whole() {
+    let mut a = UdpLink::open(&loopback(), &settings()).unwrap();
+    let mut b = UdpLink::open(&loopback(), &settings()).unwrap();
+    let longest = Bytes::from(vec![7; 65_507]);
+    a.send_to(b.local(), &longest);
+    assert_eq!(receive(&mut b).await.1, longest);
+}
+
+#[tokio::test]
+async fn a_second_node_on_the_same_address_and_port_is_refused_and_told_what_to_do() {
+    let port = free_port();
+    let settings = Settings { port, ..settings() };
+    let _first = UdpLink::open(&loopback(), &settings).unwrap();
+
+    let error = UdpLink::open(&loopback(), &settings).unwrap_err();
+    let text = error.to_string();
+    assert!(matches!(error, Error::PortTaken { .. }), "{text}");
+    assert!(
+        text.contains(&format!("UDP port {port} of 127.0.0.1 is taken")),
+        "{text}"
+    );
+    assert!(
+        text.contains("another port (0: any free one") && text.contains("127.0.0.2"),
+        "{text}"
+    );
+    assert!(
+        !cfg!(target_os = "linux") || text.contains("by this very process"),
+        "{text}"
+    );
+
+    let other_address = Interfaces::Only(vec!["127.0.0.2".into()]).choose().unwrap();
+    let second = UdpLink::open(&other_address[0], &settings).unwrap();
+    assert_eq!(second.local(), SocketAddr::from(([127, 0, 0, 2], port)));
+}
+
+#[tokio::test]
+async fn a_taken_port_is_replaced_by_a_free_one_when_that_is_wanted() {
+    let settings = Settings {
+        port: free_port(),
+        ..settings()
+    };
+    let mut first = UdpLink::open(&loopback(), &settings).unwrap();
+    let flexible = Settings {
+        port_taken: PortTaken::UseFree,
+        ..settings
+    };
+    let mut second = UdpLink::open(&loopback(), &flexible).unwrap();
+    assert_ne!(first.local(), second.local());
+
+    first.send_to_group(&Bytes::from_static(b"who is there?"));
+    let (peer, _) = receive(&mut second).await;
+    second.send_to(peer, &Bytes::from_static(b"me"));
+    assert_eq!(receive(&mut first).await.0, second.local());
+}
+
+#[tokio::test]
+async fn a_program_that_keeps_the_group_port_for_itself_is_named() {
+    let settings = settings();
+    let port = settings.group.unwrap().port();
+    let _junior_like = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port)).unwrap();
+    let error = UdpLink::open(&loopback(), &settings).unwrap_err();
+    let text = error.to_string();
+    assert!(matches!(error, Error::GroupTaken { .. }), "{text}");
+    assert!(
+        text.contains("for all addresses, without sharing"),
+        "{text}"
+    );
+    assert!(
+        !cfg!(target_os = "linux") || text.contains("by this very process"),
+        "{text}"
+    );
+}
+
+#[tokio::test]
+async fn a_group_that_is_none_is_refused() {
+    for (address, port) in [([192, 168, 0, 1], 3794), ([239, 255, 0, 1], 0)] {
+        let group = Some(SocketAddrV4::new(address.into(), port));
+        let error = UdpLink::open(
+            &loopback(),
+            &Settings {
+                group,
+                ..settings()
+            },
+        )
+        .unwrap_err();
+        assert!(matches!(error, Error::InvalidGroup(_)), "{error}");
+        assert!(error.to_string().contains("239.255.0.1:3794"), "{error}");
+    }
+}
+
+#[test]
+fn an_interface_that_does_not_exist_is_refused_with_a_list_of_those_that_do() {
+    for wanted in ["nosuch0", "203.0.113.77"] {
+        let error = Interfaces::Only(vec![wanted.into()]).choose().unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains(&format!("`{wanted}`")) && text.contains("127.0.0.1"),
+            "{text}"
+        );
+    }
+}
