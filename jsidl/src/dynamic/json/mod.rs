@@ -1,0 +1,109 @@
+//! The JSON view of messages, as people read and write it.
+//!
+//! | JSIDL | JSON |
+//! |---|---|
+//! | record, sequence | object of the members that are present, in document order |
+//! | list | array of its elements |
+//! | variant | object with one key, the alternative's name; `{}` if there is no alternative |
+//! | fixed_field | integer; `float`s with the fewest digits of their type, or `"NaN"`, `"Infinity"`, `"-Infinity"` |
+//! | … with scale_range | the decimal with the fewest digits that encodes back to the same integer |
+//! | … with value_set | the integer; the enumerator's text is understood as well |
+//! | bit_field | object of its sub-fields, and `"_reserved"`: the other bits, where they are not 0 |
+//! | strings | text; `{"hex": "…"}` where the octets are not UTF-8 |
+//! | variable_length_field | text of hexadecimal digits |
+//! | variable_format_field | `{"format": index, "data": "hex"}` |
+//! | variable_field | `{"index": n, "units": "meter", "value": …}`; units are not read |
+//! | array | nested arrays, indexed in the order of the dimensions |
+//!
+//! The name of the body's own composite is not shown; an empty body is `{}`. Only where a message
+//! has a header or footer of its own, the three stand in an object with the keys `header`, `body`
+//! and `footer`. A NaN comes back as the ordinary quiet one.
+
+mod hex;
+mod read;
+mod write;
+
+use std::fmt;
+
+pub use read::from_json;
+pub use write::to_json;
+
+use super::Path;
+use super::error::{Fault, write_place};
+
+/// The key for the bits of a bit field that no sub-field owns.
+const RESERVED: &str = "_reserved";
+
+/// The key for the octets of a string that is not UTF-8.
+const HEX: &str = "hex";
+
+/// The keys for the parts of a message that has a header or footer of its own.
+const SECTIONS: [&str; 3] = ["header", "body", "footer"];
+
+/// JSON that is not a view of the given definition.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JsonError {
+    /// The message's name.
+    pub message: String,
+    /// The field.
+    pub path: Path,
+    /// What is wrong there.
+    pub problem: JsonProblem,
+}
+
+impl fmt::Display for JsonError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_place(f, &self.message, &self.path)?;
+        self.problem.fmt(f)
+    }
+}
+
+impl std::error::Error for JsonError {}
+
+/// What can be wrong with JSON.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum JsonProblem {
+    /// An object has a key that the definition does not know.
+    #[error("unknown key \"{key}\"; known here: {known}")]
+    UnknownKey {
+        /// The key.
+        key: String,
+        /// The names that the definition has, separated by commas.
+        known: String,
+    },
+    /// A required member is absent.
+    #[error("required, but absent")]
+    Missing,
+    /// Something else than the definition has here.
+    #[error("expected {expected}, found {found}")]
+    Expected {
+        /// What the definition has.
+        expected: String,
+        /// What is there, shortened.
+        found: String,
+    },
+    /// A real number outside the range of a scaled integer, whose limits belong to it.
+    #[error("{value} is outside the range from {lower} to {upper} {units}")]
+    OutOfRange {
+        /// The number.
+        value: f64,
+        /// The least number.
+        lower: f64,
+        /// The greatest number.
+        upper: f64,
+        /// The units of all three.
+        units: String,
+    },
+}
+
+impl Fault<JsonProblem> {
+    fn reading(self, message: &str) -> JsonError {
+        let (path, _, problem) = self.path();
+        JsonError {
+            message: message.to_owned(),
+            path,
+            problem,
+        }
+    }
+}

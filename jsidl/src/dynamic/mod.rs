@@ -1,0 +1,69 @@
+//! The dynamic codec: reads and writes messages straight from their definitions at run time.
+//!
+//! Generated code is faster and typed; this codec serves the definitions that are only known when
+//! the program runs, and it is independent of the generated one, so that the two check each other.
+//! Both hold to the same rule: octets that are accepted encode back to exactly the same octets.
+//!
+//! [`decode`] and [`encode`] turn octets into a [`Value`] and back; with the feature `json`,
+//! `to_json` and `from_json` do the same for the JSON view that people read and write.
+
+mod decode;
+mod encode;
+mod error;
+mod scale;
+mod value;
+
+#[cfg(feature = "arbitrary")]
+mod arbitrary;
+#[cfg(feature = "json")]
+mod json;
+
+#[cfg(feature = "arbitrary")]
+pub use arbitrary::arbitrary;
+pub use decode::{decode, decode_with};
+pub use encode::{encode, encode_with};
+pub use error::{DecodeError, DecodeProblem, EncodeError, EncodeProblem, Path, Step};
+#[cfg(feature = "json")]
+pub use json::{JsonError, JsonProblem, from_json, to_json};
+pub use scale::{raw_from_real, real_from_raw, shortest_real};
+pub use value::{Raw, Value};
+
+/// Whether the counts of a message must keep to the limits that its definition states.
+///
+/// Layout never depends on `min_count` and `max_count`, and not every peer respects them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Limits {
+    /// A count outside its limits is an error.
+    #[default]
+    Enforced,
+    /// Every count that its type can hold is accepted: for reading real traffic.
+    Ignored,
+}
+
+impl Limits {
+    fn admit(self, count: &crate::model::Count, number: u64) -> bool {
+        self == Self::Ignored || (count.min..=count.max).contains(&number)
+    }
+}
+
+/// How many elements without any octets one message may hold.
+///
+/// Nothing in the input pays for such elements (a list of empty records, say), so that a count
+/// alone could ask for four thousand million of them. No published definition has any.
+const MOST_EMPTY_ELEMENTS: u32 = 4096;
+
+/// What remains of [`MOST_EMPTY_ELEMENTS`] in the message at hand.
+struct EmptyElements(u32);
+
+impl EmptyElements {
+    const fn new() -> Self {
+        Self(MOST_EMPTY_ELEMENTS)
+    }
+
+    /// Takes one; false if there is none left.
+    fn take(&mut self) -> bool {
+        let left = self.0.checked_sub(1);
+        self.0 = left.unwrap_or(0);
+        left.is_some()
+    }
+}

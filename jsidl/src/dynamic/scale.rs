@@ -1,0 +1,260 @@
+//! Scaled integers: real numbers in a range, sent as unsigned integers.
+//!
+//! A real number becomes the integer that the definition's `integer_function` gives for
+//! `(real - lower) * (2^n - 1) / (upper - lower)`, computed without any rounding error: limits and
+//! number are taken as the exact fractions that they are. (Floating point arithmetic is off by one
+//! in a few per cent of the numbers that lie halfway between two steps.)
+
+use std::cmp::Ordering;
+
+use crate::model::{Rounding, Scale, Unsigned};
+
+/// The real number that an integer stands for: `raw * (upper - lower) / (2^n - 1) + lower`.
+pub fn real_from_raw(scale: &Scale, width: Unsigned, raw: u64) -> f64 {
+    let step = (scale.upper - scale.lower) / width.max() as f64;
+    raw as f64 * step + scale.lower
+}
+
+/// The integer that stands for a real number, or `None` if the number lies outside of the range
+/// (its limits belong to it) or is not a number.
+pub fn raw_from_real(scale: &Scale, width: Unsigned, real: f64) -> Option<u64> {
+    if !(scale.lower..=scale.upper).contains(&real) {
+        return None;
+    }
+    let reaches = |raw| raw == 0 || reaches(scale, width, real, raw);
+    let step = (scale.upper - scale.lower) / width.max() as f64;
+    // A conversion to an integer saturates, so that this is a number of the type or above it.
+    let guess = ((real - scale.lower) / step) as u64;
+    let mut least = guess.min(width.max()).saturating_sub(2);
+    let mut greatest = guess.saturating_add(2).min(width.max());
+    if !reaches(least) {
+        least = 0;
+    }
+    if greatest < width.max() && reaches(greatest + 1) {
+        greatest = width.max();
+    }
+    while least < greatest {
+        let middle = greatest - (greatest - least) / 2;
+        if reaches(middle) {
+            least = middle;
+        } else {
+            greatest = middle - 1;
+        }
+    }
+    Some(least)
+}
+
+/// Whether the integer for `real` is `raw` or greater, exactly.
+///
+/// That is so if `real` is at least (for `ceiling`: above) the threshold
+/// `lower + k/2 * (upper - lower) / max`, where `k` counts half steps. Multiplied by `2 * max`, both
+/// sides are sums of integer multiples of the three numbers.
+fn reaches(scale: &Scale, width: Unsigned, real: f64, raw: u64) -> bool {
+    let (raw, max) = (i128::from(raw), i128::from(width.max()));
+    let (half_steps, admitted) = match scale.rounding {
+        Rounding::Round => (2 * raw - 1, Ordering::Equal),
+        Rounding::Floor => (2 * raw, Ordering::Equal),
+        Rounding::Ceiling => (2 * raw - 2, Ordering::Greater),
+    };
+    let terms = [
+        (2 * max, real),
+        (half_steps - 2 * max, scale.lower),
+        (-half_steps, scale.upper),
+    ];
+    sign_of_sum(terms) >= admitted
+}
+
+/// The sign of a sum of products, without rounding. Factors are below 2^66.
+fn sign_of_sum(terms: [(i128, f64); 3]) -> Ordering {
+    let mut terms = terms.map(|(factor, number)| {
+        let (mantissa, exponent) = parts(number);
+        (factor * i128::from(mantissa), exponent)
+    });
+    terms.sort_by_key(|&(_, exponent)| std::cmp::Reverse(exponent));
+    let mut sum = 0_i128;
+    let mut unit = terms[0].1;
+    for (term, exponent) in terms {
+        let shift = (unit - exponent).unsigned_abs();
+        unit = exponent;
+        if sum != 0 {
+            // Each term is below 2^119: a sum of 2^121 or more keeps its sign whatever follows.
+            if sum.unsigned_abs().ilog2() + shift >= 121 {
+                break;
+            }
+            sum <<= shift;
+        }
+        sum += term;
+    }
+    sum.cmp(&0)
+}
+
+/// A finite number as `mantissa * 2^exponent`.
+fn parts(number: f64) -> (i64, i32) {
+    let bits = number.to_bits();
+    let fraction = (bits & ((1 << 52) - 1)) as i64;
+    let (magnitude, exponent) = match ((bits >> 52) & 0x7ff) as i32 {
+        0 => (fraction, -1074),
+        biased => (fraction | 1 << 52, biased - 1075),
+    };
+    (
+        if number.is_sign_negative() {
+            -magnitude
+        } else {
+            magnitude
+        },
+        exponent,
+    )
+}
+
+/// The decimal with the fewest significant digits that encodes back to `raw`.
+///
+/// Zero counts as a number without digits, so that the middle of a symmetric range reads 0. Among
+/// decimals of equally many digits the one nearest to [`real_from_raw`] is taken. Where steps are
+/// finer than `f64` can express and no decimal encodes back, it is [`real_from_raw`] itself.
+pub fn shortest_real(scale: &Scale, width: Unsigned, raw: u64) -> f64 {
+    let exact = real_from_raw(scale, width, raw);
+    let encodes_back = |real: &f64| raw_from_real(scale, width, *real) == Some(raw);
+    if encodes_back(&0.0) || !exact.is_finite() {
+        return if exact.is_finite() { 0.0 } else { exact };
+    }
+    (1..=17)
+        .flat_map(|digits| neighbours(exact, digits))
+        .find(encodes_back)
+        .unwrap_or(exact)
+}
+
+/// The two decimals of so many significant digits around a number other than 0, the nearer first.
+fn neighbours(number: f64, digits: usize) -> impl Iterator<Item = f64> {
+    // "-1.25e-3" is read as -125 * 10^-5.
+    let text = format!("{:.*e}", digits - 1, number.abs());
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let whole: u64 = mantissa.replace('.', "").parse().unwrap_or(0);
+    let exponent = exponent.parse::<i32>().unwrap_or(0) - (digits as i32 - 1);
+    let decimal = |whole: u64, exponent: i32| -> Option<f64> {
+        let magnitude: f64 = format!("{whole}e{exponent}").parse().ok()?;
+        Some(magnitude.copysign(number))
+    };
+    let nearest = decimal(whole, exponent);
+    let other = match nearest {
+        Some(nearest) if nearest.abs() <= number.abs() => decimal(whole + 1, exponent),
+        // Below a power of ten decimals are ten times as dense.
+        _ if whole == 10_u64.pow(digits as u32 - 1) => decimal(whole * 10 - 1, exponent - 1),
+        _ => decimal(whole - 1, exponent),
+    };
+    nearest.into_iter().chain(other)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDTHS: [Unsigned; 3] = [Unsigned::U8, Unsigned::U16, Unsigned::U32];
+
+    fn scale(lower: f64, upper: f64, rounding: Rounding) -> Scale {
+        Scale {
+            lower,
+            upper,
+            rounding,
+        }
+    }
+
+    #[test]
+    fn the_limits_are_in_the_range_and_their_neighbours_are_not() {
+        let range = scale(-3.14159, 3.14159, Rounding::Round);
+        for width in WIDTHS {
+            assert_eq!(raw_from_real(&range, width, -3.14159), Some(0));
+            assert_eq!(raw_from_real(&range, width, 3.14159), Some(width.max()));
+        }
+        for outside in [f64::NAN, f64::INFINITY, 3.14159_f64.next_up(), -3.15] {
+            assert_eq!(
+                raw_from_real(&range, Unsigned::U16, outside),
+                None,
+                "{outside}"
+            );
+        }
+    }
+
+    #[test]
+    fn halves_go_up_and_anything_below_goes_down() {
+        let range = scale(0.0, 255.0, Rounding::Round);
+        assert_eq!(raw_from_real(&range, Unsigned::U8, 7.5), Some(8));
+        assert_eq!(
+            raw_from_real(&range, Unsigned::U8, 7.5_f64.next_down()),
+            Some(7)
+        );
+        assert_eq!(
+            raw_from_real(&range, Unsigned::U8, f64::MIN_POSITIVE),
+            Some(0)
+        );
+    }
+
+    #[test]
+    fn floor_goes_down_and_ceiling_goes_up() {
+        let floor = scale(-255.0, 0.0, Rounding::Floor);
+        let ceiling = scale(-255.0, 0.0, Rounding::Ceiling);
+        for (real, down, up) in [
+            (-255.0, 0, 0),
+            (-254.5, 0, 1),
+            (-254.0, 1, 1),
+            (-0.1, 254, 255),
+        ] {
+            assert_eq!(
+                raw_from_real(&floor, Unsigned::U8, real),
+                Some(down),
+                "{real}"
+            );
+            assert_eq!(
+                raw_from_real(&ceiling, Unsigned::U8, real),
+                Some(up),
+                "{real}"
+            );
+        }
+        let tiny = -f64::from_bits(1);
+        assert_eq!(raw_from_real(&floor, Unsigned::U8, tiny), Some(254));
+        assert_eq!(raw_from_real(&ceiling, Unsigned::U8, tiny), Some(255));
+    }
+
+    #[test]
+    fn extreme_ranges_are_exact_too() {
+        let wide = scale(-f64::MAX, f64::MAX, Rounding::Round);
+        assert_eq!(raw_from_real(&wide, Unsigned::U8, -f64::MAX), Some(0));
+        assert_eq!(raw_from_real(&wide, Unsigned::U8, 0.0), Some(128));
+        assert_eq!(
+            raw_from_real(&wide, Unsigned::U64, f64::MAX),
+            Some(u64::MAX)
+        );
+        let one = scale(0.0, 1.0, Rounding::Round);
+        assert_eq!(raw_from_real(&one, Unsigned::U64, 0.5), Some(1 << 63));
+        assert_eq!(raw_from_real(&one, Unsigned::U64, 1.0), Some(u64::MAX));
+    }
+
+    #[test]
+    fn the_shortest_decimal_is_short() {
+        let angle = scale(-180.0, 180.0, Rounding::Round);
+        assert_eq!(shortest_real(&angle, Unsigned::U32, 1 << 31), 0.0);
+        assert_eq!(shortest_real(&angle, Unsigned::U32, u32::MAX.into()), 180.0);
+        let percent = scale(0.0, 100.0, Rounding::Round);
+        assert_eq!(shortest_real(&percent, Unsigned::U8, 1), 0.4);
+        assert_eq!(shortest_real(&percent, Unsigned::U8, 255), 100.0);
+        // 1.5708 would be nearest to the upper limit, but lies beyond it.
+        let quarter = scale(0.0, std::f64::consts::FRAC_PI_2, Rounding::Round);
+        assert_eq!(shortest_real(&quarter, Unsigned::U16, 65535), 1.57079);
+    }
+
+    #[test]
+    fn every_octet_comes_back_from_its_shortest_decimal() {
+        for rounding in [Rounding::Round, Rounding::Floor, Rounding::Ceiling] {
+            for (lower, upper) in [(0.0, 100.0), (-0.3, 0.7), (-1e-9, 1e9), (99.9, 100.1)] {
+                let range = scale(lower, upper, rounding);
+                for raw in 0..=255 {
+                    let real = shortest_real(&range, Unsigned::U8, raw);
+                    assert_eq!(
+                        raw_from_real(&range, Unsigned::U8, real),
+                        Some(raw),
+                        "{range:?}"
+                    );
+                }
+            }
+        }
+    }
+}
