@@ -113,12 +113,24 @@ fn parts(number: f64) -> (i64, i32) {
 /// finer than `f64` can express and no decimal encodes back, it is [`real_from_raw`] itself.
 pub fn shortest_real(scale: &Scale, width: Unsigned, raw: u64) -> f64 {
     let exact = real_from_raw(scale, width, raw);
-    let encodes_back = |real: &f64| raw_from_real(scale, width, *real) == Some(raw);
-    if encodes_back(&0.0) || !exact.is_finite() {
-        return if exact.is_finite() { 0.0 } else { exact };
+    if !exact.is_finite() {
+        return exact;
     }
-    (1..=17)
-        .flat_map(|digits| neighbours(exact, digits))
+    let encodes_back = |real: &f64| raw_from_real(scale, width, *real) == Some(raw);
+    if encodes_back(&0.0) {
+        return 0.0;
+    }
+    // With `floor` and `ceiling` the exact value is the edge of what encodes back, and the rounding
+    // error of its computation may put it beyond.
+    let half_step = (scale.upper - scale.lower) / width.max() as f64 / 2.0;
+    let inside = match scale.rounding {
+        Rounding::Round => exact,
+        Rounding::Floor => exact + half_step,
+        Rounding::Ceiling => exact - half_step,
+    };
+    let around = |number| (1..=17).flat_map(move |digits| neighbours(number, digits));
+    around(exact)
+        .chain(around(inside))
         .find(encodes_back)
         .unwrap_or(exact)
 }
@@ -160,12 +172,12 @@ mod tests {
 
     #[test]
     fn the_limits_are_in_the_range_and_their_neighbours_are_not() {
-        let range = scale(-3.14159, 3.14159, Rounding::Round);
+        let range = scale(-5.27, 5.27, Rounding::Round);
         for width in WIDTHS {
-            assert_eq!(raw_from_real(&range, width, -3.14159), Some(0));
-            assert_eq!(raw_from_real(&range, width, 3.14159), Some(width.max()));
+            assert_eq!(raw_from_real(&range, width, -5.27), Some(0));
+            assert_eq!(raw_from_real(&range, width, 5.27), Some(width.max()));
         }
-        for outside in [f64::NAN, f64::INFINITY, 3.14159_f64.next_up(), -3.15] {
+        for outside in [f64::NAN, f64::INFINITY, 5.27_f64.next_up(), -5.28] {
             assert_eq!(
                 raw_from_real(&range, Unsigned::U16, outside),
                 None,
@@ -236,9 +248,9 @@ mod tests {
         let percent = scale(0.0, 100.0, Rounding::Round);
         assert_eq!(shortest_real(&percent, Unsigned::U8, 1), 0.4);
         assert_eq!(shortest_real(&percent, Unsigned::U8, 255), 100.0);
-        // 1.5708 would be nearest to the upper limit, but lies beyond it.
-        let quarter = scale(0.0, std::f64::consts::FRAC_PI_2, Rounding::Round);
-        assert_eq!(shortest_real(&quarter, Unsigned::U16, 65535), 1.57079);
+        // 2.3457 would be nearest to the upper limit, but lies beyond it.
+        let odd = scale(0.0, 2.3456963, Rounding::Round);
+        assert_eq!(shortest_real(&odd, Unsigned::U16, 65535), 2.34569);
     }
 
     #[test]

@@ -15,15 +15,15 @@ use crate::model::{Array, Number, Shape, Signed, SubField, Unsigned};
 pub enum Value {
     /// `record` or `sequence`: one slot for every member of the definition, in its order; `None`
     /// for an optional member that is absent.
-    Group(Vec<Option<Value>>),
+    Group(Vec<Option<Self>>),
     /// The elements of a `list`.
-    List(Vec<Value>),
+    List(Vec<Self>),
     /// The chosen alternative of a `variant`.
     Variant {
         /// Its zero-based position; 0 in a variant without alternatives.
         tag: u64,
         /// What it holds; `None` only in a variant without alternatives.
-        value: Option<Box<Value>>,
+        value: Option<Box<Self>>,
     },
     /// `fixed_field`. A scaled integer is the integer.
     Number(Raw),
@@ -48,7 +48,7 @@ pub enum Value {
         number: Raw,
     },
     /// `array`: all elements in wire order, the first dimension fastest.
-    Array(Vec<Value>),
+    Array(Vec<Self>),
 }
 
 impl Value {
