@@ -77,7 +77,7 @@ pub enum DecodeProblem {
         found: u16,
     },
     /// The octets end too early.
-    #[error("{needed} octets needed, {left} left")]
+    #[error("octets needed: {needed}, left: {left}")]
     Short {
         /// Octets that the item takes.
         needed: u64,
@@ -85,7 +85,7 @@ pub enum DecodeProblem {
         left: usize,
     },
     /// Octets follow the message.
-    #[error("{left} octets after the end of the message")]
+    #[error("octets after the end of the message: {left}")]
     Trailing {
         /// How many.
         left: usize,
