@@ -1,0 +1,412 @@
+//! Who is who: [`JausId`], the 32-bit identity of a component that every JAUS message carries twice.
+//!
+//! An id names subsystem (a vehicle, an operator station), node (a computer) and component (a program), and is
+//! written `101.1.33`. A destination may stand for many: subsystem 65535, node 255 and component 255 each mean
+//! "all of them" in their own field. Zero names nobody.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// The identity of a component, or as a destination a pattern of them.
+///
+/// Any 32 bits make a `JausId`, because any 32 bits can arrive; [`is_unicast`](Self::is_unicast) tells whether it
+/// names one component. Ordering is by subsystem, then node, then component.
+///
+/// ```
+/// use jaus::address::JausId;
+///
+/// let driver: JausId = "101.1.33".parse()?;
+/// assert_eq!(driver, JausId::new(101, 1, 33));
+/// assert!("101.1.255".parse::<JausId>()?.matches(driver));
+/// assert_eq!(driver.to_wire(), [33, 1, 101, 0]);
+/// # Ok::<(), jaus::address::ParseIdError>(())
+/// ```
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct JausId {
+    subsystem: u16,
+    node: u8,
+    component: u8,
+}
+
+impl JausId {
+    /// The subsystem number that stands for every subsystem (AS5669A).
+    pub const ANY_SUBSYSTEM: u16 = 0xFFFF;
+    /// The node number that stands for every node (AS5669A).
+    pub const ANY_NODE: u8 = 0xFF;
+    /// The component number that stands for every component (AS5669A).
+    pub const ANY_COMPONENT: u8 = 0xFF;
+    /// Every component of every subsystem: `65535.255.255`.
+    pub const EVERYONE: Self = Self::new(Self::ANY_SUBSYSTEM, Self::ANY_NODE, Self::ANY_COMPONENT);
+
+    /// An id from its three numbers.
+    #[must_use]
+    pub const fn new(subsystem: u16, node: u8, component: u8) -> Self {
+        Self {
+            subsystem,
+            node,
+            component,
+        }
+    }
+
+    /// The subsystem number.
+    #[must_use]
+    pub const fn subsystem(self) -> u16 {
+        self.subsystem
+    }
+
+    /// The node number within the subsystem.
+    #[must_use]
+    pub const fn node(self) -> u8 {
+        self.node
+    }
+
+    /// The component number within the node.
+    #[must_use]
+    pub const fn component(self) -> u8 {
+        self.component
+    }
+
+    /// The id as one number, `subsystem << 16 | node << 8 | component`.
+    #[must_use]
+    pub const fn to_u32(self) -> u32 {
+        (self.subsystem as u32) << 16 | (self.node as u32) << 8 | self.component as u32
+    }
+
+    /// The id that [`to_u32`](Self::to_u32) gives.
+    #[must_use]
+    pub const fn from_u32(id: u32) -> Self {
+        Self::new((id >> 16) as u16, (id >> 8) as u8, id as u8)
+    }
+
+    /// The four octets of a message header: component, node, subsystem low, subsystem high.
+    #[must_use]
+    pub const fn to_wire(self) -> [u8; 4] {
+        self.to_u32().to_le_bytes()
+    }
+
+    /// The id in four octets of a message header.
+    #[must_use]
+    pub const fn from_wire(octets: [u8; 4]) -> Self {
+        Self::from_u32(u32::from_le_bytes(octets))
+    }
+
+    /// Whether a field stands for "all": subsystem 65535, node 255 or component 255.
+    ///
+    /// A single octet FFh within a subsystem number, as in 511, is an ordinary number.
+    #[must_use]
+    pub const fn has_wildcard(self) -> bool {
+        self.subsystem == Self::ANY_SUBSYSTEM
+            || self.node == Self::ANY_NODE
+            || self.component == Self::ANY_COMPONENT
+    }
+
+    /// Whether a field is zero, so that the id names nobody.
+    #[must_use]
+    pub const fn has_zero(self) -> bool {
+        self.subsystem == 0 || self.node == 0 || self.component == 0
+    }
+
+    /// Whether the id names exactly one component: no wildcard, no zero.
+    #[must_use]
+    pub const fn is_unicast(self) -> bool {
+        !self.has_wildcard() && !self.has_zero()
+    }
+
+    /// Whether this destination reaches `component`: each field is equal or stands for all.
+    ///
+    /// A zero stands for nobody on either side. (One peer family reads zero as a wildcard; taking that over would
+    /// make ids with a zero octet reach strangers.)
+    ///
+    /// ```
+    /// use jaus::address::JausId;
+    ///
+    /// let component = JausId::new(101, 1, 33);
+    /// assert!(JausId::EVERYONE.matches(component));
+    /// assert!(JausId::new(101, 255, 33).matches(component));
+    /// assert!(!JausId::new(102, 255, 255).matches(component));
+    /// assert!(!JausId::new(101, 1, 0).matches(component));
+    /// ```
+    #[must_use]
+    pub const fn matches(self, component: Self) -> bool {
+        !self.has_zero()
+            && !component.has_zero()
+            && (self.subsystem == component.subsystem || self.subsystem == Self::ANY_SUBSYSTEM)
+            && (self.node == component.node || self.node == Self::ANY_NODE)
+            && (self.component == component.component || self.component == Self::ANY_COMPONENT)
+    }
+
+    /// Every component of this id's node: `subsystem.node.255`.
+    #[must_use]
+    pub const fn whole_node(self) -> Self {
+        Self::new(self.subsystem, self.node, Self::ANY_COMPONENT)
+    }
+
+    /// Every component of this id's subsystem: `subsystem.255.255`.
+    #[must_use]
+    pub const fn whole_subsystem(self) -> Self {
+        Self::new(self.subsystem, Self::ANY_NODE, Self::ANY_COMPONENT)
+    }
+}
+
+impl fmt::Display for JausId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (subsystem, node, component) = (self.subsystem, self.node, self.component);
+        match f.width() {
+            Some(_) => f.pad(&format!("{subsystem}.{node}.{component}")),
+            None => write!(f, "{subsystem}.{node}.{component}"),
+        }
+    }
+}
+
+impl fmt::Debug for JausId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// Why a text is not a JAUS id.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ParseIdError {
+    /// Not three parts with dots between them.
+    #[error("\"{text}\" is not a JAUS id: write subsystem.node.component, for instance 101.1.33")]
+    Shape {
+        /// What was given, cut after some characters.
+        text: String,
+    },
+    /// A part is not a decimal number.
+    #[error(
+        "the {field} of \"{text}\" is not a number: write subsystem.node.component, for instance 101.1.33"
+    )]
+    NotANumber {
+        /// What was given, cut after some characters.
+        text: String,
+        /// `subsystem`, `node` or `component`.
+        field: &'static str,
+    },
+    /// A part is above what its field holds.
+    #[error("the {field} of \"{text}\" is above {limit} (which stands for every {field})")]
+    TooLarge {
+        /// What was given, cut after some characters.
+        text: String,
+        /// `subsystem`, `node` or `component`.
+        field: &'static str,
+        /// The largest number of that field.
+        limit: u16,
+    },
+}
+
+impl FromStr for JausId {
+    type Err = ParseIdError;
+
+    fn from_str(text: &str) -> Result<Self, ParseIdError> {
+        let mut parts = text.split('.');
+        let (Some(subsystem), Some(node), Some(component), None) =
+            (parts.next(), parts.next(), parts.next(), parts.next())
+        else {
+            return Err(ParseIdError::Shape {
+                text: excerpt(text),
+            });
+        };
+        Ok(Self::new(
+            parse_field(text, "subsystem", subsystem, Self::ANY_SUBSYSTEM)?,
+            parse_field(text, "node", node, Self::ANY_NODE.into())? as u8,
+            parse_field(text, "component", component, Self::ANY_COMPONENT.into())? as u8,
+        ))
+    }
+}
+
+/// One number of an id, at most `limit`.
+fn parse_field(
+    text: &str,
+    field: &'static str,
+    part: &str,
+    limit: u16,
+) -> Result<u16, ParseIdError> {
+    if part.is_empty() || !part.bytes().all(|octet| octet.is_ascii_digit()) {
+        return Err(ParseIdError::NotANumber {
+            text: excerpt(text),
+            field,
+        });
+    }
+    match part.parse() {
+        Ok(number) if number <= limit => Ok(number),
+        _ => Err(ParseIdError::TooLarge {
+            text: excerpt(text),
+            field,
+            limit,
+        }),
+    }
+}
+
+/// Enough of a text to recognise it in an error.
+fn excerpt(text: &str) -> String {
+    const LONGEST: usize = 32;
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+/// As text, `"101.1.33"`.
+#[cfg(feature = "serde")]
+impl serde::Serialize for JausId {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// From text, `"101.1.33"`.
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for JausId {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Text;
+        impl serde::de::Visitor<'_> for Text {
+            type Value = JausId;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a JAUS id such as \"101.1.33\"")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<JausId, E> {
+                text.parse().map_err(E::custom)
+            }
+        }
+        deserializer.deserialize_str(Text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn error(text: &str) -> String {
+        text.parse::<JausId>()
+            .expect_err("must not parse")
+            .to_string()
+    }
+
+    #[test]
+    fn an_id_is_written_with_dots_and_read_back() {
+        let id: JausId = "1000.1.7".parse().unwrap();
+        assert_eq!((id.subsystem(), id.node(), id.component()), (1000, 1, 7));
+        assert_eq!(id.to_string(), "1000.1.7");
+        assert_eq!(format!("{id:>10}|{id:<10}|"), "  1000.1.7|1000.1.7  |");
+        assert_eq!("65535.255.255".parse(), Ok(JausId::EVERYONE));
+    }
+
+    #[test]
+    fn a_wrong_text_is_told_what_is_wrong_with_it() {
+        assert_eq!(
+            error("101.1"),
+            "\"101.1\" is not a JAUS id: write subsystem.node.component, for instance 101.1.33"
+        );
+        assert!(error("1.2.3.4").contains("is not a JAUS id"));
+        assert!(error("").contains("is not a JAUS id"));
+        assert!(error("1.x.3").starts_with("the node of \"1.x.3\" is not a number"));
+        assert!(error("1.2.").starts_with("the component of"));
+        assert!(error("+1.2.3").starts_with("the subsystem of"));
+        assert_eq!(
+            error("65536.1.1"),
+            "the subsystem of \"65536.1.1\" is above 65535 (which stands for every subsystem)"
+        );
+        assert_eq!(
+            error("1.1.256"),
+            "the component of \"1.1.256\" is above 255 (which stands for every component)"
+        );
+        assert!(error("99999999999999999999999999.1.1").contains("is above 65535"));
+        assert!(error(&"9".repeat(100_000)).len() < 200);
+    }
+
+    #[test]
+    fn the_wire_order_is_component_node_subsystem() {
+        // From a recorded JAUS++ discovery: source 1000.1.7.
+        assert_eq!(
+            JausId::from_wire([0x07, 0x01, 0xE8, 0x03]),
+            JausId::new(1000, 1, 7)
+        );
+        assert_eq!(JausId::new(1000, 1, 7).to_wire(), [0x07, 0x01, 0xE8, 0x03]);
+    }
+
+    #[test]
+    fn wildcards_stand_for_all_only_in_their_own_field() {
+        let component = JausId::new(101, 2, 3);
+        for pattern in [
+            "101.2.3",
+            "101.2.255",
+            "101.255.3",
+            "65535.2.3",
+            "101.255.255",
+            "65535.255.255",
+        ] {
+            assert!(
+                pattern.parse::<JausId>().unwrap().matches(component),
+                "{pattern}"
+            );
+        }
+        for pattern in [
+            "101.2.4",
+            "101.3.255",
+            "102.255.255",
+            "255.255.255",
+            "511.2.3",
+        ] {
+            assert!(
+                !pattern.parse::<JausId>().unwrap().matches(component),
+                "{pattern}"
+            );
+        }
+        assert!(
+            JausId::new(0x01FF, 1, 1).is_unicast(),
+            "a lone FFh in a subsystem number is no wildcard"
+        );
+    }
+
+    #[test]
+    fn zero_is_nobody() {
+        let component = JausId::new(257, 1, 1);
+        for pattern in ["0.1.1", "257.0.1", "257.1.0", "0.0.0", "0.255.255"] {
+            let pattern: JausId = pattern.parse().unwrap();
+            assert!(
+                !pattern.matches(component) && !pattern.is_unicast(),
+                "{pattern}"
+            );
+            assert!(!JausId::EVERYONE.matches(pattern), "{pattern}");
+        }
+    }
+
+    #[test]
+    fn order_is_by_subsystem_then_node_then_component() {
+        let mut ids =
+            ["2.1.1", "1.2.1", "1.1.2", "256.1.1", "1.1.1"].map(|id| id.parse::<JausId>().unwrap());
+        ids.sort();
+        assert_eq!(
+            ids.map(|id| id.to_string()),
+            ["1.1.1", "1.1.2", "1.2.1", "2.1.1", "256.1.1"]
+        );
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn json_shows_an_id_as_text() {
+        let id = JausId::new(101, 1, 33);
+        assert_eq!(serde_json::to_string(&id).unwrap(), "\"101.1.33\"");
+        assert_eq!(serde_json::from_str::<JausId>("\"101.1.33\"").unwrap(), id);
+        let wrong = serde_json::from_str::<JausId>("\"101.1.333\"")
+            .unwrap_err()
+            .to_string();
+        assert!(wrong.contains("is above 255"), "{wrong}");
+    }
+
+    proptest! {
+        #[test]
+        fn every_id_survives_text_number_and_wire(number: u32) {
+            let id = JausId::from_u32(number);
+            prop_assert_eq!(id.to_string().parse(), Ok(id));
+            prop_assert_eq!(JausId::from_wire(id.to_wire()), id);
+            prop_assert_eq!(id.to_u32(), number);
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! What an endpoint has seen, done and thrown away: one number for each, for people and for tests.
+
+use std::fmt;
+
+macro_rules! counters {
+    ($($(#[doc = $doc:literal])+ $name:ident = $text:literal,)+) => {
+        /// What is counted.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[non_exhaustive]
+        pub enum Counter {
+            $($(#[doc = $doc])+ $name,)+
+        }
+
+        impl Counter {
+            /// Every counter, in the order of their listing.
+            pub const ALL: &[Self] = &[$(Self::$name,)+];
+
+            /// What is counted, in a few words.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $text,)+
+                }
+            }
+        }
+    };
+}
+
+counters! {
+    /// Datagrams handed in.
+    DatagramsReceived = "datagrams received",
+    /// Datagrams handed out.
+    DatagramsSent = "datagrams sent",
+    /// Messages found in datagrams.
+    MessagesReceived = "messages received",
+    /// Messages delivered; one for several local components counts for each.
+    MessagesDelivered = "messages delivered",
+    /// Messages accepted for sending; one in several fragments or on several links counts once.
+    MessagesSent = "messages sent",
+    /// Acknowledgements sent.
+    AcknowledgementsSent = "acknowledgements sent",
+    /// Messages sent again for want of an acknowledgement.
+    Retransmissions = "retransmissions",
+    /// Peers forgotten because more were heard than the table holds.
+    PeersEvicted = "peers forgotten, table full",
+    /// Octets behind the last message of a datagram, left by a peer that does not shorten its buffer.
+    StaleOctets = "stale octets behind messages",
+    /// Dropped: a datagram from a link that the endpoint does not have.
+    UnknownLink = "dropped: unknown link",
+    /// Dropped: a datagram that no JAUS transport wrote.
+    NotJaus = "dropped: not JAUS",
+    /// Dropped: a datagram whose first message does not fit its own sizes.
+    Malformed = "dropped: malformed",
+    /// Dropped: an AS5669A message of a reserved type.
+    ReservedType = "dropped: reserved message type",
+    /// Dropped: a compressed header, which nobody negotiated with us.
+    CompressedHeader = "dropped: compressed header",
+    /// Dropped: the reserved value of the broadcast field.
+    ReservedBroadcast = "dropped: reserved broadcast value",
+    /// Dropped: a source id with a wildcard or a zero.
+    InvalidSource = "dropped: source is not one component",
+    /// Dropped: our own multicast, come back.
+    OwnEcho = "dropped: own multicast",
+    /// Dropped: somebody else sends with the id of a component of ours.
+    IdConflict = "dropped: id conflict",
+    /// Dropped: for nobody here.
+    NotForUs = "dropped: not for us",
+    /// Dropped: a local broadcast from another subsystem.
+    OutOfScope = "dropped: local broadcast of another subsystem",
+    /// Dropped: an acknowledgement with a message in it.
+    AcknowledgementWithPayload = "dropped: acknowledgement with payload",
+    /// Dropped: an acknowledgement that nobody waits for.
+    UnexpectedAcknowledgement = "dropped: unexpected acknowledgement",
+    /// Dropped: the same message within a short time.
+    Duplicate = "dropped: duplicate",
+    /// Dropped: a message too short for a message code.
+    NoMessageCode = "dropped: no message code",
+    /// Dropped: a part of a large message.
+    Fragment = "dropped: fragment",
+    /// Dropped: a received message, because too many wait to be delivered.
+    DeliveryQueueFull = "dropped: delivery queue full",
+    /// Dropped: a datagram to send, because too many wait to be sent.
+    TransmitQueueFull = "dropped: transmit queue full",
+    /// Dropped: an event that is not a message, because too many wait.
+    NewsQueueFull = "dropped: event queue full",
+}
+
+/// The numbers of an endpoint. They only grow.
+///
+/// `Display` lists those that are not zero, one a line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Counters {
+    values: [u64; Counter::ALL.len()],
+}
+
+impl Default for Counters {
+    fn default() -> Self {
+        Self {
+            values: [0; Counter::ALL.len()],
+        }
+    }
+}
+
+impl Counters {
+    /// The number of one counter.
+    #[must_use]
+    pub fn get(&self, counter: Counter) -> u64 {
+        self.values[counter as usize]
+    }
+
+    /// All counters with their numbers.
+    pub fn iter(&self) -> impl Iterator<Item = (Counter, u64)> + '_ {
+        Counter::ALL.iter().copied().zip(self.values)
+    }
+
+    pub(super) fn add(&mut self, counter: Counter) {
+        self.add_many(counter, 1);
+    }
+
+    pub(super) fn add_many(&mut self, counter: Counter, number: u64) {
+        self.values[counter as usize] += number;
+    }
+}
+
+impl fmt::Display for Counters {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (counter, number) in self.iter().filter(|&(_, number)| number != 0) {
+            writeln!(f, "{number:>10}  {}", counter.name())?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Counter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}

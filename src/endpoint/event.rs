@@ -1,0 +1,112 @@
+//! What goes in and out of an endpoint beside datagrams: messages to send, messages received, and news.
+
+use bytes::Bytes;
+
+use super::{MessageHandle, Path};
+use crate::address::JausId;
+use crate::wire::{Broadcast, Priority, Version};
+
+/// A message that a local component wants to send.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outgoing {
+    /// The sender, an attached component.
+    pub source: JausId,
+    /// For whom; may hold wildcards.
+    pub destination: JausId,
+    /// How urgent it is.
+    pub priority: Priority,
+    /// How far it goes. With `None`, a destination with wildcards makes it global.
+    pub broadcast: Broadcast,
+    /// Whether the receiver is to acknowledge it; then an event tells the result.
+    pub acknowledge: bool,
+    /// The message, beginning with its two code octets.
+    pub payload: Bytes,
+}
+
+impl Outgoing {
+    /// A message of standard priority, without acknowledgement.
+    #[must_use]
+    pub fn new(source: JausId, destination: JausId, payload: Bytes) -> Self {
+        Self {
+            source,
+            destination,
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            acknowledge: false,
+            payload,
+        }
+    }
+}
+
+/// A message for a local component.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Received {
+    /// Who sent it.
+    pub source: JausId,
+    /// For whom, as the sender wrote it.
+    pub destination: JausId,
+    /// How urgent it is.
+    pub priority: Priority,
+    /// How far it was meant to go.
+    pub broadcast: Broadcast,
+    /// The message, beginning with its two code octets.
+    pub payload: Bytes,
+    /// How it came; `None` from a component of this node.
+    pub path: Option<Path>,
+    /// The local component that it is for.
+    pub to: JausId,
+}
+
+/// Something that the owner of an endpoint is told.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Event {
+    /// A message for a local component.
+    Received(Received),
+    /// A peer was heard for the first time (or again, after it had been forgotten).
+    PeerLearned {
+        /// Who.
+        id: JausId,
+        /// Where.
+        path: Path,
+        /// The header that it writes.
+        version: Version,
+    },
+    /// A peer was heard from another address than before; messages to it go there from now on.
+    PeerMoved {
+        /// Who.
+        id: JausId,
+        /// Where it was.
+        from: Path,
+        /// Where it is.
+        to: Path,
+    },
+    /// A peer was forgotten because more were heard than [`Config::max_peers`](super::Config::max_peers).
+    PeerForgotten {
+        /// Who.
+        id: JausId,
+    },
+    /// Somebody else sends with the id of a local component: one of the two must change.
+    IdConflict {
+        /// The id that both have.
+        id: JausId,
+        /// Where the other is.
+        path: Path,
+    },
+    /// A message that wanted it was acknowledged.
+    Acknowledged {
+        /// The message.
+        message: MessageHandle,
+        /// By whom.
+        by: JausId,
+    },
+    /// A message that wanted it was not acknowledged, and will not be sent again.
+    NotAcknowledged {
+        /// The message.
+        message: MessageHandle,
+        /// For whom it was.
+        destination: JausId,
+        /// Whether the receiver refused it (NAK); otherwise nothing was heard in time.
+        refused: bool,
+    },
+}

@@ -1,0 +1,76 @@
+//! The components of this node that are attached to the endpoint.
+
+use std::collections::BTreeSet;
+
+use crate::address::JausId;
+
+/// Why a component cannot be attached.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AttachError {
+    /// The id has a zero or a wildcard.
+    #[error(
+        "{0} does not name one component: the subsystem must be 1 to 65534, node and component 1 to 254 each"
+    )]
+    NotOneComponent(JausId),
+    /// The id is taken here.
+    #[error("{0} is attached already: give each component an id of its own")]
+    AlreadyAttached(JausId),
+    /// There is no room.
+    #[error("{limit} components are attached already, and more are not allowed")]
+    TooMany {
+        /// [`Config::max_components`](super::Config::max_components).
+        limit: usize,
+    },
+}
+
+/// The attached components.
+#[derive(Debug)]
+pub(super) struct Components {
+    ids: BTreeSet<JausId>,
+    limit: usize,
+}
+
+impl Components {
+    pub(super) fn new(limit: usize) -> Self {
+        Self {
+            ids: BTreeSet::new(),
+            limit,
+        }
+    }
+
+    pub(super) fn attach(&mut self, id: JausId) -> Result<(), AttachError> {
+        if !id.is_unicast() {
+            return Err(AttachError::NotOneComponent(id));
+        }
+        if self.ids.contains(&id) {
+            return Err(AttachError::AlreadyAttached(id));
+        }
+        if self.ids.len() >= self.limit {
+            return Err(AttachError::TooMany { limit: self.limit });
+        }
+        self.ids.insert(id);
+        Ok(())
+    }
+
+    pub(super) fn detach(&mut self, id: JausId) {
+        self.ids.remove(&id);
+    }
+
+    pub(super) fn contains(&self, id: JausId) -> bool {
+        self.ids.contains(&id)
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = JausId> + '_ {
+        self.ids.iter().copied()
+    }
+
+    /// Those that `destination` reaches.
+    pub(super) fn matching(&self, destination: JausId) -> Vec<JausId> {
+        if destination.has_wildcard() {
+            self.iter().filter(|&id| destination.matches(id)).collect()
+        } else {
+            self.ids.get(&destination).copied().into_iter().collect()
+        }
+    }
+}

@@ -1,0 +1,232 @@
+//! The protocol core of a node: who is here, who is where, what to send and what to deliver.
+//!
+//! An [`Endpoint`] does no I/O and reads no clock. Its owner says what happened ([`Endpoint::handle_datagram`],
+//! [`Endpoint::handle_timeout`]), what is wanted ([`Endpoint::attach`], [`Endpoint::send`]), and then polls until there
+//! is no more: [`Endpoint::poll_transmit`] for datagrams to send, [`Endpoint::poll_event`] for messages to deliver and
+//! news, [`Endpoint::poll_timeout`] for when to call `handle_timeout`.
+//!
+//! Received rubbish is never an error here: it is counted ([`Counters`]), traced and forgotten. Every table and queue
+//! has a bound in [`Config`]; what is dropped for a bound is counted too.
+//!
+//! ```
+//! use std::time::Instant;
+//!
+//! use bytes::Bytes;
+//! use jaus::address::JausId;
+//! use jaus::endpoint::{Config, Endpoint, Event, Outgoing};
+//!
+//! let (driver, sensor) = (JausId::new(101, 1, 33), JausId::new(101, 1, 41));
+//! let mut endpoint = Endpoint::new(Config::default());
+//! endpoint.attach(driver)?;
+//! endpoint.attach(sensor)?;
+//! # #[expect(clippy::disallowed_methods, reason = "an example of an owner, who has the clock")]
+//! let now = Instant::now();
+//! let query_identification = Bytes::from_static(b"\x00\x2B\x02");
+//! endpoint.send(now, Outgoing::new(driver, sensor, query_identification))?;
+//! let Some(Event::Received(message)) = endpoint.poll_event() else { panic!("a local message") };
+//! assert_eq!((message.source, message.to), (driver, sensor));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod acknowledge;
+mod config;
+mod counters;
+mod event;
+mod local;
+mod peers;
+mod queue;
+mod receive;
+mod recent;
+mod send;
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::net::SocketAddr;
+use std::time::Instant;
+
+use bytes::Bytes;
+
+pub use acknowledge::MessageHandle;
+pub use config::{Config, StaticPeer};
+pub use counters::{Counter, Counters};
+pub use event::{Event, Outgoing, Received};
+pub use local::AttachError;
+pub use peers::Peer;
+pub use send::SendError;
+
+use crate::address::JausId;
+use crate::wire::Priority;
+use acknowledge::Acknowledgements;
+use local::Components;
+use peers::Peers;
+use queue::PriorityQueue;
+use recent::Recent;
+
+/// A link of the node, numbered by its owner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LinkId(pub u16);
+
+/// Where a datagram came from, and where answers go: a socket address as seen through a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Path {
+    /// The link.
+    pub link: LinkId,
+    /// The address at the other end.
+    pub peer: SocketAddr,
+}
+
+/// Whereto on a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum To {
+    /// One address.
+    Peer(SocketAddr),
+    /// The link's multicast group, or what it has instead.
+    Group,
+}
+
+/// A datagram that the owner is to send.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Transmit {
+    /// Through this link.
+    pub link: LinkId,
+    /// Whereto.
+    pub to: To,
+    /// The datagram.
+    pub payload: Bytes,
+}
+
+/// The protocol core of a node. See the [module](self).
+#[derive(Debug)]
+pub struct Endpoint {
+    config: Config,
+    components: Components,
+    links: BTreeMap<LinkId, BTreeSet<SocketAddr>>,
+    peers: Peers,
+    sequence: u16,
+    heard: Recent,
+    sent_to_group: Recent,
+    acknowledgements: Acknowledgements,
+    conflicts: BTreeMap<JausId, Instant>,
+    transmits: PriorityQueue<Transmit>,
+    messages: PriorityQueue<Received>,
+    news: VecDeque<Event>,
+    counters: Counters,
+}
+
+impl Endpoint {
+    /// An endpoint without components and links.
+    #[must_use]
+    pub fn new(config: Config) -> Self {
+        Self {
+            components: Components::new(config.max_components),
+            links: BTreeMap::new(),
+            peers: Peers::new(config.max_peers, config.static_peers.clone()),
+            sequence: config.first_sequence,
+            heard: Recent::new(config.max_recent, config.retransmission_window),
+            sent_to_group: Recent::new(config.max_recent, config.echo_window),
+            acknowledgements: Acknowledgements::new(&config),
+            conflicts: BTreeMap::new(),
+            transmits: PriorityQueue::new(config.queue_limit),
+            messages: PriorityQueue::new(config.queue_limit),
+            news: VecDeque::new(),
+            counters: Counters::default(),
+            config,
+        }
+    }
+
+    /// Takes in a local component: messages to `id` are delivered from now on, and it may send.
+    ///
+    /// # Errors
+    /// An id that does not name one component or is here already, or more than [`Config::max_components`].
+    pub fn attach(&mut self, id: JausId) -> Result<(), AttachError> {
+        self.components.attach(id)?;
+        self.peers.forget(id);
+        Ok(())
+    }
+
+    /// Lets a local component go. What was already received for it can still be polled.
+    pub fn detach(&mut self, id: JausId) {
+        self.components.detach(id);
+        self.acknowledgements.forget_source(id);
+        self.conflicts.remove(&id);
+    }
+
+    /// The attached components, in order of their ids.
+    pub fn components(&self) -> impl Iterator<Item = JausId> + '_ {
+        self.components.iter()
+    }
+
+    /// Takes in a link, or tells that its addresses have changed.
+    ///
+    /// `own` are the addresses that the link sends from, as peers see them. A message from one of our ids that comes
+    /// from elsewhere is an id conflict and not an echo of our own multicast; without addresses only the content tells.
+    pub fn add_link(&mut self, link: LinkId, own: impl IntoIterator<Item = SocketAddr>) {
+        self.links.insert(link, own.into_iter().collect());
+    }
+
+    /// Lets a link go, with what was learned through it and what waits to be sent on it.
+    pub fn remove_link(&mut self, link: LinkId) {
+        self.links.remove(&link);
+        self.peers.forget_link(link);
+        self.transmits.retain(|transmit| transmit.link != link);
+    }
+
+    /// The peers whose addresses are known, in order of their ids.
+    pub fn peers(&self) -> impl Iterator<Item = Peer> + '_ {
+        self.peers.iter()
+    }
+
+    /// Tells that time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached; early calls are
+    /// harmless.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.retry_unacknowledged(now);
+    }
+
+    /// The next datagram to send, the most urgent first.
+    pub fn poll_transmit(&mut self) -> Option<Transmit> {
+        let transmit = self.transmits.pop()?;
+        self.counters.add(Counter::DatagramsSent);
+        Some(transmit)
+    }
+
+    /// The next event: news first, then received messages, the most urgent first.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        self.news
+            .pop_front()
+            .or_else(|| self.messages.pop().map(Event::Received))
+    }
+
+    /// When to call [`handle_timeout`](Self::handle_timeout), if ever.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        self.acknowledgements.next_deadline()
+    }
+
+    /// What was received, sent and dropped, and why.
+    #[must_use]
+    pub fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    fn announce(&mut self, event: Event) {
+        if self.news.len() < self.config.queue_limit {
+            self.news.push_back(event);
+        } else {
+            self.counters.add(Counter::NewsQueueFull);
+        }
+    }
+
+    fn transmit(&mut self, priority: Priority, transmit: Transmit) -> Result<(), SendError> {
+        self.transmits.push(priority, transmit).map_err(|_| {
+            self.counters.add(Counter::TransmitQueueFull);
+            SendError::QueueFull {
+                limit: self.config.queue_limit,
+            }
+        })
+    }
+
+    /// The next sequence number. Never 0, which JAUS++ refuses in fragments.
+    fn next_sequence(&mut self) -> u16 {
+        self.sequence = self.sequence.checked_add(1).unwrap_or(1);
+        self.sequence
+    }
+}

@@ -1,0 +1,225 @@
+//! From a datagram to deliveries: each message is judged, learned from, acknowledged, filtered and handed out.
+
+use std::time::Instant;
+
+use bytes::Bytes;
+use tracing::{debug, trace};
+
+use super::peers::Learned;
+use super::{Counter, Endpoint, Event, Path, Peer, Received};
+use crate::address::JausId;
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Problem, Version, judp};
+
+impl Endpoint {
+    /// Takes a datagram that came from `from`.
+    ///
+    /// Nothing in it is an error: what cannot be used is counted and traced. Messages, answers and news come out of
+    /// [`poll_event`](Self::poll_event) and [`poll_transmit`](Self::poll_transmit).
+    pub fn handle_datagram(&mut self, now: Instant, from: Path, data: Bytes) {
+        self.counters.add(Counter::DatagramsReceived);
+        if !self.links.contains_key(&from.link) {
+            return self.counters.add(Counter::UnknownLink);
+        }
+        let mut frames = match judp::frames(data) {
+            Ok(frames) => frames,
+            Err(error) => {
+                debug!(?from, %error, "not JAUS");
+                return self.counters.add(Counter::NotJaus);
+            }
+        };
+        for frame in &mut frames {
+            match frame {
+                Ok(frame) => self.receive(now, from, &frame),
+                Err(error) => {
+                    debug!(?from, %error, "malformed");
+                    return self.counters.add(match error.problem {
+                        Problem::Compressed => Counter::CompressedHeader,
+                        _ => Counter::Malformed,
+                    });
+                }
+            }
+        }
+        if frames.remaining() > 0 {
+            trace!(?from, octets = frames.remaining(), "stale octets");
+            self.counters
+                .add_many(Counter::StaleOctets, frames.remaining() as u64);
+        }
+    }
+
+    fn receive(&mut self, now: Instant, from: Path, frame: &Frame) {
+        self.counters.add(Counter::MessagesReceived);
+        let (source, destination) = (frame.source, frame.destination);
+        if let Err(reason) = self.accept(now, from, frame) {
+            trace!(%source, %destination, peer = %from.peer, %reason);
+            self.counters.add(reason);
+        }
+    }
+
+    /// Does all that a message causes, or tells why it is dropped.
+    fn accept(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
+        let broadcast = check_header(frame)?;
+        if self.components.contains(frame.source) {
+            return Err(self.judge_own_id(now, from, frame));
+        }
+        let receivers = self.receivers(frame, broadcast)?;
+        if frame.flags.acknowledgement().is_answer() && !frame.is_acknowledgement() {
+            return Err(Counter::AcknowledgementWithPayload);
+        }
+        self.learn(now, from, frame);
+        match frame.flags.acknowledgement() {
+            Acknowledgement::Positive | Acknowledgement::Negative => {
+                return self.receive_answer(frame);
+            }
+            Acknowledgement::Request => self.acknowledge(from, frame),
+            Acknowledgement::None => {}
+        }
+        self.filter_duplicate(now, frame)?;
+        if frame.flags.data() != DataControl::Single {
+            return Err(Counter::Fragment);
+        }
+        self.deliver(from, frame, broadcast, &frame.payload, &receivers)
+    }
+
+    /// The local components that a message is for, or why there are none.
+    fn receivers(&self, frame: &Frame, broadcast: Broadcast) -> Result<Vec<JausId>, Counter> {
+        let mut receivers = self.components.matching(frame.destination);
+        if receivers.is_empty() {
+            return Err(Counter::NotForUs);
+        }
+        if broadcast == Broadcast::Local {
+            receivers.retain(|receiver| receiver.subsystem() == frame.source.subsystem());
+        }
+        if receivers.is_empty() {
+            Err(Counter::OutOfScope)
+        } else {
+            Ok(receivers)
+        }
+    }
+
+    /// A message from an id of ours: our own multicast come back, or somebody else who has taken the id.
+    fn judge_own_id(&mut self, now: Instant, from: Path, frame: &Frame) -> Counter {
+        let own_addresses = || self.links.values().flatten();
+        let may_be_own = own_addresses().next().is_none()
+            || own_addresses().any(|&address| address == from.peer);
+        let fingerprint = self.sent_to_group.fingerprint(frame);
+        if may_be_own
+            && self
+                .sent_to_group
+                .contains(now, &fingerprint, self.config.echo_window)
+        {
+            return Counter::OwnEcho;
+        }
+        let id = frame.source;
+        let announced = self.conflicts.get(&id);
+        if announced
+            .is_none_or(|&at| now.saturating_duration_since(at) >= self.config.conflict_interval)
+        {
+            self.conflicts.insert(id, now);
+            self.announce(Event::IdConflict { id, path: from });
+        }
+        Counter::IdConflict
+    }
+
+    fn learn(&mut self, now: Instant, from: Path, frame: &Frame) {
+        let (id, version) = (frame.source, frame.version);
+        match self.peers.learn(Peer {
+            id,
+            path: from,
+            version,
+            last_heard: now,
+        }) {
+            Learned::Known => {}
+            Learned::New { evicted } => {
+                if let Some(id) = evicted {
+                    self.counters.add(Counter::PeersEvicted);
+                    self.announce(Event::PeerForgotten { id });
+                }
+                debug!(%id, ?from, %version, "peer learned");
+                self.announce(Event::PeerLearned {
+                    id,
+                    path: from,
+                    version,
+                });
+            }
+            Learned::Moved { from: before } => {
+                debug!(%id, ?before, ?from, "peer moved");
+                self.announce(Event::PeerMoved {
+                    id,
+                    from: before,
+                    to: from,
+                });
+            }
+        }
+    }
+
+    /// Drops what was received before.
+    ///
+    /// The older headers' peers leave the sequence number at 0, so there only a message that wants an acknowledgement,
+    /// and hence may be repeated, can be told.
+    fn filter_duplicate(&mut self, now: Instant, frame: &Frame) -> Result<(), Counter> {
+        let repeats = frame.flags.acknowledgement() == Acknowledgement::Request;
+        if !repeats && frame.version != Version::As5669a {
+            return Ok(());
+        }
+        let window = if repeats {
+            self.config.retransmission_window
+        } else {
+            self.config.duplicate_window
+        };
+        let fingerprint = self.heard.fingerprint(frame);
+        if self.heard.contains(now, &fingerprint, window) {
+            return Err(Counter::Duplicate);
+        }
+        self.heard.insert(now, fingerprint);
+        Ok(())
+    }
+
+    /// Queues a whole message for its receivers.
+    fn deliver(
+        &mut self,
+        from: Path,
+        frame: &Frame,
+        broadcast: Broadcast,
+        payload: &Bytes,
+        receivers: &[JausId],
+    ) -> Result<(), Counter> {
+        if payload.len() < 2 {
+            return Err(Counter::NoMessageCode);
+        }
+        for &to in receivers {
+            self.enqueue(Received {
+                source: frame.source,
+                destination: frame.destination,
+                priority: frame.flags.priority(),
+                broadcast,
+                payload: payload.clone(),
+                path: Some(from),
+                to,
+            });
+        }
+        Ok(())
+    }
+
+    /// Queues a message for one component; a full queue is counted.
+    pub(super) fn enqueue(&mut self, received: Received) {
+        let outcome = match self.messages.push(received.priority, received) {
+            Ok(()) => Counter::MessagesDelivered,
+            Err(_) => Counter::DeliveryQueueFull,
+        };
+        self.counters.add(outcome);
+    }
+}
+
+/// Checks what does not depend on who we are; gives the broadcast scope.
+fn check_header(frame: &Frame) -> Result<Broadcast, Counter> {
+    if frame.kind.message_type() != 0 {
+        return Err(Counter::ReservedType);
+    }
+    if frame.kind.is_compressed() {
+        return Err(Counter::CompressedHeader);
+    }
+    if !frame.source.is_unicast() {
+        return Err(Counter::InvalidSource);
+    }
+    frame.flags.broadcast().ok_or(Counter::ReservedBroadcast)
+}
