@@ -1,12 +1,25 @@
 //! What people look at: captures, and JSON of any message.
 //!
-//! From the outside in: a [`Capture`] gives frames, a [`Network`] finds the UDP datagrams in them.
+//! From the outside in: a [`Capture`] gives [`Frame`]s, a [`Network`] finds the UDP [`Datagram`]s
+//! in them, a [`MessageLog`] the JAUS messages in those, and a [`Dictionary`] the fields of a
+//! message. A [`Line`] is the result as one JSON object; a [`Request`] is the way back.
 //! Nothing below this module knows that it exists.
 
 mod capture;
+mod dictionary;
+mod hex;
+mod large;
+mod line;
+mod log;
 mod network;
+mod request;
 mod time;
 
 pub use capture::{Capture, CaptureError, Frame, LinkType};
+pub use dictionary::{Body, Dictionary, Reading, ServiceName, Unreadable};
+pub use hex::{from_hex, to_hex};
+pub use line::{Content, Envelope, Header, Line};
+pub use log::MessageLog;
 pub use network::{Counts, Datagram, JAUS_PORT, Network};
+pub use request::Request;
 pub use time::Timestamp;

@@ -1,0 +1,58 @@
+//! How a run ends: the exit status, and the one sentence that a failure prints.
+
+use std::error::Error;
+use std::fmt;
+use std::io;
+use std::path::Path;
+
+/// A run that came to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// Exit status 0.
+    Done,
+    /// Something could not be read, or did not answer: exit status 1.
+    Incomplete,
+}
+
+impl Outcome {
+    /// [`Incomplete`](Self::Incomplete) if anything was missing.
+    pub(crate) fn complete_if(complete: bool) -> Self {
+        if complete {
+            Self::Done
+        } else {
+            Self::Incomplete
+        }
+    }
+}
+
+/// Why a run could not be: exit status 2.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// Nobody reads our output any more; not worth a word.
+    OutputClosed,
+    /// What is wrong and what to do.
+    Message(String),
+}
+
+impl Failure {
+    /// A sentence for people.
+    pub(crate) fn new(message: impl Into<String>) -> Self {
+        Self::Message(message.into())
+    }
+
+    /// A file that cannot be opened or read.
+    pub(crate) fn file(path: &Path, error: &io::Error) -> Self {
+        Self::Message(format!("{}: {error}", path.display()))
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OutputClosed => f.write_str("standard output was closed"),
+            Self::Message(message) => f.write_str(message),
+        }
+    }
+}
+
+impl Error for Failure {}

@@ -1,0 +1,417 @@
+//! Which definition a message is read and written by: the generated types, and definitions loaded
+//! at run time.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use jsidl::model::{Message, Version};
+use jsidl::{Library, dynamic};
+use serde::Serialize;
+use serde_json::Value as Json;
+
+use super::{Line, Request};
+
+/// Message definitions by code and by name.
+///
+/// Where several definitions share a code, they are tried in a stated order: those loaded at run
+/// time, then the generated ones; within each, newer versions first. The first that fits exactly
+/// is taken. [`prefer`](Self::prefer) settles the matter by naming a service.
+#[derive(Debug, Default)]
+pub struct Dictionary {
+    by_code: BTreeMap<u16, Vec<Definition>>,
+    preferred: Vec<ServiceName>,
+}
+
+/// One layout of a message, and the services that define it so.
+#[derive(Debug)]
+struct Definition {
+    services: Vec<Service>,
+    codec: Codec,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Service {
+    urn: Arc<str>,
+    version: Version,
+}
+
+#[derive(Debug)]
+enum Codec {
+    Dynamic(Arc<Message>),
+}
+
+/// What the dictionary knows about octets.
+#[derive(Debug, Clone)]
+pub struct Reading<'d> {
+    /// The message code, unless there are fewer than two octets.
+    pub code: Option<u16>,
+    /// The message's name, if the code is known.
+    pub message: Option<&'d str>,
+    /// The URN of a service that defines it.
+    pub service: Option<&'d str>,
+    /// That service's version, if the definition is not the one that is tried first.
+    pub version: Option<Version>,
+    /// The fields.
+    pub body: Result<Body, Unreadable>,
+}
+
+/// A message's fields, which serialize as people see them.
+#[derive(Debug, Clone, Serialize)]
+#[serde(untagged)]
+#[non_exhaustive]
+pub enum Body {
+    /// Read by a definition loaded at run time.
+    Dynamic(Json),
+}
+
+/// Why octets cannot be read, or JSON cannot be written, as a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unreadable {
+    /// A sentence.
+    pub problem: String,
+    /// Where: the octet, counted from the first of the message code, or the column of a line.
+    pub offset: usize,
+}
+
+impl Unreadable {
+    pub(super) fn new(problem: impl Into<String>, offset: usize) -> Self {
+        Self {
+            problem: problem.into(),
+            offset,
+        }
+    }
+}
+
+impl fmt::Display for Unreadable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.problem)
+    }
+}
+
+impl std::error::Error for Unreadable {}
+
+/// A service as people name it: `urn:jaus:jss:core:Events`, or with its version
+/// `urn:jaus:jss:core:Events@1.0`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ServiceName {
+    /// The URN.
+    pub urn: String,
+    /// The version; any, if not given.
+    pub version: Option<Version>,
+}
+
+impl ServiceName {
+    fn matches(&self, service: &Service) -> bool {
+        *self.urn == *service.urn
+            && self
+                .version
+                .is_none_or(|version| version == service.version)
+    }
+}
+
+impl fmt::Display for ServiceName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.urn)?;
+        self.version
+            .map_or(Ok(()), |version| write!(f, "@{version}"))
+    }
+}
+
+impl FromStr for ServiceName {
+    type Err = Unreadable;
+
+    fn from_str(text: &str) -> Result<Self, Unreadable> {
+        let (urn, version) = match text.split_once('@') {
+            Some((urn, version)) => (urn, Some(parse_version(version)?)),
+            None => (text, None),
+        };
+        Ok(Self {
+            urn: urn.to_owned(),
+            version,
+        })
+    }
+}
+
+/// `1.0`
+pub(super) fn parse_version(text: &str) -> Result<Version, Unreadable> {
+    let parsed = text.split_once('.').and_then(|(major, minor)| {
+        Some(Version {
+            major: major.parse().ok()?,
+            minor: minor.parse().ok()?,
+        })
+    });
+    parsed.ok_or_else(|| {
+        Unreadable::new(format!("\"{text}\" is not a version; write it like 1.0"), 0)
+    })
+}
+
+impl Dictionary {
+    /// Everything that this crate was generated with.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds definitions loaded at run time. A service with the URN and version of one that is
+    /// already here takes its place.
+    pub fn add(&mut self, library: &Library) {
+        let mut added: BTreeMap<u16, Vec<Definition>> = BTreeMap::new();
+        for service in library.services() {
+            let service_name = Service {
+                urn: service.id.urn.clone(),
+                version: service.id.version,
+            };
+            self.forget(&service_name);
+            for message in service.messages() {
+                added.entry(message.code).or_default().push(Definition {
+                    services: vec![service_name.clone()],
+                    codec: Codec::Dynamic(Arc::clone(message)),
+                });
+            }
+        }
+        for (code, mut definitions) in added {
+            definitions.sort_by_key(|d| d.services.first().map(|s| std::cmp::Reverse(s.version)));
+            let known = self.by_code.entry(code).or_default();
+            definitions.append(known);
+            *known = definitions;
+        }
+    }
+
+    /// Drops a service, and the definitions that no other service has.
+    fn forget(&mut self, service: &Service) {
+        for definitions in self.by_code.values_mut() {
+            definitions
+                .iter_mut()
+                .for_each(|d| d.services.retain(|s| s != service));
+            definitions.retain(|d| !d.services.is_empty());
+        }
+    }
+
+    /// Takes this service's definitions wherever it has any, instead of trying others.
+    ///
+    /// # Errors
+    /// If no definition here belongs to such a service.
+    pub fn prefer(&mut self, service: ServiceName) -> Result<(), Unreadable> {
+        let all = || self.by_code.values().flatten().flat_map(|d| &d.services);
+        if all().any(|known| service.matches(known)) {
+            self.preferred.push(service);
+            return Ok(());
+        }
+        let wanted = service.urn.to_lowercase();
+        let wanted = wanted.rsplit(':').next().unwrap_or_default();
+        let similar = all().find(|known| known.urn.to_lowercase().contains(wanted));
+        Err(Unreadable::new(
+            match similar {
+                Some(similar) => format!(
+                    "there is no service {service}; perhaps {}@{} is meant",
+                    similar.urn, similar.version
+                ),
+                None => format!("there is no service {service}"),
+            },
+            0,
+        ))
+    }
+
+    /// The name of the messages with this code, if it is known.
+    pub fn name_of(&self, code: u16) -> Option<&str> {
+        self.candidates(code).next().map(Definition::name)
+    }
+
+    /// Looks the message up by its code, and takes its fields apart.
+    pub fn read(&self, octets: &Bytes) -> Reading<'_> {
+        let Some(code) = octets.first_chunk().map(|&code| u16::from_le_bytes(code)) else {
+            let count = octets.len();
+            let problem =
+                format!("a message begins with the two octets of its code, here are {count}");
+            return Reading::unknown(None, Unreadable::new(problem, 0));
+        };
+        let mut failure = None;
+        for (rank, definition) in self.candidates(code).enumerate() {
+            match definition.decode(octets) {
+                Ok(body) => return self.reading(code, rank, definition, Ok(body)),
+                Err(unreadable) => {
+                    failure.get_or_insert((definition, unreadable));
+                }
+            }
+        }
+        match failure {
+            Some((definition, unreadable)) => self.reading(code, 0, definition, Err(unreadable)),
+            None => {
+                let problem = format!("no definition here has the message code {code:04X}h");
+                Reading::unknown(Some(code), Unreadable::new(problem, 0))
+            }
+        }
+    }
+
+    /// The message as a line without transport keys.
+    pub fn line(&self, octets: &Bytes) -> Line<'_> {
+        Line::of_reading(None, self.read(octets), octets)
+    }
+
+    fn reading<'d>(
+        &self,
+        code: u16,
+        rank: usize,
+        definition: &'d Definition,
+        body: Result<Body, Unreadable>,
+    ) -> Reading<'d> {
+        let service = definition
+            .services
+            .iter()
+            .find(|service| self.is_preferred(service))
+            .or(definition.services.first());
+        Reading {
+            code: Some(code),
+            message: Some(definition.name()),
+            service: service.map(|service| &*service.urn),
+            version: service.map(|service| service.version).filter(|_| rank > 0),
+            body,
+        }
+    }
+
+    /// The definitions to try for a code, best first.
+    fn candidates(&self, code: u16) -> impl Iterator<Item = &Definition> {
+        let definitions = self.by_code.get(&code).map_or(&[][..], Vec::as_slice);
+        let preferred = |d: &Definition| d.services.iter().any(|s| self.is_preferred(s));
+        let some_preferred = definitions.iter().any(preferred);
+        definitions
+            .iter()
+            .filter(move |definition| !some_preferred || preferred(definition))
+    }
+
+    fn is_preferred(&self, service: &Service) -> bool {
+        self.preferred.iter().any(|name| name.matches(service))
+    }
+}
+
+impl Dictionary {
+    /// Makes the octets of a message out of what people write.
+    ///
+    /// # Errors
+    /// If no definition is meant, or the body does not fit it.
+    pub fn write(&self, request: &Request) -> Result<Bytes, Unreadable> {
+        let mut failure = None;
+        for definition in self.requested(request)? {
+            match definition.encode(&request.body) {
+                Ok(octets) => return Ok(octets),
+                Err(problem) => {
+                    failure.get_or_insert(problem);
+                }
+            }
+        }
+        let problem = failure.unwrap_or_else(|| format!("{request} is not defined here"));
+        Err(Unreadable::new(problem, 0))
+    }
+
+    /// The definitions that a request may mean, best first; at least one.
+    fn requested(&self, request: &Request) -> Result<Vec<&Definition>, Unreadable> {
+        let codes = match request.code {
+            Some(code) => vec![code],
+            None => self.by_code.keys().copied().collect(),
+        };
+        let of_name: Vec<_> = codes
+            .into_iter()
+            .flat_map(|code| self.candidates(code))
+            .filter(|d| {
+                request
+                    .message
+                    .as_deref()
+                    .is_none_or(|name| name == d.name())
+            })
+            .collect();
+        if of_name.is_empty() {
+            return Err(Unreadable::new(self.advice(request), 0));
+        }
+        let Some(service) = &request.service else {
+            return Ok(of_name);
+        };
+        let of_service = of_name.iter().copied().filter(|d| d.belongs_to(service));
+        let of_service: Vec<_> = of_service.collect();
+        if of_service.is_empty() {
+            let services = of_name.iter().flat_map(|d| &d.services);
+            let services: Vec<_> = services
+                .map(|s| format!("{}@{}", s.urn, s.version))
+                .collect();
+            let problem = format!(
+                "{service} does not define {request}; {} does",
+                services.join(", ")
+            );
+            return Err(Unreadable::new(problem, 0));
+        }
+        Ok(of_service)
+    }
+
+    /// What to say about a message that is not here.
+    fn advice(&self, request: &Request) -> String {
+        let all = || self.by_code.values().flatten();
+        let Some(name) = request.message.as_deref() else {
+            return format!("no definition here has {request}");
+        };
+        if let Some(known) = all().find(|d| d.name() == name) {
+            return format!("{name} has the code {:04X}h", known.code());
+        }
+        let lower = name.to_lowercase();
+        let similar = all().map(Definition::name).filter(|known| {
+            let known = known.to_lowercase();
+            known.contains(&lower) || lower.contains(&known)
+        });
+        match similar.min_by_key(|known| known.len().abs_diff(name.len())) {
+            Some(similar) => format!("there is no message {name}; perhaps {similar} is meant"),
+            None => format!("there is no message {name}"),
+        }
+    }
+}
+
+impl<'d> Reading<'d> {
+    fn unknown(code: Option<u16>, unreadable: Unreadable) -> Self {
+        Self {
+            code,
+            message: None,
+            service: None,
+            version: None,
+            body: Err(unreadable),
+        }
+    }
+}
+
+impl Definition {
+    fn belongs_to(&self, service: &ServiceName) -> bool {
+        self.services.iter().any(|known| service.matches(known))
+    }
+
+    fn name(&self) -> &str {
+        match &self.codec {
+            Codec::Dynamic(message) => &message.name,
+        }
+    }
+
+    fn code(&self) -> u16 {
+        match &self.codec {
+            Codec::Dynamic(message) => message.code,
+        }
+    }
+
+    fn decode(&self, octets: &Bytes) -> Result<Body, Unreadable> {
+        match &self.codec {
+            Codec::Dynamic(message) => {
+                let value = dynamic::decode(message, octets)
+                    .map_err(|error| Unreadable::new(error.to_string(), error.offset))?;
+                dynamic::to_json(message, &value)
+                    .map(Body::Dynamic)
+                    .map_err(|error| Unreadable::new(error.to_string(), 0))
+            }
+        }
+    }
+
+    fn encode(&self, body: &Json) -> Result<Bytes, String> {
+        match &self.codec {
+            Codec::Dynamic(message) => {
+                let value = dynamic::from_json(message, body).map_err(|error| error.to_string())?;
+                let octets = dynamic::encode(message, &value).map_err(|error| error.to_string())?;
+                Ok(octets.into())
+            }
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! From the datagrams of a capture to the messages in them.
+
+use bytes::Bytes;
+
+use super::dictionary::Dictionary;
+use super::large::LargeMessages;
+use super::line::{Content, Envelope, Header, Line};
+use super::{Datagram, Timestamp};
+use crate::wire::{DataControl, Frame, Version, judp};
+
+/// Reads datagrams one after the other and gives a [`Line`] for every message.
+///
+/// Octets behind the messages of a datagram are passed over without a word, because JAUS++ leaves
+/// the end of older, longer messages there. Now and then such a rest looks like a message. What
+/// follows the first message is therefore only believed if its header could have been written on
+/// purpose ([`Frame::is_plausible`]) and its source is of the same node as the first message's:
+/// one node sends a datagram.
+#[derive(Debug)]
+pub struct MessageLog<'d> {
+    dictionary: &'d Dictionary,
+    large: LargeMessages,
+    stale_octets: u64,
+}
+
+impl<'d> MessageLog<'d> {
+    /// A log that looks messages up in `dictionary`.
+    pub fn new(dictionary: &'d Dictionary) -> Self {
+        Self {
+            dictionary,
+            large: LargeMessages::default(),
+            stale_octets: 0,
+        }
+    }
+
+    /// Octets behind messages that were passed over so far.
+    pub fn stale_octets(&self) -> u64 {
+        self.stale_octets
+    }
+
+    /// Large messages of which some fragments were not seen so far.
+    pub fn incomplete_messages(&self) -> u64 {
+        self.large.incomplete()
+    }
+
+    /// The messages of a datagram, or why there is none.
+    pub fn read(&mut self, time: Option<Timestamp>, datagram: &Datagram<'_>) -> Vec<Line<'d>> {
+        let octets = Bytes::copy_from_slice(&datagram.payload);
+        let mut frames = match judp::frames(octets.clone()) {
+            Ok(frames) => frames,
+            Err(error) => {
+                let envelope = Envelope { time, header: None };
+                return vec![Line::of_error(Some(envelope), &error, error.offset as u64)];
+            }
+        };
+        let mut lines = Vec::new();
+        let mut node = None;
+        loop {
+            let offset = frames.offset();
+            match frames.next() {
+                Some(Ok(frame)) => {
+                    let sender = frame.source.whole_node();
+                    if *node.get_or_insert(sender) != sender {
+                        self.stale_octets += (octets.len() - offset) as u64;
+                        return lines;
+                    }
+                    self.message(time, &frame, &mut lines);
+                }
+                Some(Err(error)) => {
+                    let envelope = Envelope { time, header: None };
+                    let offset = error.offset as u64;
+                    let error = match datagram.missing {
+                        0 => error.to_string(),
+                        missing => format!("{error}; the capture left out {missing} octets"),
+                    };
+                    lines.push(Line::of_error(Some(envelope), &error, offset));
+                    return lines;
+                }
+                None => {
+                    self.stale_octets += frames.remaining() as u64;
+                    return lines;
+                }
+            }
+        }
+    }
+
+    /// Adds the line of a message, and that of the large message which it completes.
+    fn message(&mut self, time: Option<Timestamp>, frame: &Frame, lines: &mut Vec<Line<'d>>) {
+        let envelope = Envelope {
+            time,
+            header: Some(Header::of(frame)),
+        };
+        if frame.is_acknowledgement() {
+            lines.push(self.bare(envelope, None, Content::Empty));
+        } else if frame.flags.data() != DataControl::Single {
+            lines.push(self.fragment(envelope, frame));
+            lines.extend(self.whole(time, frame));
+        } else {
+            lines.push(self.line(envelope, frame.version, &frame.payload));
+        }
+    }
+
+    /// A message that is here as a whole.
+    fn line(&self, envelope: Envelope, version: Version, octets: &Bytes) -> Line<'d> {
+        if version == Version::Ra {
+            // The Reference Architecture's messages share codes and names with the services' but
+            // not layouts: reading them by the services' definitions would invent values.
+            let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
+            return self.bare(envelope, code, Content::Octets(octets.clone()));
+        }
+        Line::of_reading(Some(envelope), self.dictionary.read(octets), octets)
+    }
+
+    fn fragment(&self, envelope: Envelope, frame: &Frame) -> Line<'d> {
+        // Only the first fragment surely begins with the code; the older headers hold it.
+        let has_code =
+            frame.version != Version::As5669a || frame.flags.data() == DataControl::First;
+        let code = frame.code().filter(|_| has_code);
+        self.bare(envelope, code, Content::Fragment(frame.payload.len()))
+    }
+
+    /// The large message that this fragment completes.
+    fn whole(&mut self, time: Option<Timestamp>, frame: &Frame) -> Option<Line<'d>> {
+        let whole = self.large.insert(frame)?;
+        let envelope = Envelope {
+            time,
+            header: Some(Header {
+                data: "whole",
+                sequence: whole.sequence,
+                ..Header::of(frame)
+            }),
+        };
+        let line = self.line(envelope.clone(), frame.version, &whole.plain);
+        let Some(octets) = whole.without_repeated_code.filter(|_| line.is_error()) else {
+            return Some(line);
+        };
+        let other = self.line(envelope, frame.version, &octets);
+        Some(if other.is_error() { line } else { other })
+    }
+
+    /// A line without body.
+    fn bare(&self, envelope: Envelope, code: Option<u16>, content: Content) -> Line<'d> {
+        Line {
+            envelope: Some(envelope),
+            code,
+            message: code.and_then(|code| self.dictionary.name_of(code)),
+            service: None,
+            version: None,
+            content,
+        }
+    }
+}
