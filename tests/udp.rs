@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::link::udp::{PortTaken, Settings, UdpLink};
-use jaus::link::{Error, Interface, Interfaces, Slab};
+use jaus::link::{Error, Group, Interface, Interfaces, Slab};
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);
@@ -34,7 +34,7 @@ fn settings() -> Settings {
     let group = SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), free_port());
     Settings {
         port: 0,
-        group: Some(group),
+        group: Group::At(group),
         ..Settings::default()
     }
 }
@@ -96,7 +96,7 @@ async fn configured_peers_get_a_copy_of_what_goes_to_the_group() {
     let mut deaf = UdpLink::open(
         &loopback(),
         &Settings {
-            group: None,
+            group: Group::Off,
             ..settings()
         },
     )
@@ -190,7 +190,10 @@ async fn a_taken_port_is_replaced_by_a_free_one_when_that_is_wanted() {
 #[tokio::test]
 async fn a_program_that_keeps_the_group_port_for_itself_is_named() {
     let settings = settings();
-    let port = settings.group.unwrap().port();
+    let Group::At(group) = settings.group else {
+        unreachable!()
+    };
+    let port = group.port();
     let _junior_like = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port)).unwrap();
     let error = UdpLink::open(&loopback(), &settings).unwrap_err();
     let text = error.to_string();
@@ -208,7 +211,7 @@ async fn a_program_that_keeps_the_group_port_for_itself_is_named() {
 #[tokio::test]
 async fn a_group_that_is_none_is_refused() {
     for (address, port) in [([192, 168, 0, 1], 3794), ([239, 255, 0, 1], 0)] {
-        let group = Some(SocketAddrV4::new(address.into(), port));
+        let group = Group::At(SocketAddrV4::new(address.into(), port));
         let error = UdpLink::open(
             &loopback(),
             &Settings {

@@ -3,6 +3,7 @@
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
 
+use super::group::InvalidGroup;
 use super::holder::Holder;
 use super::interface::{Available, Interface};
 
@@ -40,11 +41,8 @@ pub enum Error {
     )]
     NoMulticast(Available),
     /// The group is not an IPv4 multicast address with a port.
-    #[error(
-        "{0} is no multicast group: the address must lie in 224.0.0.0 to 239.255.255.255 and the \
-         port must not be 0; the usual group for JAUS is 239.255.0.1:3794"
-    )]
-    InvalidGroup(SocketAddr),
+    #[error(transparent)]
+    InvalidGroup(#[from] InvalidGroup),
     /// The unicast address and port are in use.
     #[error(
         "UDP port {} of {} is taken{holder}. Each node of a host needs a port or an address for \

@@ -4,7 +4,7 @@
 //! also chooses the address that peers see.
 
 use std::fmt;
-use std::net::Ipv4Addr;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 
 use if_addrs::{IfAddr, IfOperStatus};
 
@@ -119,6 +119,52 @@ impl Interfaces {
     }
 }
 
+#[cfg(feature = "serde")]
+impl serde::Serialize for Interfaces {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::All => serializer.serialize_str("all"),
+            Self::Loopback => serializer.serialize_str("loopback"),
+            Self::Only(names) => names.serialize(serializer),
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for Interfaces {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WordOrNames)
+    }
+}
+
+#[cfg(feature = "serde")]
+struct WordOrNames;
+
+#[cfg(feature = "serde")]
+impl<'de> serde::de::Visitor<'de> for WordOrNames {
+    type Value = Interfaces;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"all\", \"loopback\" or a list of names or addresses such as [\"eth0\"]")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Interfaces, E> {
+        match word {
+            "all" => Ok(Interfaces::All),
+            "loopback" => Ok(Interfaces::Loopback),
+            _ => Err(E::invalid_value(serde::de::Unexpected::Str(word), &self)),
+        }
+    }
+
+    fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut seq: A) -> Result<Interfaces, A::Error> {
+        let mut names = Vec::new();
+        while let Some(name) = seq.next_element()? {
+            names.push(name);
+        }
+        Ok(Interfaces::Only(names))
+    }
+}
+
 /// Every IPv4 address of every interface of this host, up or not.
 ///
 /// # Errors
@@ -129,6 +175,18 @@ pub fn list() -> Result<Vec<Interface>, Error> {
         source,
     })?;
     Ok(found.into_iter().filter_map(describe).collect())
+}
+
+/// The local address from which the operating system would send to `peer`; `None` if it knows no
+/// way there. Nothing is sent.
+#[must_use]
+pub fn local_address_for(peer: SocketAddr) -> Option<Ipv4Addr> {
+    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
+    socket.connect(peer).ok()?;
+    match socket.local_addr().ok()?.ip() {
+        IpAddr::V4(v4) => Some(v4),
+        IpAddr::V6(_) => None,
+    }
 }
 
 fn describe(found: if_addrs::Interface) -> Option<Interface> {

@@ -24,12 +24,14 @@
 #![expect(clippy::disallowed_types, reason = "this is where sockets live")]
 
 mod error;
+mod group;
 mod holder;
 pub mod interface;
 mod slab;
 pub mod udp;
 
 pub use error::Error;
+pub use group::{Group, InvalidGroup, STANDARD_GROUP, STANDARD_PORT};
 pub use holder::Holder;
 pub use interface::{Available, Interface, Interfaces};
 pub use slab::Slab;

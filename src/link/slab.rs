@@ -1,7 +1,8 @@
-//! Memory that datagrams are received into, so that payloads can be shared instead of copied.
+//! Memory that datagrams are received into, so that large payloads are shared, not copied.
 //!
-//! Each datagram is cut off the front of a larger block. The block lives as long as any payload
-//! cut from it: who keeps a small payload for long should copy it.
+//! A large datagram takes the receive buffer with it and the next one gets a new buffer; a small
+//! one is copied out. So a payload that somebody keeps never holds on to more than four times
+//! its datagram's size.
 
 use std::io;
 
@@ -9,10 +10,10 @@ use bytes::{Bytes, BytesMut};
 
 /// No UDP datagram is longer; with this much room none is ever cut short.
 const LONGEST: usize = 65_536;
-/// Size of one block: some three of the longest datagrams, or two thousand usual ones.
-const BLOCK: usize = 4 * LONGEST;
+/// Up to this length copying (under a microsecond) is cheaper than a new buffer.
+const SMALL: usize = LONGEST / 4;
 
-/// A block of memory and what is left of it.
+/// The receive buffer.
 #[derive(Debug, Default)]
 pub struct Slab {
     free: BytesMut,
@@ -25,7 +26,7 @@ impl Slab {
         Self::default()
     }
 
-    /// Lets `read` append one datagram to the free memory and cuts it off.
+    /// Lets `read` write one datagram into the free memory and takes it out.
     ///
     /// # Errors
     /// What `read` returns; the memory stays free then.
@@ -33,12 +34,15 @@ impl Slab {
         &mut self,
         read: impl FnOnce(&mut BytesMut) -> io::Result<T>,
     ) -> io::Result<(T, Bytes)> {
-        if self.free.capacity() < LONGEST {
-            self.free.reserve(BLOCK);
-        }
-        let result = read(&mut self.free);
-        let datagram = self.free.split();
-        Ok((result?, datagram.freeze()))
+        self.free.clear();
+        self.free.reserve(LONGEST);
+        let result = read(&mut self.free)?;
+        let datagram = if self.free.len() <= SMALL {
+            Bytes::copy_from_slice(&self.free)
+        } else {
+            std::mem::take(&mut self.free).freeze()
+        };
+        Ok((result, datagram))
     }
 }
 
@@ -46,41 +50,48 @@ impl Slab {
 mod tests {
     use super::*;
 
-    fn fill(slab: &mut Slab, octets: &[u8]) -> Bytes {
+    fn fill(slab: &mut Slab, octets: &[u8]) -> (*const u8, Bytes) {
         slab.receive(|free| {
             assert!(free.is_empty() && free.capacity() >= LONGEST);
             free.extend_from_slice(octets);
-            Ok(())
+            Ok(free.as_ptr())
         })
         .unwrap()
-        .1
     }
 
     #[test]
-    fn there_is_always_room_for_the_longest_datagram() {
+    fn datagrams_of_all_lengths_come_out_as_they_came_in() {
         let mut slab = Slab::new();
-        let kept: Vec<Bytes> = (0..20).map(|i| fill(&mut slab, &[i; 20_000])).collect();
-        for (i, datagram) in (0_u8..).zip(&kept) {
-            assert_eq!(datagram[..], [i; 20_000]);
+        let lengths = [0, 1, SMALL, SMALL + 1, 65_507, 9];
+        let kept: Vec<Bytes> = lengths.map(|n| fill(&mut slab, &vec![n as u8; n]).1).into();
+        for (n, datagram) in lengths.into_iter().zip(&kept) {
+            assert_eq!(datagram[..], vec![n as u8; n]);
         }
     }
 
     #[test]
-    fn small_datagrams_share_one_block() {
+    fn a_large_datagram_is_not_copied() {
+        let (written, datagram) = fill(&mut Slab::new(), &[7; 60_000]);
+        assert_eq!(written, datagram.as_ptr());
+    }
+
+    #[test]
+    fn a_small_datagram_does_not_hold_on_to_the_buffer() {
         let mut slab = Slab::new();
-        let first = fill(&mut slab, b"first");
-        let second = fill(&mut slab, b"second");
-        assert_eq!(
-            second.as_ptr() as usize - first.as_ptr() as usize,
-            first.len()
-        );
+        let (first, datagram) = fill(&mut slab, b"small");
+        let (second, _) = fill(&mut slab, b"next");
+        assert_eq!(first, second);
+        assert_ne!(first, datagram.as_ptr());
     }
 
     #[test]
     fn a_failed_read_leaves_nothing_behind() {
         let mut slab = Slab::new();
-        let failed = slab.receive(|_| Err::<(), _>(io::ErrorKind::WouldBlock.into()));
+        let failed = slab.receive(|free| {
+            free.extend_from_slice(b"half");
+            Err::<(), _>(io::ErrorKind::WouldBlock.into())
+        });
         assert!(failed.is_err());
-        assert_eq!(fill(&mut slab, b"next")[..], b"next"[..]);
+        assert_eq!(fill(&mut slab, b"next").1[..], b"next"[..]);
     }
 }

@@ -13,14 +13,8 @@ use bytes::Bytes;
 use socket2::{Domain, InterfaceIndexOrAddress, Protocol, SockRef, Socket, Type};
 use tokio::net::UdpSocket;
 
+use super::group::{Group, STANDARD_PORT};
 use super::{Error, Holder, Interface, Slab};
-
-/// The port that IANA assigned to JAUS, for UDP and TCP.
-pub const STANDARD_PORT: u16 = 3794;
-
-/// The multicast group that every known implementation uses.
-pub const STANDARD_GROUP: SocketAddrV4 =
-    SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), STANDARD_PORT);
 
 /// What to do when another socket has the unicast address and port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,8 +36,8 @@ pub struct Settings {
     pub port: u16,
     /// What to do if `port` is taken.
     pub port_taken: PortTaken,
-    /// The multicast group and its port, or `None` for unicast alone.
-    pub group: Option<SocketAddrV4>,
+    /// The multicast group and its port.
+    pub group: Group,
     /// How many routers a multicast datagram may pass, 0 to 255; 0 keeps it on this host.
     pub ttl: u8,
     /// How many octets of received datagrams the kernel is asked to hold for each socket.
@@ -58,7 +52,7 @@ impl Default for Settings {
         Self {
             port: STANDARD_PORT,
             port_taken: PortTaken::Refuse,
-            group: Some(STANDARD_GROUP),
+            group: Group::default(),
             ttl: 16,
             receive_buffer: 4 << 20,
             peers: Vec::new(),
@@ -118,14 +112,14 @@ impl UdpLink {
     /// [`Error::PortTaken`], [`Error::GroupTaken`], [`Error::InvalidGroup`],
     /// [`Error::Permission`], [`Error::AddressGone`] or [`Error::Io`].
     pub fn open(interface: &Interface, settings: &Settings) -> Result<Self, Error> {
-        let group = settings.group.filter(|_| interface.multicast);
-        if let Some(group) = group {
-            check_group(group)?;
-        }
+        settings.group.validate()?;
         let unicast = open_unicast(interface, settings)?;
-        let group = group
-            .map(|group| open_group(interface, group, settings))
-            .transpose()?;
+        let group = match settings.group {
+            Group::At(group) if interface.multicast => {
+                Some(open_group(interface, group, settings)?)
+            }
+            _ => None,
+        };
         let local = unicast
             .local_addr()
             .map_err(io_error("reading the local address"))?;
@@ -289,16 +283,6 @@ impl UdpLink {
         } else {
             tracing::warn!(interface, doing, ?peer, %error, "datagram lost");
         }
-    }
-}
-
-/// # Errors
-/// [`Error::InvalidGroup`] if the address is no multicast address or the port is 0.
-pub(super) fn check_group(group: SocketAddrV4) -> Result<(), Error> {
-    if group.ip().is_multicast() && group.port() != 0 {
-        Ok(())
-    } else {
-        Err(Error::InvalidGroup(group.into()))
     }
 }
 

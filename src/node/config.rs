@@ -1,0 +1,397 @@
+//! What a node is told before it starts: from code, from flags, or (feature `serde`) from a TOML
+//! file such as
+//!
+//! ```toml
+//! subsystem = 101
+//! node = 1
+//! interfaces = ["eth0", "10.0.3.2"]    # or "all" (the default), or "loopback"
+//! port = 3794                          # 0: any free one
+//! port_taken = "use-free"              # or "refuse" (the default)
+//! group = "239.255.0.1:3794"           # or "off"
+//! ttl = 16
+//! peers = ["192.168.7.2", "192.168.7.3:3795"]
+//!
+//! [mailbox]
+//! messages = 1024
+//! ```
+
+use std::fmt;
+use std::net::{IpAddr, SocketAddr, SocketAddrV4};
+use std::str::FromStr;
+
+use super::mailbox::MailboxLimits;
+use crate::address::{JausId, ParseIdError};
+use crate::link::udp::{self, PortTaken};
+use crate::link::{Group, Interfaces, InvalidGroup, STANDARD_PORT};
+
+/// Everything that can be set about a node. All but the id has a default.
+///
+/// ```
+/// use jaus::node::Config;
+///
+/// let config = Config::new(101, 1).interfaces(["eth0"]).peer("192.168.7.2".parse()?);
+/// assert_eq!(config.validate(), Ok(()));
+/// # Ok::<(), jaus::node::ConfigError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
+pub struct Config {
+    /// The subsystem number, 1 to 65534: the vehicle or station that this node is part of.
+    pub subsystem: u16,
+    /// The node number within the subsystem, 1 to 254.
+    pub node: u8,
+    /// The interfaces to open links on.
+    pub interfaces: Interfaces,
+    /// The UDP port of this node; 0 takes any free one.
+    pub port: u16,
+    /// What to do if the port is taken.
+    pub port_taken: PortTaken,
+    /// The multicast group, by which nodes find each other.
+    pub group: Group,
+    /// How many routers multicast may pass.
+    pub ttl: u8,
+    /// How many octets of received datagrams the kernel is asked to hold for each socket.
+    pub receive_buffer: usize,
+    /// Peers to whom everything for the group is sent by unicast too.
+    pub peers: Vec<Peer>,
+    /// How much may wait for each component.
+    pub mailbox: MailboxLimits,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self::new(0, 0)
+    }
+}
+
+impl Config {
+    /// The usual settings: all interfaces, port 3794, group 239.255.0.1:3794.
+    #[must_use]
+    pub fn new(subsystem: u16, node: u8) -> Self {
+        let udp = udp::Settings::default();
+        Self {
+            subsystem,
+            node,
+            interfaces: Interfaces::All,
+            port: udp.port,
+            port_taken: udp.port_taken,
+            group: udp.group,
+            ttl: udp.ttl,
+            receive_buffer: udp.receive_buffer,
+            peers: Vec::new(),
+            mailbox: MailboxLimits::default(),
+        }
+    }
+
+    /// A node that stays on this host, on any free port: needs no network and no rights, and any
+    /// number of them run side by side.
+    #[must_use]
+    pub fn loopback(subsystem: u16, node: u8) -> Self {
+        Self {
+            interfaces: Interfaces::Loopback,
+            port: 0,
+            ..Self::new(subsystem, node)
+        }
+    }
+
+    /// Uses only these interfaces, each by name or IPv4 address.
+    #[must_use]
+    pub fn interfaces<S: Into<String>>(mut self, only: impl IntoIterator<Item = S>) -> Self {
+        self.interfaces = Interfaces::Only(only.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Uses this UDP port; 0 takes any free one.
+    #[must_use]
+    pub const fn port(mut self, port: u16) -> Self {
+        self.port = port;
+        self
+    }
+
+    /// Takes any free port if the wanted one is taken.
+    #[must_use]
+    pub const fn or_any_free_port(mut self) -> Self {
+        self.port_taken = PortTaken::UseFree;
+        self
+    }
+
+    /// Uses this multicast group, or none.
+    #[must_use]
+    pub const fn group(mut self, group: Group) -> Self {
+        self.group = group;
+        self
+    }
+
+    /// Adds a peer that is also spoken to by unicast.
+    #[must_use]
+    pub fn peer(mut self, peer: Peer) -> Self {
+        self.peers.push(peer);
+        self
+    }
+
+    /// Whether a node can be started with this, as far as can be told without trying.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range, and the range.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        if !(1..JausId::ANY_SUBSYSTEM).contains(&self.subsystem) {
+            return Err(ConfigError::Subsystem(self.subsystem));
+        }
+        if !(1..JausId::ANY_NODE).contains(&self.node) {
+            return Err(ConfigError::Node(self.node));
+        }
+        if self.mailbox.messages == 0 {
+            return Err(ConfigError::Mailbox);
+        }
+        self.group.validate().map_err(ConfigError::Group)
+    }
+
+    pub(super) fn udp(&self) -> udp::Settings {
+        udp::Settings {
+            port: self.port,
+            port_taken: self.port_taken,
+            group: self.group,
+            ttl: self.ttl,
+            receive_buffer: self.receive_buffer,
+            peers: Vec::new(),
+        }
+    }
+}
+
+/// A peer that is spoken to by unicast from the start: `10.0.0.2`, which means port 3794,
+/// `10.0.0.2:3795`, or with its id in front `102.1.1@10.0.0.2`.
+///
+/// With an id (which may hold the wildcards 65535 and 255) its messages go there before it was
+/// heard, and its address is never learned anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Peer {
+    id: Option<JausId>,
+    address: SocketAddr,
+}
+
+impl Peer {
+    /// The id, or pattern of ids, that lives at the address, if that is known.
+    #[must_use]
+    pub const fn id(self) -> Option<JausId> {
+        self.id
+    }
+
+    /// The address and port.
+    #[must_use]
+    pub const fn address(self) -> SocketAddr {
+        self.address
+    }
+}
+
+impl FromStr for Peer {
+    type Err = ConfigError;
+
+    fn from_str(text: &str) -> Result<Self, ConfigError> {
+        let (id, place) = match text.split_once('@') {
+            Some((id, place)) => (
+                Some(id.parse::<JausId>().map_err(ConfigError::PeerId)?),
+                place,
+            ),
+            None => (None, text),
+        };
+        let standard = |ip: IpAddr| SocketAddr::new(ip, STANDARD_PORT);
+        let address = place.parse().or_else(|_| place.parse().map(standard)).ok();
+        let one_host = |a: &SocketAddr| !a.ip().is_unspecified() && !a.ip().is_multicast();
+        address
+            .filter(|a| a.is_ipv4() && a.port() != 0 && one_host(a))
+            .map(|address| Self { id, address })
+            .ok_or_else(|| ConfigError::Peer(text.to_owned()))
+    }
+}
+
+impl fmt::Display for Peer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(id) = self.id {
+            write!(f, "{id}@")?;
+        }
+        self.address.fmt(f)
+    }
+}
+
+impl From<SocketAddrV4> for Peer {
+    fn from(address: SocketAddrV4) -> Self {
+        Self {
+            id: None,
+            address: address.into(),
+        }
+    }
+}
+
+/// A setting that no node can have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// 0 names nobody, 65535 everybody.
+    #[error("subsystem {0} cannot be: choose a number from 1 to 65534")]
+    Subsystem(u16),
+    /// 0 names nobody, 255 everybody.
+    #[error("node {0} cannot be: choose a number from 1 to 254")]
+    Node(u8),
+    /// A mailbox without room.
+    #[error("a mailbox must hold at least 1 message")]
+    Mailbox,
+    /// Not a multicast group.
+    #[error(transparent)]
+    Group(InvalidGroup),
+    /// The id of a peer is none.
+    #[error("the id of a peer: {0}")]
+    PeerId(ParseIdError),
+    /// Not the address of a peer.
+    #[error(
+        "`{0}` is no peer's address: write an IPv4 address of one host, with a port if it is not \
+         3794, such as 192.168.7.2 or 192.168.7.2:3795"
+    )]
+    Peer(String),
+}
+
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for Peer {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        text.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl serde::Serialize for Peer {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_that_name_nobody_or_everybody_are_refused() {
+        for (subsystem, node) in [(0, 1), (65535, 1), (1, 0), (1, 255)] {
+            let error = Config::new(subsystem, node).validate().unwrap_err();
+            assert!(
+                error.to_string().contains("choose a number from 1 to"),
+                "{error}"
+            );
+        }
+        assert_eq!(Config::new(65534, 254).validate(), Ok(()));
+    }
+
+    #[test]
+    fn a_peer_is_an_address_with_or_without_port_and_id() {
+        assert_eq!(
+            "10.0.0.2".parse::<Peer>().unwrap().to_string(),
+            "10.0.0.2:3794"
+        );
+        assert_eq!(
+            "10.0.0.2:9".parse::<Peer>().unwrap().to_string(),
+            "10.0.0.2:9"
+        );
+        let named: Peer = "101.255.255@10.0.0.2".parse().unwrap();
+        assert_eq!(named.to_string(), "101.255.255@10.0.0.2:3794");
+        assert_eq!(named.id(), Some(JausId::new(101, 255, 255)));
+        assert!(
+            "101.1@10.0.0.2"
+                .parse::<Peer>()
+                .unwrap_err()
+                .to_string()
+                .contains("\"101.1\"")
+        );
+        for wrong in [
+            "",
+            "ten",
+            "10.0.0.2:0",
+            "239.255.0.1",
+            "0.0.0.0",
+            "10.0.0.2:70000",
+        ] {
+            let error = wrong.parse::<Peer>().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{wrong}`")), "{error}");
+        }
+    }
+}
+
+#[cfg(test)]
+#[cfg(feature = "cli")]
+mod toml_tests {
+    use super::*;
+
+    fn error(text: &str) -> String {
+        toml::from_str::<Config>(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_file_sets_what_it_names_and_leaves_the_rest() {
+        let config: Config = toml::from_str(
+            r#"
+            subsystem = 101
+            node = 1
+            interfaces = ["eth0", "10.0.3.2"]
+            port = 0
+            port_taken = "use-free"
+            group = "239.255.0.9"
+            peers = ["192.168.7.2"]
+            [mailbox]
+            messages = 10
+            "#,
+        )
+        .unwrap();
+        let expected = Config {
+            mailbox: MailboxLimits {
+                messages: 10,
+                ..MailboxLimits::default()
+            },
+            ..Config::new(101, 1)
+                .interfaces(["eth0", "10.0.3.2"])
+                .port(0)
+                .or_any_free_port()
+                .group("239.255.0.9:3794".parse().unwrap())
+                .peer("192.168.7.2:3794".parse().unwrap())
+        };
+        assert_eq!(config, expected);
+    }
+
+    #[test]
+    fn the_words_for_interfaces_and_group_are_understood() {
+        let config: Config = toml::from_str("interfaces = \"loopback\"\ngroup = \"off\"").unwrap();
+        assert_eq!(
+            (config.interfaces, config.group),
+            (Interfaces::Loopback, Group::Off)
+        );
+        assert_eq!(
+            toml::from_str::<Config>("interfaces = \"all\"").unwrap(),
+            Config::default()
+        );
+    }
+
+    #[test]
+    fn mistakes_in_a_file_are_named_with_their_place() {
+        let unknown = error("subsystem = 1\nprot = 3794");
+        assert!(
+            unknown.contains("line 2") && unknown.contains("unknown field `prot`"),
+            "{unknown}"
+        );
+        let range = error("ttl = 300");
+        assert!(range.contains("line 1") && range.contains("300"), "{range}");
+        let group = error("group = \"10.0.0.1\"");
+        assert!(group.contains("224.0.0.0 to 239.255.255.255"), "{group}");
+        let interfaces = error("interfaces = \"eth0\"");
+        assert!(interfaces.contains("[\"eth0\"]"), "{interfaces}");
+        let peer = error("peers = [\"nobody\"]");
+        assert!(peer.contains("`nobody` is no peer's address"), "{peer}");
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let config = Config::loopback(7, 3)
+            .peer("10.0.0.2".parse().unwrap())
+            .group(Group::Off);
+        let text = serde_json::to_string(&config).unwrap();
+        assert_eq!(serde_json::from_str::<Config>(&text).unwrap(), config);
+    }
+}

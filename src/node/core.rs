@@ -1,0 +1,259 @@
+//! The state of a running node: endpoint, links and mailboxes behind one lock.
+//!
+//! The lock is held for single steps and never across an `await`. So a component that sends runs
+//! the endpoint in its own task, up to the socket, and is told at once what is wrong; nothing is
+//! queued in between. Receiving and waiting is the [driver](super::driver)'s.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
+use std::time::{Duration, Instant};
+
+use tokio::sync::{broadcast, watch};
+
+use super::links::{Links, link_id};
+use super::mailbox::{Mailbox, MailboxLimits};
+use crate::address::JausId;
+use crate::endpoint::{
+    self, AttachError, Endpoint, Event, MessageHandle, Outgoing, Path, Received, SendError, To,
+    Transmit,
+};
+use crate::link::Slab;
+use crate::link::udp::UdpLink;
+
+/// Datagrams taken from one link before the others have their turn.
+const BATCH: usize = 32;
+/// Node events kept for a slow listener.
+const EVENTS: usize = 256;
+/// How long a node that shuts down tries to send what waits.
+const LAST_WORDS: Duration = Duration::from_millis(250);
+
+/// The node's clock. Tokio's, so that a paused test clock holds for timers and endpoint alike.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the node is the owner that has the clock"
+)]
+pub(super) fn now() -> Instant {
+    tokio::time::Instant::now().into_std()
+}
+
+/// What handles, ports and the driver have in common.
+#[derive(Debug)]
+pub(super) struct Shared {
+    core: Mutex<Core>,
+    pub(super) stopped: watch::Sender<bool>,
+}
+
+impl Shared {
+    pub(super) fn new(links: Links, mailbox: MailboxLimits) -> Self {
+        let config = endpoint::Config {
+            static_peers: links.static_peers,
+            first_sequence: random(),
+            ..endpoint::Config::default()
+        };
+        let core = Core::new(Endpoint::new(config), links.links, mailbox);
+        Self {
+            core: Mutex::new(core),
+            stopped: watch::Sender::new(false),
+        }
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Core> {
+        self.core.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Enough chance for a first sequence number; the standard library seeds its hashers with it.
+fn random() -> u16 {
+    use std::hash::{BuildHasher, RandomState};
+    (RandomState::new().hash_one(()) & 0xFFFF) as u16
+}
+
+#[derive(Debug)]
+pub(super) struct Core {
+    pub(super) endpoint: Endpoint,
+    pub(super) links: Vec<UdpLink>,
+    pub(super) mailboxes: BTreeMap<JausId, Arc<Mailbox>>,
+    limits: MailboxLimits,
+    /// Gone when the node has stopped, which ends the listeners' streams.
+    events: Option<broadcast::Sender<Event>>,
+    slab: Slab,
+    driver: Option<Waker>,
+    stop_at: Option<Instant>,
+    stopped: bool,
+}
+
+impl Core {
+    fn new(mut endpoint: Endpoint, links: Vec<UdpLink>, limits: MailboxLimits) -> Self {
+        for place in 0..links.len() {
+            endpoint.add_link(link_id(place), links.iter().map(UdpLink::local));
+        }
+        Self {
+            endpoint,
+            links,
+            mailboxes: BTreeMap::new(),
+            limits,
+            events: Some(broadcast::Sender::new(EVENTS)),
+            slab: Slab::new(),
+            driver: None,
+            stop_at: None,
+            stopped: false,
+        }
+    }
+
+    pub(super) fn attach(&mut self, id: JausId) -> Result<Arc<Mailbox>, AttachError> {
+        self.endpoint.attach(id)?;
+        let mailbox = Arc::new(Mailbox::new(self.limits));
+        if self.stopped {
+            mailbox.close();
+        }
+        self.mailboxes.insert(id, mailbox.clone());
+        Ok(mailbox)
+    }
+
+    pub(super) fn detach(&mut self, id: JausId) {
+        self.endpoint.detach(id);
+        self.mailboxes.remove(&id);
+    }
+
+    pub(super) fn subscribe(&self) -> broadcast::Receiver<Event> {
+        let ended = || broadcast::channel(1).1;
+        self.events
+            .as_ref()
+            .map_or_else(ended, broadcast::Sender::subscribe)
+    }
+
+    pub(super) fn send(&mut self, message: Outgoing) -> Result<MessageHandle, SendError> {
+        let result = self.endpoint.send(now(), message);
+        self.pump();
+        self.wake_driver();
+        result
+    }
+
+    /// Begins to shut down; the driver finishes.
+    pub(super) fn stop(&mut self) {
+        self.stop_at.get_or_insert_with(|| now() + LAST_WORDS);
+        self.wake_driver();
+    }
+
+    /// One turn of the driver. Ready when the node has stopped; `true` while there is more to do.
+    pub(super) fn turn(&mut self, cx: &mut Context<'_>) -> Poll<()> {
+        self.driver = Some(cx.waker().clone());
+        let now = now();
+        let more = self.receive(now, cx);
+        if self
+            .endpoint
+            .poll_timeout()
+            .is_some_and(|deadline| deadline <= now)
+        {
+            self.endpoint.handle_timeout(now);
+        }
+        self.pump();
+        let flushed = self.flush(cx);
+        if self
+            .stop_at
+            .is_some_and(|deadline| flushed || deadline <= now)
+        {
+            self.finish();
+            return Poll::Ready(());
+        }
+        if more {
+            cx.waker().wake_by_ref();
+        }
+        Poll::Pending
+    }
+
+    /// When the driver wants its next turn, if nothing else happens.
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        [self.endpoint.poll_timeout(), self.stop_at]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// Hands on what the endpoint has to say: datagrams to links, messages to mailboxes.
+    fn pump(&mut self) {
+        while let Some(transmit) = self.endpoint.poll_transmit() {
+            self.transmit(&transmit);
+        }
+        while let Some(event) = self.endpoint.poll_event() {
+            match event {
+                Event::Received(message) => self.deliver(message),
+                news => self.announce(news),
+            }
+        }
+    }
+
+    fn transmit(&mut self, transmit: &Transmit) {
+        let Some(link) = self.links.get_mut(usize::from(transmit.link.0)) else {
+            return;
+        };
+        match transmit.to {
+            To::Peer(peer) => link.send_to(peer, &transmit.payload),
+            To::Group => link.send_to_group(&transmit.payload),
+        }
+    }
+
+    fn deliver(&self, message: Received) {
+        if let Some(mailbox) = self.mailboxes.get(&message.to) {
+            mailbox.push(message);
+        }
+    }
+
+    fn announce(&self, news: Event) {
+        if let Some(events) = &self.events {
+            // Nobody listening is no error.
+            let _ = events.send(news);
+        }
+    }
+
+    /// Takes in what has arrived; whether a link had more than its share.
+    fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
+        let mut more = false;
+        for (place, link) in self.links.iter_mut().enumerate() {
+            let mut batch = 0;
+            while let Poll::Ready((peer, datagram)) = link.poll_recv(cx, &mut self.slab) {
+                let path = Path {
+                    link: link_id(place),
+                    peer,
+                };
+                self.endpoint.handle_datagram(now, path, datagram);
+                batch += 1;
+                if batch == BATCH {
+                    more = true;
+                    break;
+                }
+            }
+        }
+        more
+    }
+
+    /// Sends what waits for the network; whether nothing waits any more.
+    fn flush(&mut self, cx: &mut Context<'_>) -> bool {
+        let mut flushed = true;
+        for link in &mut self.links {
+            flushed &= link.poll_flush(cx).is_ready();
+        }
+        flushed
+    }
+
+    /// Closes everything; harmless when repeated.
+    pub(super) fn finish(&mut self) {
+        self.stopped = true;
+        for (id, mailbox) in std::mem::take(&mut self.mailboxes) {
+            self.endpoint.detach(id);
+            mailbox.close();
+        }
+        for place in 0..self.links.len() {
+            self.endpoint.remove_link(link_id(place));
+        }
+        self.links.clear();
+        self.events = None;
+    }
+
+    fn wake_driver(&mut self) {
+        if let Some(driver) = self.driver.take() {
+            driver.wake();
+        }
+    }
+}

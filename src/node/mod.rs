@@ -1,0 +1,211 @@
+//! A running node: links, endpoint and attached components on tokio.
+//!
+//! A node lives in one task and starts no threads. On a current-thread runtime components,
+//! endpoint and sockets share one thread, which is the fastest way there is.
+//!
+//! ```
+//! use bytes::Bytes;
+//! use jaus::address::JausId;
+//! use jaus::endpoint::Outgoing;
+//! use jaus::node::{Config, Node};
+//!
+//! # #[tokio::main(flavor = "current_thread")]
+//! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // Two nodes on this host, which find each other by multicast.
+//! let vehicle = Node::start(Config::loopback(101, 1))?;
+//! let operator = Node::start(Config::loopback(102, 1))?;
+//! let mut driver = vehicle.attach(33)?;
+//! let mut console = operator.attach(1)?;
+//!
+//! let query_heartbeat = Bytes::from_static(&[0x02, 0x22]);
+//! console.send(Outgoing::new(console.id(), driver.id(), query_heartbeat))?;
+//!
+//! let query = driver.recv().await.ok_or("the node has stopped")?;
+//! assert_eq!(query.source, JausId::new(102, 1, 1));
+//! let report_heartbeat = Bytes::from_static(&[0x02, 0x42]);
+//! driver.send(Outgoing::new(driver.id(), query.source, report_heartbeat))?;
+//! assert!(console.recv().await.is_some());
+//!
+//! vehicle.shutdown().await;
+//! operator.shutdown().await;
+//! # Ok(())
+//! # }
+//! ```
+
+mod config;
+mod core;
+mod driver;
+mod error;
+mod links;
+mod mailbox;
+mod port;
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+
+use tokio::sync::broadcast;
+
+pub use self::config::{Config, ConfigError, Peer};
+pub use self::error::StartError;
+pub use self::mailbox::{MailboxCounters, MailboxLimits};
+pub use self::port::{Port, Sender};
+pub use crate::endpoint::{AttachError, SendError};
+
+use self::core::Shared;
+use self::driver::Driver;
+use crate::address::JausId;
+use crate::endpoint::{self, Event, LinkId};
+use crate::link::{Interface, udp};
+
+/// A handle to a running node. Cheap to clone.
+///
+/// The node runs until [`shutdown`](Self::shutdown), or until its last handle and its last
+/// [`Port`] are dropped.
+#[derive(Clone, Debug)]
+pub struct Node {
+    config: Arc<Config>,
+    guard: Arc<Guard>,
+}
+
+/// Stops the node when nobody is left who could use it.
+#[derive(Debug)]
+struct Guard(Arc<Shared>);
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        self.0.lock().stop();
+    }
+}
+
+impl Node {
+    /// Opens the links and starts the node's task on the current tokio runtime.
+    ///
+    /// # Errors
+    /// [`StartError`] says what is wrong and what to do; then nothing runs.
+    pub fn start(config: Config) -> Result<Self, StartError> {
+        config.validate()?;
+        let runtime = tokio::runtime::Handle::try_current().map_err(|_| StartError::NoRuntime)?;
+        let links = links::open(&config)?;
+        let shared = Arc::new(Shared::new(links, config.mailbox));
+        runtime.spawn(Driver::new(shared.clone()));
+        Ok(Self {
+            config: Arc::new(config),
+            guard: Arc::new(Guard(shared)),
+        })
+    }
+
+    /// What it was started with.
+    #[must_use]
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// Takes in a component, by its number within the node, 1 to 254.
+    ///
+    /// # Errors
+    /// A number that names no single component, or is attached already.
+    pub fn attach(&self, component: u8) -> Result<Port, AttachError> {
+        let id = JausId::new(self.config.subsystem, self.config.node, component);
+        let mailbox = self.shared().lock().attach(id)?;
+        Ok(Port::new(id, mailbox, self.guard.clone()))
+    }
+
+    /// The open links; none after the node has stopped.
+    #[must_use]
+    pub fn links(&self) -> Vec<LinkReport> {
+        let core = self.shared().lock();
+        let report = |(place, link): (usize, &udp::UdpLink)| LinkReport {
+            link: links::link_id(place),
+            interface: link.interface().clone(),
+            local: link.local(),
+            group: link.group(),
+            counters: *link.counters(),
+        };
+        core.links.iter().enumerate().map(report).collect()
+    }
+
+    /// The peers whose addresses are known, in order of their ids.
+    #[must_use]
+    pub fn peers(&self) -> Vec<endpoint::Peer> {
+        self.shared().lock().endpoint.peers().collect()
+    }
+
+    /// What the endpoint has received, sent and dropped, and why.
+    #[must_use]
+    pub fn counters(&self) -> endpoint::Counters {
+        self.shared().lock().endpoint.counters().clone()
+    }
+
+    /// What has become of the messages for each attached component.
+    #[must_use]
+    pub fn mailboxes(&self) -> Vec<(JausId, MailboxCounters)> {
+        let core = self.shared().lock();
+        core.mailboxes
+            .iter()
+            .map(|(id, mailbox)| (*id, mailbox.counters()))
+            .collect()
+    }
+
+    /// News from now on: peers learned and moved, id conflicts, acknowledgements.
+    #[must_use]
+    pub fn events(&self) -> Events {
+        Events {
+            receiver: self.shared().lock().subscribe(),
+            missed: 0,
+        }
+    }
+
+    /// Stops the node: sends what waits (for a quarter of a second at most), closes the links,
+    /// and lets every [`Port::recv`] end once its mailbox is read.
+    pub async fn shutdown(self) {
+        let mut stopped = self.shared().stopped.subscribe();
+        self.shared().lock().stop();
+        // An error would mean that the node is gone, and that is what is waited for.
+        let _ = stopped.wait_for(|stopped| *stopped).await;
+    }
+
+    fn shared(&self) -> &Shared {
+        &self.guard.0
+    }
+}
+
+/// One link of a node, as it is now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LinkReport {
+    /// Its number in [`Path`](endpoint::Path).
+    pub link: LinkId,
+    /// The interface that it is on.
+    pub interface: Interface,
+    /// The address that it sends from and peers answer to.
+    pub local: SocketAddr,
+    /// The multicast group that it has joined.
+    pub group: Option<SocketAddr>,
+    /// What it has done.
+    pub counters: udp::Counters,
+}
+
+/// A listener to a node's news. One that falls behind by more than 256 misses the oldest.
+#[derive(Debug)]
+pub struct Events {
+    receiver: broadcast::Receiver<Event>,
+    missed: u64,
+}
+
+impl Events {
+    /// Waits for the next event, which is never [`Event::Received`]; `None` when the node is gone.
+    pub async fn recv(&mut self) -> Option<Event> {
+        loop {
+            match self.receiver.recv().await {
+                Ok(event) => return Some(event),
+                Err(broadcast::error::RecvError::Lagged(missed)) => self.missed += missed,
+                Err(broadcast::error::RecvError::Closed) => return None,
+            }
+        }
+    }
+
+    /// How many events this listener has missed.
+    #[must_use]
+    pub const fn missed(&self) -> u64 {
+        self.missed
+    }
+}
