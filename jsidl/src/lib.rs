@@ -1,8 +1,17 @@
 //! JSIDL (AS5684), the language in which JAUS services are defined.
 #![forbid(unsafe_code)]
 
+mod check;
+mod diagnostic;
 pub mod dynamic;
+mod expr;
 mod library;
+mod loader;
 pub mod model;
+mod resolve;
+mod source;
+mod syntax;
 
+pub use diagnostic::{Diagnostic, Diagnostics, Note, Severity};
 pub use library::Library;
+pub use loader::{Loaded, Loader};

@@ -23,7 +23,7 @@ impl Library {
     }
 
     /// All services, ordered by URN, then version.
-    pub fn services(&self) -> impl Iterator<Item = &Arc<Service>> {
+    pub fn services(&self) -> impl Iterator<Item = &Arc<Service>> + Clone {
         self.services.values()
     }
 

@@ -384,6 +384,18 @@ impl Number {
             Self::F64 => 8,
         }
     }
+
+    /// The least and the greatest integer that fit; `None` for the two floating point types.
+    pub const fn integers(self) -> Option<(i128, i128)> {
+        match self {
+            Self::Unsigned(u) => Some((0, u.max() as i128)),
+            Self::Signed(s) => {
+                let half = 1_i128 << (s.size() * 8 - 1);
+                Some((-half, half - 1))
+            }
+            Self::F32 | Self::F64 => None,
+        }
+    }
 }
 
 /// Unsigned integers.

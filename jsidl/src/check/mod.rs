@@ -1,0 +1,76 @@
+//! The rules: what cannot be encoded, or could be read in two ways, is an error; what published
+//! definitions do all the same is a warning.
+//!
+//! Each rule looks at one construct, says what it finds and answers whether the construct is
+//! sound. Following references is not its business.
+
+mod composite;
+mod field;
+mod layout;
+mod service;
+
+use std::collections::HashMap;
+
+use crate::diagnostic::Report;
+use crate::source::Span;
+use crate::syntax::Node;
+
+pub(crate) use composite::{array, count, count_limit, group, header, required, size, tag};
+pub(crate) use field::{
+    bits, enum_index, octet_index, one_meaning, overlap, scale, value_range, value_set,
+    values_of_bits, values_of_number,
+};
+pub(crate) use service::{ambiguities, incomplete, same_service};
+
+/// Names must differ, because they are how everyone speaks of the things.
+pub(crate) fn unique<'n>(
+    report: &mut Report,
+    what: &str,
+    names: impl Iterator<Item = (&'n str, Span)>,
+) -> bool {
+    let mut seen = HashMap::new();
+    let mut sound = true;
+    for (name, span) in names.filter(|(name, _)| !name.is_empty()) {
+        if let Some(first) = seen.insert(name, span) {
+            report
+                .error(
+                    span,
+                    format!("there are two {what}s named `{name}`: rename one"),
+                )
+                .note(first, "the other one");
+            sound = false;
+        }
+    }
+    sound
+}
+
+/// As [`unique`], for fields and composites.
+pub(crate) fn unique_names(report: &mut Report, what: &str, nodes: &[Node]) -> bool {
+    unique(
+        report,
+        what,
+        nodes.iter().map(|n| (n.name.as_str(), n.span)),
+    )
+}
+
+/// Indices must differ, because they are all that stands on the wire.
+pub(crate) fn unique_indices(
+    report: &mut Report,
+    what: &str,
+    indices: impl Iterator<Item = (u64, Span)>,
+) -> bool {
+    let mut seen = HashMap::new();
+    let mut sound = true;
+    for (index, span) in indices {
+        if let Some(first) = seen.insert(index, span) {
+            report
+                .error(
+                    span,
+                    format!("there are two {what}s with index {index}: renumber one"),
+                )
+                .note(first, "the other one");
+            sound = false;
+        }
+    }
+    sound
+}

@@ -1,0 +1,189 @@
+//! What is wrong with the definitions of a load: every finding with its place and a sentence that
+//! says what to do about it.
+
+use std::fmt;
+
+use crate::model::Location;
+use crate::source::{Sources, Span};
+
+/// How bad a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Severity {
+    /// Usable, but the author should look at it. Published definitions have such findings.
+    Warning,
+    /// What it concerns is left out of the library.
+    Error,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Warning => "warning",
+            Self::Error => "error",
+        })
+    }
+}
+
+/// A second place that a finding is about.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Note {
+    /// The place.
+    pub location: Location,
+    /// What is to be seen there.
+    pub message: String,
+}
+
+/// One finding. Displayed as `file:line:column: error: sentence`, each note on a further line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// Error or warning.
+    pub severity: Severity,
+    /// Where to look first.
+    pub location: Location,
+    /// What is wrong, and what to do.
+    pub message: String,
+    /// Other places that matter.
+    pub notes: Vec<Note>,
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}: {}", self.location, self.severity, self.message)?;
+        for note in &self.notes {
+            write!(f, "\n  {}: note: {}", note.location, note.message)?;
+        }
+        Ok(())
+    }
+}
+
+/// All findings of a load, ordered by file and place.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Diagnostics(Vec<Diagnostic>);
+
+impl Diagnostics {
+    /// Whether anything was left out.
+    pub fn has_errors(&self) -> bool {
+        self.errors().next().is_some()
+    }
+
+    /// Whether there is no finding at all.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Number of findings.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// All findings.
+    pub fn iter(&self) -> std::slice::Iter<'_, Diagnostic> {
+        self.0.iter()
+    }
+
+    /// The errors among them.
+    pub fn errors(&self) -> impl Iterator<Item = &Diagnostic> {
+        self.iter().filter(|d| d.severity == Severity::Error)
+    }
+
+    /// The warnings among them.
+    pub fn warnings(&self) -> impl Iterator<Item = &Diagnostic> {
+        self.iter().filter(|d| d.severity == Severity::Warning)
+    }
+}
+
+impl<'a> IntoIterator for &'a Diagnostics {
+    type Item = &'a Diagnostic;
+    type IntoIter = std::slice::Iter<'a, Diagnostic>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl IntoIterator for Diagnostics {
+    type Item = Diagnostic;
+    type IntoIter = std::vec::IntoIter<Diagnostic>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.into_iter()
+    }
+}
+
+impl fmt::Display for Diagnostics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.iter().try_for_each(|d| writeln!(f, "{d}"))
+    }
+}
+
+/// A finding whose places are still offsets.
+#[derive(Debug)]
+pub(crate) struct Finding {
+    severity: Severity,
+    span: Span,
+    message: String,
+    notes: Vec<(Span, String)>,
+}
+
+impl Finding {
+    /// Adds a second place.
+    pub(crate) fn note(&mut self, span: Span, message: impl Into<String>) -> &mut Self {
+        self.notes.push((span, message.into()));
+        self
+    }
+}
+
+/// Collects the findings while a load is under way.
+#[derive(Debug, Default)]
+pub(crate) struct Report {
+    findings: Vec<Finding>,
+    errors: usize,
+}
+
+impl Report {
+    /// Reports what makes a definition unusable.
+    pub(crate) fn error(&mut self, span: Span, message: impl Into<String>) -> &mut Finding {
+        self.errors += 1;
+        self.add(Severity::Error, span, message.into())
+    }
+
+    /// Reports what a definition should not say but may.
+    pub(crate) fn warning(&mut self, span: Span, message: impl Into<String>) -> &mut Finding {
+        self.add(Severity::Warning, span, message.into())
+    }
+
+    /// Errors so far.
+    pub(crate) fn errors(&self) -> usize {
+        self.errors
+    }
+
+    fn add(&mut self, severity: Severity, span: Span, message: String) -> &mut Finding {
+        let index = self.findings.len();
+        self.findings.push(Finding {
+            severity,
+            span,
+            message,
+            notes: Vec::new(),
+        });
+        &mut self.findings[index]
+    }
+
+    /// Orders the findings and turns offsets into lines and columns.
+    pub(crate) fn finish(mut self, sources: &Sources) -> Diagnostics {
+        self.findings.sort_by_key(|finding| finding.span);
+        let located = self.findings.into_iter().map(|finding| Diagnostic {
+            severity: finding.severity,
+            location: sources.location(finding.span),
+            message: finding.message,
+            notes: finding
+                .notes
+                .into_iter()
+                .map(|(span, message)| Note {
+                    location: sources.location(span),
+                    message,
+                })
+                .collect(),
+        });
+        Diagnostics(located.collect())
+    }
+}

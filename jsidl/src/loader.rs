@@ -1,0 +1,144 @@
+//! Gathers definitions from files, directories and texts, and compiles them together.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::diagnostic::{Diagnostics, Report};
+use crate::library::Library;
+use crate::resolve::resolve;
+use crate::source::Sources;
+use crate::syntax::{Program, Strictness, read};
+
+/// Directories within each other.
+const DEEPEST: usize = 32;
+
+/// Collects definitions; [`load`](Self::load) compiles them.
+///
+/// References are followed across everything that was added, whatever the order. When one
+/// identity is declared several times, the first counts.
+#[derive(Debug, Default)]
+pub struct Loader {
+    sources: Sources,
+    program: Program,
+    report: Report,
+}
+
+/// What came of a load.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// Everything that is sound.
+    pub library: Library,
+    /// Everything that is wrong, and what should be looked at.
+    pub diagnostics: Diagnostics,
+}
+
+impl Loader {
+    /// A loader that knows no definitions.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a file, or all `.xml` files of a directory and those below it. What cannot be read
+    /// becomes a diagnostic.
+    pub fn path(&mut self, path: impl AsRef<Path>) -> &mut Self {
+        let path = path.as_ref();
+        if path.is_dir() {
+            let before = self.report.errors();
+            let mut files = Vec::new();
+            self.directory(path, 0, &mut files);
+            if files.is_empty() && self.report.errors() == before {
+                self.unreadable(path, "there is no `.xml` file in this directory");
+            }
+            for file in files {
+                self.file(&file, Strictness::Found);
+            }
+        } else {
+            self.file(path, Strictness::Named);
+        }
+        self
+    }
+
+    /// Adds a text as if it were a file of this name.
+    pub fn text(&mut self, name: impl AsRef<Path>, text: &str) -> &mut Self {
+        self.add(name.as_ref(), text, Strictness::Named);
+        self
+    }
+
+    /// Compiles everything that was added.
+    pub fn load(mut self) -> Loaded {
+        let library = resolve(&self.program, &self.sources, &mut self.report);
+        Loaded {
+            library,
+            diagnostics: self.report.finish(&self.sources),
+        }
+    }
+
+    fn add(&mut self, name: &Path, text: &str, strictness: Strictness) {
+        let source = self.sources.add(name, text);
+        read(source, strictness, &mut self.program, &mut self.report);
+    }
+
+    /// Lists the definitions of a directory in an order that does not depend on the file system.
+    fn directory(&mut self, path: &Path, depth: usize, files: &mut Vec<PathBuf>) {
+        if depth > DEEPEST {
+            self.unreadable(path, "directories are nested too deeply here");
+            return;
+        }
+        let entries = fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+        let mut entries = match entries {
+            Ok(entries) => entries,
+            Err(error) => {
+                self.unreadable(path, &format!("the directory cannot be read: {error}"));
+                return;
+            }
+        };
+        entries.sort_by_key(fs::DirEntry::file_name);
+        for entry in entries {
+            let path = entry.path();
+            // Links to directories are not followed: they may lead in a circle.
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                self.directory(&path, depth + 1, files);
+            } else if path.is_file()
+                && path
+                    .extension()
+                    .is_some_and(|e| e.eq_ignore_ascii_case("xml"))
+            {
+                files.push(path);
+            }
+        }
+    }
+
+    fn file(&mut self, path: &Path, strictness: Strictness) {
+        match readable(path) {
+            Ok(text) => self.add(path, &text, strictness),
+            Err(reason) => self.unreadable(path, &reason),
+        }
+    }
+
+    fn unreadable(&mut self, path: &Path, reason: &str) {
+        let source = self.sources.add(path, "");
+        self.report.error(source.span(0), reason);
+    }
+}
+
+/// The text of a file, or the reason why there is none.
+fn readable(path: &Path) -> Result<String, String> {
+    let metadata =
+        fs::metadata(path).map_err(|error| format!("the file cannot be read: {error}"))?;
+    if !metadata.is_file() {
+        return Err("this is neither a file nor a directory".into());
+    }
+    if metadata.len() > crate::syntax::LARGEST {
+        return Err(format!(
+            "the file is larger than {} MiB: split it",
+            crate::syntax::LARGEST >> 20
+        ));
+    }
+    let octets = fs::read(path).map_err(|error| format!("the file cannot be read: {error}"))?;
+    String::from_utf8(octets).map_err(|error| {
+        format!(
+            "the file is not UTF-8 at octet {}: convert it",
+            error.utf8_error().valid_up_to()
+        )
+    })
+}

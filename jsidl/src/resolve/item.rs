@@ -1,0 +1,243 @@
+//! Resolves composites, arrays, and references to them and to fields.
+
+use std::rc::Rc;
+
+use super::{Resolved, Resolver, Whole};
+use crate::check;
+use crate::model::{Array, Group, GroupKind, Item, List, Shape, Unsigned, Variant};
+use crate::source::{Span, Spanned};
+use crate::syntax::{CountField, Dimension, Kind, Node, Target, TypeSetIndex};
+
+impl Resolver<'_> {
+    /// Resolves a field or composite, with what it costs to copy it.
+    pub(super) fn whole(&mut self, scope: TypeSetIndex, node: &Node) -> Option<Rc<Whole>> {
+        let item = self.item(scope, node)?;
+        let (items, height) = measure(&item);
+        Some(Rc::new(Whole {
+            item,
+            items,
+            height,
+        }))
+    }
+
+    /// Resolves a field or composite.
+    pub(super) fn item(&mut self, scope: TypeSetIndex, node: &Node) -> Option<Item> {
+        if self.nesting >= super::DEEPEST {
+            self.too_deep(node.span);
+            return None;
+        }
+        self.nesting += 1;
+        let item = match &node.kind {
+            Kind::Reference(target) => self.referred(scope, node, target),
+            kind => self.shape(scope, node, kind).map(|shape| Item {
+                name: node.name.clone(),
+                optional: node.optional.unwrap_or(false),
+                interpretation: node.interpretation.clone().unwrap_or_default(),
+                shape,
+                location: self.location(node.span),
+            }),
+        };
+        self.nesting -= 1;
+        item
+    }
+
+    /// A copy of the target in which what the reference says itself prevails.
+    fn referred(&mut self, scope: TypeSetIndex, node: &Node, target: &Target) -> Option<Item> {
+        let Resolved::Node(whole) = self.follow(scope, target)? else {
+            return None;
+        };
+        if self.nesting + whole.height > super::DEEPEST {
+            self.too_deep(node.span);
+            return None;
+        }
+        self.spend(whole.items, node.span)?;
+        let own = node.interpretation.as_ref().filter(|text| !text.is_empty());
+        Some(Item {
+            name: node.name.clone(),
+            optional: node.optional.unwrap_or(whole.item.optional),
+            interpretation: own.unwrap_or(&whole.item.interpretation).clone(),
+            shape: whole.item.shape.clone(),
+            location: self.location(node.span),
+        })
+    }
+
+    /// Takes what a copy costs from what is left. `None` if that is too little, which is reported
+    /// once, because everything that follows has the same cause.
+    pub(super) fn spend(&mut self, items: usize, span: Span) -> Option<()> {
+        if let Some(left) = self.items_left.checked_sub(items) {
+            self.items_left = left;
+            return Some(());
+        }
+        if self.items_left > 0 {
+            self.items_left = 0;
+            let limit = super::MOST_ITEMS;
+            self.report.error(
+                span,
+                format!("the references of these definitions add up to more than {limit} fields: load fewer of them at once"),
+            );
+        }
+        None
+    }
+
+    fn shape(&mut self, scope: TypeSetIndex, node: &Node, kind: &Kind) -> Option<Shape> {
+        match kind {
+            Kind::Group {
+                kind,
+                presence,
+                members,
+            } => self
+                .group(scope, node, *kind, *presence, members)
+                .map(Shape::Group),
+            Kind::List { count, element } => self.list(scope, count, element).map(Shape::List),
+            Kind::Variant { tag, alternatives } => {
+                self.variant(scope, tag, alternatives).map(Shape::Variant)
+            }
+            Kind::Array {
+                dimensions,
+                element,
+            } => self
+                .array(scope, node, dimensions, element)
+                .map(Shape::Array),
+            Kind::Scalar(scalar) => self.scalar(scope, scalar).map(Shape::Scalar),
+            Kind::Bits { base, fields } => self.bit_field(scope, *base, fields).map(Shape::Bits),
+            Kind::FixedString { length } => self.fixed_string(scope, length),
+            Kind::VariableString { count } => {
+                let count = self.count(scope, count)?;
+                Some(Shape::VariableString { count })
+            }
+            Kind::Blob { count, format } => {
+                let count = self.count(scope, count)?;
+                let format = format.clone();
+                Some(Shape::Blob { count, format })
+            }
+            Kind::FormattedBlob { formats, count } => {
+                let formats = self.formats(scope, formats);
+                let count = self.count(scope, count);
+                Some(Shape::FormattedBlob {
+                    formats: formats?,
+                    count: count?,
+                })
+            }
+            Kind::Measure { choices } => {
+                let choices = self.choices(scope, choices)?;
+                Some(Shape::Measure { choices })
+            }
+            Kind::Reference(_) | Kind::Faulty => None,
+        }
+    }
+
+    fn group(
+        &mut self,
+        scope: TypeSetIndex,
+        node: &Node,
+        kind: GroupKind,
+        presence: Option<Spanned<Unsigned>>,
+        nodes: &[Node],
+    ) -> Option<Group> {
+        let unique = check::unique_names(self.report, "member", nodes);
+        let members = self.items(scope, nodes)?;
+        let sound = check::group(self.report, node, kind, presence, nodes, &members);
+        (unique && sound).then(|| Group {
+            kind,
+            presence: presence.map(|presence| presence.value),
+            members,
+        })
+    }
+
+    /// All of them, so that every mistake is found; `None` if one is faulty.
+    fn items(&mut self, scope: TypeSetIndex, nodes: &[Node]) -> Option<Vec<Item>> {
+        let items: Vec<_> = nodes.iter().map(|node| self.item(scope, node)).collect();
+        items.into_iter().collect()
+    }
+
+    fn list(&mut self, scope: TypeSetIndex, count: &CountField, element: &Node) -> Option<List> {
+        let count = self.count(scope, count);
+        let item = self.item(scope, element)?;
+        let sound = check::required(self.report, "the element of a list", element, &item);
+        let count = count.filter(|_| sound)?;
+        Some(List {
+            count,
+            element: Box::new(item),
+        })
+    }
+
+    fn variant(
+        &mut self,
+        scope: TypeSetIndex,
+        tag: &CountField,
+        nodes: &[Node],
+    ) -> Option<Variant> {
+        let mut sound = check::unique_names(self.report, "alternative", nodes);
+        let range = self.count(scope, tag);
+        let alternatives = self.items(scope, nodes)?;
+        for (node, item) in nodes.iter().zip(&alternatives) {
+            sound &= check::required(self.report, "an alternative of a variant", node, item);
+        }
+        sound &= check::tag(self.report, tag, range?, alternatives.len());
+        sound.then_some(Variant {
+            tag: tag.unsigned,
+            alternatives,
+        })
+    }
+
+    fn array(
+        &mut self,
+        scope: TypeSetIndex,
+        node: &Node,
+        dimensions: &[Dimension],
+        element: &Node,
+    ) -> Option<Array> {
+        let names = dimensions.iter().map(|d| (d.name.as_str(), d.span));
+        let unique = check::unique(self.report, "dimension", names);
+        let sizes: Vec<_> = dimensions
+            .iter()
+            .map(|dimension| {
+                let size = self.integer(scope, &dimension.size, "size")?;
+                check::size(self.report, dimension.size.span, "size", size)
+            })
+            .collect();
+        let item = self.item(scope, element)?;
+        let required = check::required(self.report, "the element of an array", element, &item);
+        let dimensions: Vec<u32> = sizes.into_iter().collect::<Option<_>>()?;
+        let small = check::array(self.report, node.span, &dimensions);
+        (unique && required && small).then(|| Array {
+            dimensions,
+            element: Box::new(item),
+        })
+    }
+}
+
+/// Number of items in an item, and how deep they are nested.
+pub(super) fn measure(item: &Item) -> (usize, usize) {
+    let inner: &mut dyn Iterator<Item = &Item> = match &item.shape {
+        Shape::Group(group) => &mut group.members.iter(),
+        Shape::Variant(variant) => &mut variant.alternatives.iter(),
+        Shape::List(list) => &mut std::iter::once(list.element.as_ref()),
+        Shape::Array(array) => &mut std::iter::once(array.element.as_ref()),
+        // Enumerations cost about as much as fields.
+        Shape::Scalar(scalar) => return (1 + entries(&scalar.meaning), 1),
+        Shape::Bits(bits) => {
+            let values = bits
+                .fields
+                .iter()
+                .map(|f| 1 + f.values.values.len() + f.values.ranges.len());
+            return (1 + values.sum::<usize>(), 1);
+        }
+        Shape::Measure { choices } => return (1 + choices.len(), 1),
+        Shape::FormattedBlob { formats, .. } => return (1 + formats.len(), 1),
+        Shape::FixedString { .. } | Shape::VariableString { .. } | Shape::Blob { .. } => {
+            return (1, 1);
+        }
+    };
+    let (items, height) = inner
+        .map(measure)
+        .fold((0, 0), |(items, height), (i, h)| (items + i, height.max(h)));
+    (items + 1, height + 1)
+}
+
+fn entries(meaning: &crate::model::Meaning) -> usize {
+    match meaning {
+        crate::model::Meaning::Values(set) => set.values.len() + set.ranges.len(),
+        _ => 0,
+    }
+}

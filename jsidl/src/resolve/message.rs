@@ -1,0 +1,107 @@
+//! Resolves messages, events and their sections.
+
+use std::rc::Rc;
+use std::sync::Arc;
+
+use super::item::measure;
+use super::{Resolved, Resolver, Whole};
+use crate::check;
+use crate::model::{Item, Message};
+use crate::syntax::{Content, Declaration, EventDef, MessageDef, Section, TypeSetIndex};
+
+impl Resolver<'_> {
+    /// Resolves a `message_def`.
+    pub(super) fn message(
+        &mut self,
+        scope: TypeSetIndex,
+        declaration: &Declaration,
+        message: &MessageDef,
+    ) -> Option<Arc<Message>> {
+        let header = self.section(scope, &message.header);
+        let body = self.section(scope, &message.body);
+        let footer = self.section(scope, &message.footer);
+        let header = self.header(&message.header, header?.as_deref())?;
+        Some(Arc::new(Message {
+            name: declaration.name.clone(),
+            code: message.code,
+            is_command: message.is_command,
+            description: message.description.clone(),
+            header,
+            body: self.taken(body?, &message.body)?,
+            footer: self.taken(footer?, &message.footer)?,
+            location: self.location(declaration.span),
+        }))
+    }
+
+    /// Resolves an `event_def`, only to find its mistakes.
+    pub(super) fn event(&mut self, scope: TypeSetIndex, event: &EventDef) -> Option<()> {
+        let sections: Vec<_> = event
+            .sections
+            .iter()
+            .map(|section| self.section(scope, section))
+            .collect();
+        sections.iter().all(Option::is_some).then_some(())
+    }
+
+    /// Resolves what a section holds; `Some(None)` if it is empty.
+    pub(super) fn section(
+        &mut self,
+        scope: TypeSetIndex,
+        section: &Section,
+    ) -> Option<Option<Rc<Whole>>> {
+        match &section.content {
+            Content::Empty => Some(None),
+            Content::Node(node) => {
+                let whole = self.whole(scope, node)?;
+                let what = "the composite at the top of a message";
+                check::required(self.report, what, node, &whole.item).then_some(Some(whole))
+            }
+            Content::Reference(target) => match self.follow(scope, target)? {
+                Resolved::Section(content) => Some(content),
+                _ => None,
+            },
+            Content::Faulty => None,
+        }
+    }
+
+    /// The item itself, or a copy if a declaration keeps it.
+    fn taken(&mut self, whole: Option<Rc<Whole>>, section: &Section) -> Option<Option<Item>> {
+        let Some(whole) = whole else {
+            return Some(None);
+        };
+        match Rc::try_unwrap(whole) {
+            Ok(whole) => Some(Some(whole.item)),
+            Err(shared) => {
+                self.spend(shared.items, section.span)?;
+                Some(Some(shared.item.clone()))
+            }
+        }
+    }
+
+    /// The message under the name that a reference gives it.
+    pub(super) fn renamed(
+        &mut self,
+        message: Arc<Message>,
+        reference: &Declaration,
+    ) -> Option<Arc<Message>> {
+        if message.name == reference.name {
+            return Some(message);
+        }
+        let items = message.body.as_ref().map_or(0, |body| measure(body).0);
+        self.spend(items, reference.span)?;
+        let mut renamed = Message::clone(&message);
+        renamed.name.clone_from(&reference.name);
+        Some(Arc::new(renamed))
+    }
+
+    /// What a header holds beside the message code.
+    fn header(&mut self, section: &Section, header: Option<&Whole>) -> Option<Option<Item>> {
+        match check::header(header.map(|whole| &whole.item)) {
+            Ok(rest) => Some(rest),
+            Err(message) => {
+                self.report.error(section.span, message);
+                None
+            }
+        }
+    }
+}

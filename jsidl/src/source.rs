@@ -1,0 +1,120 @@
+//! The texts of a load, and the way back from an offset in one of them to file, line and column.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::model::Location;
+
+/// A place in one of the loaded texts: eight octets instead of a whole [`Location`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Span {
+    file: u32,
+    offset: u32,
+}
+
+impl Span {
+    /// Whether both lie in the same file.
+    pub(crate) fn same_file(self, other: Self) -> bool {
+        self.file == other.file
+    }
+}
+
+/// A value together with the place where it is written.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spanned<T> {
+    pub(crate) value: T,
+    pub(crate) span: Span,
+}
+
+/// One file, or one text given in memory.
+#[derive(Debug)]
+pub(crate) struct Source {
+    id: u32,
+    path: Arc<Path>,
+    text: Arc<str>,
+    /// Offset of the first octet of every line.
+    lines: Vec<u32>,
+}
+
+impl Source {
+    /// The text without its byte order mark.
+    pub(crate) fn text(&self) -> &Arc<str> {
+        &self.text
+    }
+
+    /// The place at this octet of the text.
+    pub(crate) fn span(&self, offset: usize) -> Span {
+        let offset = u32::try_from(offset).unwrap_or(u32::MAX);
+        Span {
+            file: self.id,
+            offset,
+        }
+    }
+
+    fn location(&self, offset: u32) -> Location {
+        let line = self.lines.partition_point(|&start| start <= offset).max(1);
+        let start = self.lines.get(line - 1).copied().unwrap_or(0) as usize;
+        let before = self.text.get(start..offset as usize).unwrap_or("");
+        Location {
+            file: Arc::clone(&self.path),
+            line: u32::try_from(line).unwrap_or(u32::MAX),
+            column: u32::try_from(before.chars().count() + 1).unwrap_or(u32::MAX),
+        }
+    }
+}
+
+/// All texts of a load.
+#[derive(Debug, Default)]
+pub(crate) struct Sources(Vec<Source>);
+
+impl Sources {
+    /// Adds a text; a byte order mark at its start is dropped.
+    pub(crate) fn add(&mut self, path: &Path, text: &str) -> &Source {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let starts = text.match_indices('\n').map(|(at, _)| at + 1);
+        let lines = std::iter::once(0)
+            .chain(starts)
+            .map(|at| u32::try_from(at).unwrap_or(u32::MAX))
+            .collect();
+        let index = self.0.len();
+        self.0.push(Source {
+            id: u32::try_from(index).unwrap_or(u32::MAX),
+            path: Arc::from(path),
+            text: Arc::from(text),
+            lines,
+        });
+        &self.0[index]
+    }
+
+    /// File, line and column of a place.
+    pub(crate) fn location(&self, span: Span) -> Location {
+        self.source(span).location(span.offset)
+    }
+
+    /// The name of the file in which a place lies.
+    pub(crate) fn path(&self, span: Span) -> &Path {
+        &self.source(span).path
+    }
+
+    fn source(&self, span: Span) -> &Source {
+        &self.0[span.file as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_and_columns_count_characters_from_one_whatever_ends_the_lines() {
+        let mut sources = Sources::default();
+        let source = sources.add(Path::new("a.xml"), "\u{feff}über\r\nß x\n");
+        let at = |needle: &str| {
+            let offset = source.text().find(needle).expect("occurs");
+            source.location(u32::try_from(offset).expect("short"))
+        };
+        assert_eq!(at("über").to_string(), "a.xml:1:1");
+        assert_eq!(at("r\r").to_string(), "a.xml:1:4");
+        assert_eq!(at("x").to_string(), "a.xml:2:3");
+    }
+}

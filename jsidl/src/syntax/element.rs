@@ -1,0 +1,367 @@
+//! A cursor over XML elements that knows the habits of the language: two namespaces for the same
+//! elements, attributes with runs of white space, and the wish to report everything at once.
+
+use roxmltree::Node as Xml;
+
+use super::Expr;
+use crate::diagnostic::Report;
+use crate::expr::Expression;
+use crate::model::{Id, Number, Signed, Unsigned, Version};
+use crate::source::{Source, Span, Spanned};
+
+/// AS5684 and AS5684A; files mix them.
+const NAMESPACES: [&str; 2] = ["urn:jaus:jsidl:1.0", "urn:jaus:jsidl:1.1"];
+
+/// JSIDL+: wraps several services into one file and adds what a diagram editor needs.
+const PLUS: &str = "urn:jaus:jsidl:plus";
+
+/// Folds runs of white space into single blanks and trims.
+pub(super) fn fold(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Reads the elements of one text.
+pub(super) struct Reader<'r> {
+    pub(super) source: &'r Source,
+    pub(super) report: &'r mut Report,
+}
+
+/// What belongs to an element of the language.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Belongs {
+    Jsidl,
+    Plus,
+    Foreign,
+}
+
+pub(super) fn belongs(xml: Xml<'_, '_>) -> Belongs {
+    match xml.tag_name().namespace() {
+        Some(uri) if NAMESPACES.contains(&uri) => Belongs::Jsidl,
+        Some(PLUS) => Belongs::Plus,
+        _ => Belongs::Foreign,
+    }
+}
+
+impl Reader<'_> {
+    /// Where an element begins.
+    pub(super) fn span(&self, xml: Xml<'_, '_>) -> Span {
+        self.source.span(xml.range().start)
+    }
+
+    /// The child elements. Drawing data of JSIDL+ is passed over; other foreign elements and text
+    /// are reported.
+    pub(super) fn children<'a, 'x>(&mut self, xml: Xml<'a, 'x>) -> Vec<Xml<'a, 'x>> {
+        let parent = xml.tag_name().name();
+        let mut elements = Vec::new();
+        for child in xml.children() {
+            let at = self.span(child);
+            if child.is_element() {
+                match belongs(child) {
+                    Belongs::Jsidl => elements.push(child),
+                    Belongs::Plus if child.tag_name().name() == "service_set" => {
+                        elements.push(child);
+                    }
+                    Belongs::Plus => {}
+                    Belongs::Foreign => {
+                        let name = child.tag_name().name();
+                        self.report.error(at, format!(
+                            "`{name}` is not an element of JSIDL: its namespace must be `{}` or `{}`",
+                            NAMESPACES[0], NAMESPACES[1],
+                        ));
+                    }
+                }
+            } else if child.is_text() && child.text().is_some_and(|t| !t.trim().is_empty()) {
+                self.report.error(
+                    at,
+                    format!(
+                        "text has no meaning inside `{parent}`: remove it, or make it a comment"
+                    ),
+                );
+            }
+        }
+        elements
+    }
+
+    /// Reports attributes that the element does not have.
+    pub(super) fn only(&mut self, xml: Xml<'_, '_>, known: &[&str]) {
+        for attribute in xml.attributes() {
+            let name = attribute.name();
+            if attribute.namespace().is_some() || known.contains(&name) {
+                continue;
+            }
+            let element = xml.tag_name().name();
+            let at = self.source.span(attribute.range().start);
+            let message = if known.is_empty() {
+                format!("`{element}` has no attribute `{name}`: remove it")
+            } else {
+                let known = known.join("`, `");
+                format!("`{element}` has no attribute `{name}`: it has `{known}`")
+            };
+            self.report.error(at, message);
+        }
+    }
+
+    /// Reports an element that stands where it may not.
+    pub(super) fn misplaced(&mut self, xml: Xml<'_, '_>, parent: &str, allowed: &str) {
+        let name = xml.tag_name().name();
+        let at = self.span(xml);
+        self.report.error(
+            at,
+            format!("`{name}` may not stand in `{parent}`, which holds {allowed}"),
+        );
+    }
+
+    /// Reports a second element where one is allowed.
+    pub(super) fn repeated(&mut self, xml: Xml<'_, '_>, parent: &str) {
+        let name = xml.tag_name().name();
+        let at = self.span(xml);
+        self.report.error(
+            at,
+            format!("`{parent}` has more than one `{name}`: keep one"),
+        );
+    }
+
+    /// Reports that a required child is missing.
+    pub(super) fn lacks(&mut self, xml: Xml<'_, '_>, child: &str) {
+        let name = xml.tag_name().name();
+        let at = self.span(xml);
+        self.report
+            .error(at, format!("`{name}` lacks the element `{child}`: add it"));
+    }
+
+    /// An attribute's text, white space folded.
+    pub(super) fn attribute(&self, xml: Xml<'_, '_>, name: &str) -> Option<Spanned<String>> {
+        let attribute = xml.attribute_node(name)?;
+        Some(Spanned {
+            value: fold(attribute.value()),
+            span: self.source.span(attribute.range_value().start),
+        })
+    }
+
+    /// An attribute that must be there and not be empty.
+    pub(super) fn required(&mut self, xml: Xml<'_, '_>, name: &str) -> Option<Spanned<String>> {
+        let found = self.attribute(xml, name);
+        let element = xml.tag_name().name();
+        match found {
+            Some(found) if !found.value.is_empty() => Some(found),
+            Some(found) => {
+                self.report.error(
+                    found.span,
+                    format!("the attribute `{name}` of `{element}` is empty: give it a value"),
+                );
+                None
+            }
+            None => {
+                let at = self.span(xml);
+                self.report.error(
+                    at,
+                    format!("`{element}` lacks the attribute `{name}`: add it"),
+                );
+                None
+            }
+        }
+    }
+
+    /// The text of an optional attribute, empty if there is none.
+    pub(super) fn text(&self, xml: Xml<'_, '_>, name: &str) -> String {
+        self.attribute(xml, name)
+            .map(|a| a.value)
+            .unwrap_or_default()
+    }
+
+    /// The attribute `name`, which must be an identifier.
+    pub(super) fn name(&mut self, xml: Xml<'_, '_>) -> Option<String> {
+        let name = self.required(xml, "name")?;
+        self.identifier(name)
+    }
+
+    /// Checks that a text is an identifier.
+    pub(super) fn identifier(&mut self, name: Spanned<String>) -> Option<String> {
+        let mut letters = name.value.chars();
+        let sound = letters
+            .next()
+            .is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
+            && letters.all(|c| c.is_ascii_alphanumeric() || c == '_');
+        if sound {
+            return Some(name.value);
+        }
+        self.report.error(
+            name.span,
+            format!(
+                "`{}` cannot be a name: use letters, digits and underscores, not beginning with a digit",
+                name.value
+            ),
+        );
+        None
+    }
+
+    /// Looks an attribute's text up among the words that it may be.
+    pub(super) fn word<T: Copy>(
+        &mut self,
+        attribute: &Spanned<String>,
+        what: &str,
+        words: &[(&str, T)],
+    ) -> Option<T> {
+        let found = words.iter().find(|(word, _)| *word == attribute.value);
+        if found.is_none() {
+            let words: Vec<_> = words.iter().map(|(word, _)| *word).collect();
+            self.report.error(
+                attribute.span,
+                format!(
+                    "`{}` is not a value of `{what}`: use `{}`",
+                    attribute.value,
+                    words.join("`, `")
+                ),
+            );
+        }
+        found.map(|(_, value)| *value)
+    }
+
+    /// An attribute that is `true` or `false`. `Ok(None)` if there is none.
+    pub(super) fn flag(&mut self, xml: Xml<'_, '_>, name: &str) -> Result<Option<bool>, Faulty> {
+        const WORDS: [(&str, bool); 4] =
+            [("true", true), ("false", false), ("1", true), ("0", false)];
+        match self.attribute(xml, name) {
+            None => Ok(None),
+            Some(text) => self.word(&text, name, &WORDS).map(Some).ok_or(Faulty),
+        }
+    }
+
+    /// The type in `field_type_unsigned`.
+    pub(super) fn unsigned(&mut self, xml: Xml<'_, '_>) -> Option<Unsigned> {
+        let text = self.required(xml, "field_type_unsigned")?;
+        self.word(&text, "field_type_unsigned", &UNSIGNED)
+    }
+
+    /// A type in `field_type` or `const_type`.
+    pub(super) fn number(&mut self, xml: Xml<'_, '_>, attribute: &str) -> Option<Number> {
+        let text = self.required(xml, attribute)?;
+        self.word(&text, attribute, &NUMBERS)
+    }
+
+    /// A required attribute that holds a constant expression.
+    pub(super) fn expression(&mut self, xml: Xml<'_, '_>, name: &str) -> Option<Expr> {
+        let text = self.required(xml, name)?;
+        self.parse(&text, name)
+    }
+
+    /// As [`expression`](Self::expression), for an attribute that may be absent.
+    pub(super) fn optional_expression(
+        &mut self,
+        xml: Xml<'_, '_>,
+        name: &str,
+    ) -> Result<Option<Expr>, Faulty> {
+        match self.attribute(xml, name) {
+            None => Ok(None),
+            Some(text) => self.parse(&text, name).map(Some).ok_or(Faulty),
+        }
+    }
+
+    fn parse(&mut self, text: &Spanned<String>, name: &str) -> Option<Expr> {
+        match Expression::parse(&text.value) {
+            Ok(value) => Some(Spanned {
+                value,
+                span: text.span,
+            }),
+            Err(reason) => {
+                self.report.error(
+                    text.span,
+                    format!("`{name}` must be a number or a constant expression: {reason}"),
+                );
+                None
+            }
+        }
+    }
+
+    /// The attributes `id` and `version`.
+    pub(super) fn id(&mut self, xml: Xml<'_, '_>) -> Option<Id> {
+        let urn = self.required(xml, "id");
+        let version = self.required(xml, "version");
+        if let Some(raw) = xml.attribute("id")
+            && raw.trim() != raw
+            && let Some(urn) = &urn
+        {
+            self.report.warning(
+                urn.span,
+                format!(
+                    "the id `{}` is written with blanks around it: remove them",
+                    urn.value
+                ),
+            );
+        }
+        let urn = urn.and_then(|urn| self.urn(urn));
+        let version = version.and_then(|version| self.version(&version));
+        Some(Id {
+            urn: urn?.into(),
+            version: version?,
+        })
+    }
+
+    fn urn(&mut self, urn: Spanned<String>) -> Option<String> {
+        let mut letters = urn.value.chars();
+        let sound = letters
+            .next()
+            .is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
+            && letters.all(|c| c.is_ascii_alphanumeric() || "_-:.".contains(c));
+        if sound {
+            return Some(urn.value);
+        }
+        self.report.error(
+            urn.span,
+            format!(
+                "`{}` cannot be an id: write a URN such as `urn:jaus:jss:core:Discovery`",
+                urn.value
+            ),
+        );
+        None
+    }
+
+    fn version(&mut self, text: &Spanned<String>) -> Option<Version> {
+        let part = |part: &str| -> Option<u8> {
+            let plain = part == "0" || !part.starts_with(['0', '+']);
+            part.parse().ok().filter(|_| plain)
+        };
+        let parsed = text.value.split_once('.').and_then(|(major, minor)| {
+            Some(Version {
+                major: part(major)?,
+                minor: part(minor)?,
+            })
+        });
+        if parsed.is_none() {
+            let advice = if text.value.contains('*') {
+                "a wild card does not say which definition is meant, so write the version"
+            } else {
+                "write two numbers from 0 to 255, for example `1.0`"
+            };
+            self.report.error(
+                text.span,
+                format!("`{}` cannot be a version: {advice}", text.value),
+            );
+        }
+        parsed
+    }
+}
+
+/// Something was wrong and has been reported.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Faulty;
+
+const UNSIGNED: [(&str, Unsigned); 4] = [
+    ("unsigned byte", Unsigned::U8),
+    ("unsigned short integer", Unsigned::U16),
+    ("unsigned integer", Unsigned::U32),
+    ("unsigned long integer", Unsigned::U64),
+];
+
+const NUMBERS: [(&str, Number); 10] = [
+    ("byte", Number::Signed(Signed::I8)),
+    ("short integer", Number::Signed(Signed::I16)),
+    ("integer", Number::Signed(Signed::I32)),
+    ("long integer", Number::Signed(Signed::I64)),
+    ("unsigned byte", Number::Unsigned(Unsigned::U8)),
+    ("unsigned short integer", Number::Unsigned(Unsigned::U16)),
+    ("unsigned integer", Number::Unsigned(Unsigned::U32)),
+    ("unsigned long integer", Number::Unsigned(Unsigned::U64)),
+    ("float", Number::F32),
+    ("long float", Number::F64),
+];

@@ -1,0 +1,441 @@
+//! The syntax tree: what the XML says, with every place kept and no reference followed.
+//!
+//! [`read`] turns one text into declarations, which it adds to a [`Program`]. What it cannot read
+//! it reports and marks as faulty, so that everything around it is still looked at.
+
+mod composite;
+mod element;
+mod field;
+mod limits;
+mod message;
+mod root;
+
+use crate::expr::Expression;
+use crate::model::{GroupKind, Id, Number, Rounding, Unsigned};
+use crate::source::{Span, Spanned};
+
+pub(crate) use limits::LARGEST;
+pub(crate) use root::{Strictness, read};
+
+/// Everything that was read, of all files.
+#[derive(Debug, Default)]
+pub(crate) struct Program {
+    pub(crate) services: Vec<ServiceDef>,
+    pub(crate) type_sets: Vec<TypeSet>,
+    pub(crate) const_sets: Vec<ConstSet>,
+    /// Services that could not be kept; the mistakes have been reported.
+    pub(crate) lost_services: Vec<Id>,
+}
+
+/// Index of a type set in [`Program::type_sets`].
+pub(crate) type TypeSetIndex = usize;
+
+/// `service_def`
+#[derive(Debug)]
+pub(crate) struct ServiceDef {
+    pub(crate) span: Span,
+    pub(crate) name: String,
+    pub(crate) id: Id,
+    pub(crate) description: String,
+    pub(crate) inherits_from: Option<SetRef>,
+    pub(crate) client_of: Vec<SetRef>,
+    /// The `declared_type_set` inside the service; an empty one if it has none.
+    pub(crate) types: TypeSetIndex,
+    pub(crate) inputs: Vec<Declaration>,
+    pub(crate) outputs: Vec<Declaration>,
+    pub(crate) events: Vec<Declaration>,
+}
+
+/// A local name for something that is identified by URN and version: `inherits_from`,
+/// `client_of`, `declared_type_set_ref`, `declared_const_set_ref`.
+#[derive(Debug, Clone)]
+pub(crate) struct SetRef {
+    pub(crate) span: Span,
+    pub(crate) name: String,
+    pub(crate) id: Id,
+}
+
+/// `declared_type_set`
+#[derive(Debug)]
+pub(crate) struct TypeSet {
+    pub(crate) span: Span,
+    /// A set inside a service has none.
+    pub(crate) id: Option<Id>,
+    pub(crate) type_sets: Vec<SetRef>,
+    pub(crate) const_sets: Vec<SetRef>,
+    /// The constant set that stands beside the type set in a service: an index into
+    /// [`Program::const_sets`].
+    pub(crate) constants: Option<usize>,
+    pub(crate) declarations: Vec<Declaration>,
+}
+
+/// `declared_const_set`
+#[derive(Debug)]
+pub(crate) struct ConstSet {
+    pub(crate) span: Span,
+    pub(crate) name: String,
+    /// A set inside a service needs none.
+    pub(crate) id: Option<Id>,
+    pub(crate) const_sets: Vec<SetRef>,
+    pub(crate) definitions: Vec<ConstDef>,
+}
+
+/// `const_def`
+#[derive(Debug)]
+pub(crate) struct ConstDef {
+    pub(crate) name: String,
+    pub(crate) number: Number,
+    pub(crate) value: Expr,
+}
+
+/// A named thing in a type set, a message set or an event set.
+#[derive(Debug)]
+pub(crate) struct Declaration {
+    pub(crate) span: Span,
+    pub(crate) name: String,
+    pub(crate) kind: DeclarationKind,
+}
+
+/// What a declaration declares.
+#[derive(Debug)]
+pub(crate) enum DeclarationKind {
+    Message(MessageDef),
+    Event(EventDef),
+    /// `header`, `body` or `footer`.
+    Section(Construct, Section),
+    Node(Node),
+    /// `declared_message_def`, `declared_event_def`, `declared_header` …
+    Reference(Target),
+    /// Reported already.
+    Faulty,
+}
+
+/// What a `declared_type_ref` asks for.
+#[derive(Debug, Clone)]
+pub(crate) struct Target {
+    pub(crate) construct: Construct,
+    pub(crate) path: Spanned<String>,
+}
+
+impl DeclarationKind {
+    /// Which construct is declared; `None` if that could not be read.
+    pub(crate) const fn construct(&self) -> Option<Construct> {
+        match self {
+            Self::Message(_) => Some(Construct::MessageDef),
+            Self::Event(_) => Some(Construct::EventDef),
+            Self::Section(construct, _) => Some(*construct),
+            Self::Node(node) => node.kind.construct(),
+            Self::Reference(target) => Some(target.construct),
+            Self::Faulty => None,
+        }
+    }
+}
+
+/// `message_def`
+#[derive(Debug)]
+pub(crate) struct MessageDef {
+    pub(crate) code: u16,
+    pub(crate) is_command: bool,
+    pub(crate) description: String,
+    pub(crate) header: Section,
+    pub(crate) body: Section,
+    pub(crate) footer: Section,
+}
+
+/// `event_def`: looked at for its mistakes only.
+#[derive(Debug)]
+pub(crate) struct EventDef {
+    pub(crate) sections: [Section; 3],
+}
+
+/// `header`, `body` or `footer`.
+#[derive(Debug)]
+pub(crate) struct Section {
+    pub(crate) span: Span,
+    pub(crate) content: Content,
+}
+
+/// What a section holds.
+#[derive(Debug)]
+pub(crate) enum Content {
+    Empty,
+    Node(Box<Node>),
+    Reference(Target),
+    /// Reported already.
+    Faulty,
+}
+
+/// A field or a composite.
+#[derive(Debug)]
+pub(crate) struct Node {
+    pub(crate) span: Span,
+    pub(crate) name: String,
+    /// Absent in some older definitions, which means `false`; a reference without it takes over
+    /// what the target says.
+    pub(crate) optional: Option<bool>,
+    pub(crate) interpretation: Option<String>,
+    pub(crate) kind: Kind,
+}
+
+/// The constructs, as written.
+#[derive(Debug)]
+pub(crate) enum Kind {
+    Group {
+        kind: GroupKind,
+        presence: Option<Spanned<Unsigned>>,
+        members: Vec<Node>,
+    },
+    List {
+        count: CountField,
+        element: Box<Node>,
+    },
+    Variant {
+        tag: CountField,
+        alternatives: Vec<Node>,
+    },
+    Array {
+        dimensions: Vec<Dimension>,
+        element: Box<Node>,
+    },
+    Scalar(ScalarField),
+    Bits {
+        base: Unsigned,
+        fields: Vec<SubField>,
+    },
+    FixedString {
+        length: Expr,
+    },
+    VariableString {
+        count: CountField,
+    },
+    Blob {
+        count: CountField,
+        format: String,
+    },
+    FormattedBlob {
+        formats: Vec<FormatEnum>,
+        count: CountField,
+    },
+    Measure {
+        choices: Vec<ChoiceEnum>,
+    },
+    Reference(Target),
+    /// Reported already.
+    Faulty,
+}
+
+impl Kind {
+    const fn construct(&self) -> Option<Construct> {
+        Some(match self {
+            Self::Group { kind, .. } => match kind {
+                GroupKind::Record => Construct::Record,
+                GroupKind::Sequence => Construct::Sequence,
+            },
+            Self::List { .. } => Construct::List,
+            Self::Variant { .. } => Construct::Variant,
+            Self::Array { .. } => Construct::Array,
+            Self::Scalar(_) => Construct::FixedField,
+            Self::Bits { .. } => Construct::BitField,
+            Self::FixedString { .. } => Construct::FixedLengthString,
+            Self::VariableString { .. } => Construct::VariableLengthString,
+            Self::Blob { .. } => Construct::VariableLengthField,
+            Self::FormattedBlob { .. } => Construct::VariableFormatField,
+            Self::Measure { .. } => Construct::VariableField,
+            Self::Reference(target) => target.construct,
+            Self::Faulty => return None,
+        })
+    }
+}
+
+/// An expression and where it stands.
+pub(crate) type Expr = Spanned<Expression>;
+
+/// `count_field` or `vtag_field`
+#[derive(Debug)]
+pub(crate) struct CountField {
+    pub(crate) span: Span,
+    pub(crate) unsigned: Unsigned,
+    pub(crate) min: Option<Expr>,
+    pub(crate) max: Option<Expr>,
+}
+
+/// `dimension`
+#[derive(Debug)]
+pub(crate) struct Dimension {
+    pub(crate) span: Span,
+    pub(crate) name: String,
+    pub(crate) size: Expr,
+}
+
+/// `fixed_field`, or the value of a `type_and_units_enum`
+#[derive(Debug)]
+pub(crate) struct ScalarField {
+    pub(crate) number: Number,
+    pub(crate) units: String,
+    pub(crate) scale: Option<ScaleRange>,
+    pub(crate) values: Option<ValueSet>,
+}
+
+/// `scale_range`
+#[derive(Debug)]
+pub(crate) struct ScaleRange {
+    pub(crate) span: Span,
+    pub(crate) lower: Expr,
+    pub(crate) upper: Expr,
+    pub(crate) rounding: Rounding,
+}
+
+/// `value_set`
+#[derive(Debug)]
+pub(crate) struct ValueSet {
+    pub(crate) span: Span,
+    pub(crate) offset_to_lower_limit: bool,
+    pub(crate) ranges: Vec<ValueRange>,
+    pub(crate) values: Vec<ValueEnum>,
+}
+
+/// `value_range`
+#[derive(Debug)]
+pub(crate) struct ValueRange {
+    pub(crate) span: Span,
+    pub(crate) lower: Expr,
+    pub(crate) upper: Expr,
+    pub(crate) lower_exclusive: bool,
+    pub(crate) upper_exclusive: bool,
+    pub(crate) interpretation: String,
+}
+
+/// `value_enum`
+#[derive(Debug)]
+pub(crate) struct ValueEnum {
+    pub(crate) span: Span,
+    pub(crate) index: Expr,
+    pub(crate) name: String,
+    pub(crate) interpretation: String,
+}
+
+/// `sub_field`
+#[derive(Debug)]
+pub(crate) struct SubField {
+    pub(crate) span: Span,
+    pub(crate) name: String,
+    pub(crate) from: Expr,
+    pub(crate) to: Expr,
+    pub(crate) values: ValueSet,
+    pub(crate) interpretation: String,
+}
+
+/// `format_enum`
+#[derive(Debug)]
+pub(crate) struct FormatEnum {
+    pub(crate) span: Span,
+    pub(crate) index: Expr,
+    pub(crate) name: String,
+}
+
+/// `type_and_units_enum`
+#[derive(Debug)]
+pub(crate) struct ChoiceEnum {
+    pub(crate) span: Span,
+    pub(crate) index: Expr,
+    pub(crate) name: Option<String>,
+    pub(crate) scalar: ScalarField,
+}
+
+/// The elements that declare something which a `declared_…` element may refer to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Construct {
+    Record,
+    Sequence,
+    List,
+    Variant,
+    Array,
+    FixedField,
+    BitField,
+    VariableField,
+    FixedLengthString,
+    VariableLengthString,
+    VariableLengthField,
+    VariableFormatField,
+    Header,
+    Body,
+    Footer,
+    MessageDef,
+    EventDef,
+}
+
+impl Construct {
+    const ALL: [Self; 17] = [
+        Self::Record,
+        Self::Sequence,
+        Self::List,
+        Self::Variant,
+        Self::Array,
+        Self::FixedField,
+        Self::BitField,
+        Self::VariableField,
+        Self::FixedLengthString,
+        Self::VariableLengthString,
+        Self::VariableLengthField,
+        Self::VariableFormatField,
+        Self::Header,
+        Self::Body,
+        Self::Footer,
+        Self::MessageDef,
+        Self::EventDef,
+    ];
+
+    /// The element's name.
+    pub(crate) const fn element(self) -> &'static str {
+        match self {
+            Self::Record => "record",
+            Self::Sequence => "sequence",
+            Self::List => "list",
+            Self::Variant => "variant",
+            Self::Array => "array",
+            Self::FixedField => "fixed_field",
+            Self::BitField => "bit_field",
+            Self::VariableField => "variable_field",
+            Self::FixedLengthString => "fixed_length_string",
+            Self::VariableLengthString => "variable_length_string",
+            Self::VariableLengthField => "variable_length_field",
+            Self::VariableFormatField => "variable_format_field",
+            Self::Header => "header",
+            Self::Body => "body",
+            Self::Footer => "footer",
+            Self::MessageDef => "message_def",
+            Self::EventDef => "event_def",
+        }
+    }
+
+    /// What an element declares, and whether it only refers to a declaration (`declared_…`).
+    pub(crate) fn of(element: &str) -> Option<(Self, bool)> {
+        let bare = element.strip_prefix("declared_");
+        let name = bare.unwrap_or(element);
+        let construct = Self::ALL.into_iter().find(|c| c.element() == name)?;
+        Some((construct, bare.is_some()))
+    }
+
+    /// Composites are made of other constructs.
+    pub(crate) const fn is_composite(self) -> bool {
+        matches!(
+            self,
+            Self::Record | Self::Sequence | Self::List | Self::Variant
+        )
+    }
+
+    /// Fields are what records hold.
+    pub(crate) const fn is_field(self) -> bool {
+        matches!(
+            self,
+            Self::Array
+                | Self::FixedField
+                | Self::BitField
+                | Self::VariableField
+                | Self::FixedLengthString
+                | Self::VariableLengthString
+                | Self::VariableLengthField
+                | Self::VariableFormatField
+        )
+    }
+}
