@@ -95,3 +95,49 @@ fn place(peer: Peer, chosen: &mut Vec<Interface>, may_add: bool) -> Result<usize
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn interface(name: &str, address: [u8; 4]) -> Interface {
+        Interface {
+            name: name.into(),
+            index: 1,
+            address: address.into(),
+            netmask: [255, 255, 255, 255].into(),
+            up: true,
+            multicast: true,
+        }
+    }
+
+    fn peer() -> Peer {
+        "127.0.0.1:9".parse().unwrap()
+    }
+
+    #[test]
+    fn a_peer_is_reached_through_the_interface_of_its_network() {
+        let mut chosen = vec![
+            interface("eth0", [10, 0, 0, 5]),
+            interface("lo", [127, 0, 0, 1]),
+        ];
+        assert_eq!(place(peer(), &mut chosen, false).unwrap(), 1);
+    }
+
+    #[test]
+    fn the_interface_that_leads_to_a_peer_is_added_when_all_are_wanted() {
+        let mut chosen = vec![interface("eth0", [10, 0, 0, 5])];
+        assert_eq!(place(peer(), &mut chosen, true).unwrap(), 1);
+        assert_eq!(chosen[1].address.octets(), [127, 0, 0, 1]);
+    }
+
+    #[test]
+    fn a_peer_behind_an_interface_that_was_not_chosen_is_an_error_that_names_it() {
+        let mut chosen = vec![interface("eth0", [10, 0, 0, 5])];
+        let error = place(peer(), &mut chosen, false).unwrap_err().to_string();
+        assert!(
+            error.contains("add `127.0.0.1`") && error.contains("eth0 10.0.0.5"),
+            "{error}"
+        );
+    }
+}
