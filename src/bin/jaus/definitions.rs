@@ -1,12 +1,22 @@
 //! `--jsidl` and `--service`: which definitions messages are read and written by.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use jaus::view::Dictionary;
+use jsidl::{Loaded, Loader};
 
 use crate::failure::Failure;
 
 #[derive(Args)]
 pub(crate) struct Definitions {
+    /// Add the service definitions of a JSIDL file or directory (repeatable)
+    ///
+    /// They come before the built-in ones. Mistakes in them are listed on standard error; services
+    /// without a mistake are used.
+    #[arg(long, value_name = "PATH")]
+    jsidl: Vec<PathBuf>,
+
     /// The service meant where several define the same message code (repeatable)
     ///
     /// A URN, or a URN and version: urn:jaus:jss:core:Events or urn:jaus:jss:core:Events@1.0
@@ -18,6 +28,7 @@ impl Definitions {
     /// The built-in definitions and those of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
         let mut dictionary = Dictionary::new();
+        self.add(&mut dictionary)?;
         for service in &self.service {
             service
                 .parse()
@@ -25,5 +36,36 @@ impl Definitions {
                 .map_err(|error| Failure::new(format!("--service {service}: {error}")))?;
         }
         Ok(dictionary)
+    }
+
+    /// Loads all paths together, since files may refer to one another.
+    fn add(&self, dictionary: &mut Dictionary) -> Result<(), Failure> {
+        if self.jsidl.is_empty() {
+            return Ok(());
+        }
+        let mut loader = Loader::new();
+        for path in &self.jsidl {
+            loader.path(path);
+        }
+        let Loaded {
+            library,
+            diagnostics,
+        } = loader.load();
+        for diagnostic in diagnostics.errors() {
+            eprintln!("jaus: {diagnostic}");
+        }
+        if library.services().next().is_none() {
+            let paths: Vec<_> = self
+                .jsidl
+                .iter()
+                .map(|path| path.display().to_string())
+                .collect();
+            return Err(Failure::new(format!(
+                "no service could be loaded from {}",
+                paths.join(", ")
+            )));
+        }
+        dictionary.add(&library);
+        Ok(())
     }
 }
