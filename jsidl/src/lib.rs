@@ -1,6 +1,7 @@
 //! JSIDL (AS5684), the language in which JAUS services are defined.
 #![forbid(unsafe_code)]
 
+pub mod catalogue;
 mod check;
 mod diagnostic;
 pub mod dynamic;

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::catalogue;
 use crate::diagnostic::{Diagnostics, Report};
 use crate::library::Library;
 use crate::resolve::resolve;
@@ -21,6 +22,7 @@ pub struct Loader {
     sources: Sources,
     program: Program,
     report: Report,
+    with_catalogue: bool,
 }
 
 /// What came of a load.
@@ -64,8 +66,21 @@ impl Loader {
         self
     }
 
+    /// Adds the definitions that come with this crate. What was added otherwise counts before
+    /// them, whatever the order.
+    pub fn catalogue(&mut self) -> &mut Self {
+        self.with_catalogue = true;
+        self
+    }
+
     /// Compiles everything that was added.
     pub fn load(mut self) -> Loaded {
+        if self.with_catalogue {
+            for entry in catalogue::entries() {
+                let name = Path::new("catalogue").join(entry.path);
+                self.add(&name, entry.text, Strictness::Named);
+            }
+        }
         let library = resolve(&self.program, &self.sources, &mut self.report);
         Loaded {
             library,

@@ -1,0 +1,74 @@
+//! The definitions that come with the crate, embedded: the same at run time, in a build script and
+//! on a machine without the source.
+//!
+//! Definitions are grouped into sets, for example `core` (AS5710) and `mobility` (AS6009).
+//! [`Loader::catalogue`](crate::Loader::catalogue) loads all of them.
+
+use crate::model::Id;
+
+/// One embedded file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Entry {
+    /// The set, for example `core`.
+    pub set: &'static str,
+    /// Path within the catalogue, for example `core/Discovery.xml`.
+    pub path: &'static str,
+    /// The root element: `service_def`, `declared_type_set` or `declared_const_set`.
+    pub element: &'static str,
+    /// The URN that the file declares.
+    pub urn: &'static str,
+    /// The version that the file declares, for example `1.1`.
+    pub version: &'static str,
+    /// The XML text.
+    pub text: &'static str,
+}
+
+static ENTRIES: &[Entry] = &include!(concat!(env!("OUT_DIR"), "/catalogue.rs"));
+
+/// All embedded files, ordered by set and path.
+pub fn entries() -> &'static [Entry] {
+    ENTRIES
+}
+
+/// The names of the sets, in alphabetical order.
+pub fn sets() -> impl Iterator<Item = &'static str> {
+    let mut sets: Vec<_> = ENTRIES.iter().map(|entry| entry.set).collect();
+    sets.dedup();
+    sets.into_iter()
+}
+
+/// The file that declares exactly this URN and version.
+pub fn find(id: &Id) -> Option<&'static Entry> {
+    let version = id.version.to_string();
+    ENTRIES
+        .iter()
+        .find(|entry| entry.urn == &*id.urn && entry.version == version)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Loader;
+
+    #[test]
+    fn every_embedded_definition_is_sound() {
+        let mut loader = Loader::new();
+        loader.catalogue();
+        let loaded = loader.load();
+        assert_eq!(loaded.diagnostics.to_string(), "");
+        let services = ENTRIES.iter().filter(|e| e.element == "service_def");
+        assert_eq!(loaded.library.services().count(), services.count());
+    }
+
+    #[test]
+    fn definitions_are_found_by_set_and_by_identity() {
+        assert!(sets().any(|set| set == "core"));
+        let mut loader = Loader::new();
+        loader.catalogue();
+        for service in loader.load().library.services() {
+            let entry = find(&service.id).expect("every service has a file");
+            assert_eq!(entry.element, "service_def");
+            assert!(entry.path.starts_with(entry.set));
+        }
+    }
+}
