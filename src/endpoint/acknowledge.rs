@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
+use tracing::debug;
+
 use super::{Config, Counter, Endpoint, Event, Path, To, Transmit};
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version, judp, ra};
@@ -66,8 +68,8 @@ impl Acknowledgements {
         MessageHandle(self.sent)
     }
 
-    pub(super) fn is_full(&self) -> bool {
-        self.waiting.len() >= self.limit
+    pub(super) fn has_room(&self, count: usize) -> bool {
+        self.waiting.len() + count <= self.limit
     }
 
     /// Waits for the acknowledgement of a frame that is being sent.
@@ -101,6 +103,19 @@ impl Acknowledgements {
 
     pub(super) fn next_deadline(&self) -> Option<Instant> {
         self.deadlines.first().map(|&(deadline, _)| deadline)
+    }
+
+    fn is_waiting(&self, message: MessageHandle) -> bool {
+        self.waiting
+            .values()
+            .any(|waiting| waiting.message == message)
+    }
+
+    /// Stops waiting for a message and all its fragments.
+    fn forget(&mut self, message: MessageHandle) {
+        self.waiting.retain(|_, waiting| waiting.message != message);
+        self.deadlines
+            .retain(|(_, key)| self.waiting.contains_key(key));
     }
 
     pub(super) fn forget_source(&mut self, source: JausId) {
@@ -142,9 +157,8 @@ impl Endpoint {
             to: To::Peer(from.peer),
             payload,
         };
-        if self.transmit(request.flags.priority(), transmit).is_ok() {
-            self.counters.add(Counter::AcknowledgementsSent);
-        }
+        self.transmit(request.flags.priority(), transmit);
+        self.counters.add(Counter::AcknowledgementsSent);
     }
 
     /// Takes the answer to a message of ours.
@@ -162,18 +176,24 @@ impl Endpoint {
             .take(key)
             .ok_or(Counter::UnexpectedAcknowledgement)?;
         let message = waiting.message;
-        self.announce(match frame.flags.acknowledgement() {
-            Acknowledgement::Negative => Event::NotAcknowledged {
-                message,
-                destination: frame.source,
-                refused: true,
-            },
-            _ => Event::Acknowledged {
+        if frame.flags.acknowledgement() == Acknowledgement::Negative {
+            self.give_up(message, frame.source, true);
+        } else if !self.acknowledgements.is_waiting(message) {
+            self.announce(Event::Acknowledged {
                 message,
                 by: frame.source,
-            },
-        });
+            });
+        }
         Ok(())
+    }
+
+    fn give_up(&mut self, message: MessageHandle, destination: JausId, refused: bool) {
+        self.acknowledgements.forget(message);
+        self.announce(Event::NotAcknowledged {
+            message,
+            destination,
+            refused,
+        });
     }
 
     /// Sends again what was not acknowledged in time, or gives up.
@@ -181,19 +201,15 @@ impl Endpoint {
         while let Some(mut waiting) = self.acknowledgements.take_due(now) {
             let destination = waiting.frame.destination;
             if waiting.retries_left == 0 {
-                let message = waiting.message;
-                self.announce(Event::NotAcknowledged {
-                    message,
-                    destination,
-                    refused: false,
-                });
+                self.give_up(waiting.message, destination, false);
                 continue;
             }
             waiting.retries_left -= 1;
             waiting.deadline = now + self.acknowledgements.timeout;
             self.counters.add(Counter::Retransmissions);
-            // A full queue is counted, and the next deadline tries again.
-            let _ = self.route(now, &waiting.frame);
+            if let Err(error) = self.resend(now, &waiting.frame) {
+                debug!(%destination, %error, "cannot send again");
+            }
             self.acknowledgements.insert(waiting);
         }
     }

@@ -20,6 +20,13 @@ pub struct Config {
     /// The longest payload, in octets, that is sent in one message. The default stays under one Ethernet frame and
     /// under the 1425 octets above which JAUS++ expects its own way of fragmenting.
     pub payload_limit: usize,
+    /// The longest message, in octets, that is sent or received. Above [`payload_limit`](Self::payload_limit) it travels
+    /// in fragments. Also the most that is kept of the unfinished messages of one sender.
+    pub max_message: usize,
+    /// The most octets that are kept of unfinished messages of all senders. The oldest are forgotten first.
+    pub max_reassembly: usize,
+    /// How long an unfinished message is kept after its latest fragment.
+    pub reassembly_timeout: Duration,
     /// The most entries of each queue (datagrams to send and messages to deliver, both per priority; news). What comes
     /// when a queue is full is dropped and counted.
     pub queue_limit: usize,
@@ -37,7 +44,7 @@ pub struct Config {
     pub acknowledge_timeout: Duration,
     /// How often to send again before giving up.
     pub acknowledge_retries: u32,
-    /// The most messages that can wait for an acknowledgement at a time.
+    /// The most messages, or fragments of one, that can wait for an acknowledgement at a time.
     pub max_unacknowledged: usize,
     /// The shortest time between two [`Event::IdConflict`](super::Event::IdConflict) about one id.
     pub conflict_interval: Duration,
@@ -53,6 +60,9 @@ impl Default for Config {
             max_peers: 1024,
             static_peers: Vec::new(),
             payload_limit: 1425,
+            max_message: 512 * 1024,
+            max_reassembly: 4 * 1024 * 1024,
+            reassembly_timeout: Duration::from_secs(2),
             queue_limit: 1024,
             duplicate_window: Duration::from_millis(100),
             retransmission_window: Duration::from_millis(500),
@@ -60,7 +70,7 @@ impl Default for Config {
             max_recent: 4096,
             acknowledge_timeout: Duration::from_millis(100),
             acknowledge_retries: 3,
-            max_unacknowledged: 256,
+            max_unacknowledged: 512,
             conflict_interval: Duration::from_secs(5),
             first_sequence: 0,
         }

@@ -75,8 +75,10 @@ counters! {
     Duplicate = "dropped: duplicate",
     /// Dropped: a message too short for a message code.
     NoMessageCode = "dropped: no message code",
-    /// Dropped: a part of a large message.
-    Fragment = "dropped: fragment",
+    /// Dropped: a large message that is longer than the limit.
+    MessageTooLong = "dropped: large message above the limit",
+    /// Dropped: a part of a large message of which the rest did not come in time, or for which there is no room.
+    FragmentsForgotten = "dropped: unfinished large message",
     /// Dropped: a received message, because too many wait to be delivered.
     DeliveryQueueFull = "dropped: delivery queue full",
     /// Dropped: a datagram to send, because too many wait to be sent.

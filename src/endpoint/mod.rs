@@ -32,6 +32,7 @@ mod acknowledge;
 mod config;
 mod counters;
 mod event;
+mod fragment;
 mod local;
 mod peers;
 mod queue;
@@ -56,6 +57,7 @@ pub use send::SendError;
 use crate::address::JausId;
 use crate::wire::Priority;
 use acknowledge::Acknowledgements;
+use fragment::Reassembly;
 use local::Components;
 use peers::Peers;
 use queue::PriorityQueue;
@@ -104,6 +106,7 @@ pub struct Endpoint {
     sequence: u16,
     heard: Recent,
     sent_to_group: Recent,
+    reassembly: Reassembly,
     acknowledgements: Acknowledgements,
     conflicts: BTreeMap<JausId, Instant>,
     transmits: PriorityQueue<Transmit>,
@@ -123,6 +126,7 @@ impl Endpoint {
             sequence: config.first_sequence,
             heard: Recent::new(config.max_recent, config.retransmission_window),
             sent_to_group: Recent::new(config.max_recent, config.echo_window),
+            reassembly: Reassembly::new(&config),
             acknowledgements: Acknowledgements::new(&config),
             conflicts: BTreeMap::new(),
             transmits: PriorityQueue::new(config.queue_limit),
@@ -179,6 +183,7 @@ impl Endpoint {
     /// harmless.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.retry_unacknowledged(now);
+        self.reassembly.expire(now, &mut self.counters);
     }
 
     /// The next datagram to send, the most urgent first.
@@ -198,7 +203,13 @@ impl Endpoint {
     /// When to call [`handle_timeout`](Self::handle_timeout), if ever.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.acknowledgements.next_deadline()
+        [
+            self.acknowledgements.next_deadline(),
+            self.reassembly.next_expiry(),
+        ]
+        .into_iter()
+        .flatten()
+        .min()
     }
 
     /// What was received, sent and dropped, and why.
@@ -215,18 +226,10 @@ impl Endpoint {
         }
     }
 
-    fn transmit(&mut self, priority: Priority, transmit: Transmit) -> Result<(), SendError> {
-        self.transmits.push(priority, transmit).map_err(|_| {
+    /// Queues a datagram; a full queue is counted.
+    fn transmit(&mut self, priority: Priority, transmit: Transmit) {
+        if self.transmits.push(priority, transmit).is_err() {
             self.counters.add(Counter::TransmitQueueFull);
-            SendError::QueueFull {
-                limit: self.config.queue_limit,
-            }
-        })
-    }
-
-    /// The next sequence number. Never 0, which JAUS++ refuses in fragments.
-    fn next_sequence(&mut self) -> u16 {
-        self.sequence = self.sequence.checked_add(1).unwrap_or(1);
-        self.sequence
+        }
     }
 }

@@ -20,6 +20,11 @@ impl<T> PriorityQueue<T> {
         }
     }
 
+    /// Whether `count` more entries of that priority fit.
+    pub(super) fn has_room(&self, priority: Priority, count: usize) -> bool {
+        self.levels[usize::from(priority.bits())].len() + count <= self.limit
+    }
+
     /// Puts an entry behind the others of its priority, or gives it back if there are too many.
     pub(super) fn push(&mut self, priority: Priority, entry: T) -> Result<(), T> {
         let level = &mut self.levels[usize::from(priority.bits())];

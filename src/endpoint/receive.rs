@@ -58,8 +58,12 @@ impl Endpoint {
     /// Does all that a message causes, or tells why it is dropped.
     fn accept(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
         let broadcast = check_header(frame)?;
+        if self.is_own_echo(now, from, frame) {
+            return Err(Counter::OwnEcho);
+        }
         if self.components.contains(frame.source) {
-            return Err(self.judge_own_id(now, from, frame));
+            self.announce_conflict(now, from, frame.source);
+            return Err(Counter::IdConflict);
         }
         let receivers = self.receivers(frame, broadcast)?;
         if frame.flags.acknowledgement().is_answer() && !frame.is_acknowledgement() {
@@ -74,10 +78,14 @@ impl Endpoint {
             Acknowledgement::None => {}
         }
         self.filter_duplicate(now, frame)?;
-        if frame.flags.data() != DataControl::Single {
-            return Err(Counter::Fragment);
-        }
-        self.deliver(from, frame, broadcast, &frame.payload, &receivers)
+        let payload = match frame.flags.data() {
+            DataControl::Single => frame.payload.clone(),
+            _ => match self.reassembly.insert(now, frame, &mut self.counters)? {
+                Some(whole) => whole,
+                None => return Ok(()),
+            },
+        };
+        self.deliver(from, frame, broadcast, &payload, &receivers)
     }
 
     /// The local components that a message is for, or why there are none.
@@ -96,28 +104,28 @@ impl Endpoint {
         }
     }
 
-    /// A message from an id of ours: our own multicast come back, or somebody else who has taken the id.
-    fn judge_own_id(&mut self, now: Instant, from: Path, frame: &Frame) -> Counter {
-        let own_addresses = || self.links.values().flatten();
-        let may_be_own = own_addresses().next().is_none()
-            || own_addresses().any(|&address| address == from.peer);
-        let fingerprint = self.sent_to_group.fingerprint(frame);
-        if may_be_own
+    /// Whether this is our own multicast come back. A component that has gone meanwhile is known by what it sent.
+    fn is_own_echo(&self, now: Instant, from: Path, frame: &Frame) -> bool {
+        let mut own_addresses = self.links.values().flatten().peekable();
+        let may_be_own =
+            own_addresses.peek().is_none() || own_addresses.any(|&address| address == from.peer);
+        let window = self.config.echo_window;
+        may_be_own
             && self
                 .sent_to_group
-                .contains(now, &fingerprint, self.config.echo_window)
-        {
-            return Counter::OwnEcho;
-        }
-        let id = frame.source;
+                .contains(now, &self.sent_to_group.fingerprint(frame), window)
+    }
+
+    /// Tells that somebody else has taken an id of ours, not for each of its messages.
+    fn announce_conflict(&mut self, now: Instant, from: Path, id: JausId) {
         let announced = self.conflicts.get(&id);
         if announced
             .is_none_or(|&at| now.saturating_duration_since(at) >= self.config.conflict_interval)
         {
             self.conflicts.insert(id, now);
+            debug!(%id, ?from, "id conflict");
             self.announce(Event::IdConflict { id, path: from });
         }
-        Counter::IdConflict
     }
 
     fn learn(&mut self, now: Instant, from: Path, frame: &Frame) {

@@ -5,9 +5,12 @@ use std::time::Instant;
 use bytes::Bytes;
 use tracing::trace;
 
-use super::{Counter, Endpoint, Event, MessageHandle, Outgoing, Path, Received, To, Transmit};
+use super::{
+    Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To, Transmit,
+    fragment,
+};
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, EncodeError, Flags, Frame, judp};
+use crate::wire::{Acknowledgement, Broadcast, EncodeError, Flags, Frame, Version, judp};
 
 /// Why a message cannot be sent. Nothing of it was.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -25,11 +28,12 @@ pub enum SendError {
         /// Octets of the payload.
         length: usize,
     },
-    /// The payload is longer than one packet may be.
-    #[error("the message has {length} octets, and the limit of one packet is {limit}")]
+    /// The payload is longer than a message may be.
+    #[error("the message has {length} octets, and at most {limit} can be sent to this receiver")]
     TooLong {
         /// Octets of the payload.
         length: usize,
+        /// [`Config::max_message`](super::Config::max_message); to a receiver with an older header
         /// [`Config::payload_limit`](super::Config::payload_limit).
         limit: usize,
     },
@@ -77,8 +81,8 @@ impl Endpoint {
         if self.components.contains(message.destination) {
             self.send_to_sibling(handle, message)?;
         } else {
+            self.send_away(now, handle, &message, scope)?;
             self.send_to_siblings(&message, scope);
-            self.send_away(now, handle, message, scope)?;
         }
         self.counters.add(Counter::MessagesSent);
         Ok(handle)
@@ -150,87 +154,140 @@ impl Endpoint {
         &mut self,
         now: Instant,
         handle: MessageHandle,
-        message: Outgoing,
+        message: &Outgoing,
         scope: Broadcast,
     ) -> Result<(), SendError> {
-        let (length, limit) = (message.payload.len(), self.config.payload_limit);
-        if length > limit {
-            return Err(SendError::TooLong { length, limit });
+        let (destination, limit) = (message.destination, self.config.queue_limit);
+        if self.links.is_empty() && scope == Broadcast::None {
+            return Err(SendError::NoLink(destination));
         }
-        if message.acknowledge && self.acknowledgements.is_full() {
-            return Err(SendError::TooManyUnacknowledged {
-                limit: self.config.max_unacknowledged,
-            });
+        let frames = self.frames(message, scope)?;
+        if message.acknowledge && !self.acknowledgements.has_room(frames.len()) {
+            let limit = self.config.max_unacknowledged;
+            return Err(SendError::TooManyUnacknowledged { limit });
         }
-        let acknowledgement = if message.acknowledge {
-            Acknowledgement::Request
-        } else {
-            Acknowledgement::None
-        };
-        let frame = Frame {
-            flags: Flags::new(message.priority)
-                .with_broadcast(scope)
-                .with_acknowledgement(acknowledgement),
-            sequence: self.next_sequence(),
-            ..Frame::new(message.source, message.destination, message.payload)
-        };
-        self.route(now, &frame)?;
-        if message.acknowledge {
-            self.acknowledgements.expect(now, handle, frame);
+        let transmits: Vec<_> = frames
+            .iter()
+            .map(|frame| self.transmits_of(frame))
+            .collect::<Result<_, _>>()?;
+        if !self
+            .transmits
+            .has_room(message.priority, transmits.iter().map(Vec::len).sum())
+        {
+            self.counters.add(Counter::TransmitQueueFull);
+            return Err(SendError::QueueFull { limit });
+        }
+        for (frame, transmits) in frames.into_iter().zip(transmits) {
+            self.queue(now, &frame, transmits);
+            if message.acknowledge {
+                self.acknowledgements.expect(now, handle, frame);
+            }
         }
         Ok(())
     }
 
-    /// Queues a frame for where its destination is now.
-    pub(super) fn route(&mut self, now: Instant, frame: &Frame) -> Result<(), SendError> {
+    /// The frame that carries a message, or its fragments.
+    fn frames(&mut self, message: &Outgoing, scope: Broadcast) -> Result<Vec<Frame>, SendError> {
+        let length = message.payload.len();
+        let older_header = self
+            .peers
+            .route(message.destination)
+            .is_some_and(|(_, version)| version != Version::As5669a);
+        let (part, limit) = match self.config.payload_limit.clamp(1, judp::MAX_PAYLOAD) {
+            part if older_header => (part, part),
+            part => (
+                part,
+                self.config
+                    .max_message
+                    .clamp(part, part.saturating_mul(u16::MAX.into())),
+            ),
+        };
+        if length > limit {
+            return Err(SendError::TooLong { length, limit });
+        }
+        let mut flags = Flags::new(message.priority).with_broadcast(scope);
+        if message.acknowledge {
+            flags = flags.with_acknowledgement(Acknowledgement::Request);
+        }
+        let first = self.take_sequence_numbers(length.div_ceil(part));
+        Ok(fragment::split(&message.payload, part)
+            .enumerate()
+            .map(|(index, (data, payload))| Frame {
+                flags: flags.with_data(data),
+                sequence: first.wrapping_add(index as u16),
+                ..Frame::new(message.source, message.destination, payload)
+            })
+            .collect())
+    }
+
+    /// The first of `count` consecutive sequence numbers.
+    ///
+    /// They neither hold 0, which JAUS++ refuses in fragments, nor go round within a message, which it does not follow.
+    fn take_sequence_numbers(&mut self, count: usize) -> u16 {
+        let last = u16::try_from(count)
+            .ok()
+            .and_then(|count| self.sequence.checked_add(count));
+        let first = if last.is_some() { self.sequence + 1 } else { 1 };
+        self.sequence = last.unwrap_or(count as u16);
+        first
+    }
+
+    /// Sends a frame again, to where its destination is now.
+    pub(super) fn resend(&mut self, now: Instant, frame: &Frame) -> Result<(), SendError> {
+        let transmits = self.transmits_of(frame)?;
+        self.queue(now, frame, transmits);
+        Ok(())
+    }
+
+    fn queue(&mut self, now: Instant, frame: &Frame, transmits: Vec<Transmit>) {
+        if transmits.iter().any(|transmit| transmit.to == To::Group) {
+            self.sent_to_group
+                .insert(now, self.sent_to_group.fingerprint(frame));
+        }
+        for transmit in transmits {
+            self.transmit(frame.flags.priority(), transmit);
+        }
+    }
+
+    /// The datagrams that carry a frame to where its destination is.
+    fn transmits_of(&self, frame: &Frame) -> Result<Vec<Transmit>, SendError> {
         let destination = frame.destination;
         if destination.has_wildcard() || frame.flags.broadcast() != Some(Broadcast::None) {
-            return self.send_to_group(now, frame);
+            return self.to_group(frame);
         }
-        if self.links.is_empty() {
-            return Err(SendError::NoLink(destination));
-        }
-        let Some((path, version)) = self.peers.route(destination) else {
+        let route = self.peers.route(destination);
+        let Some((path, version)) = route.filter(|(path, _)| self.links.contains_key(&path.link))
+        else {
             trace!(%destination, "address unknown");
             let flags = frame
                 .flags
                 .with_broadcast(Broadcast::Global)
                 .with_acknowledgement(Acknowledgement::Request);
-            return self.send_to_group(
-                now,
-                &Frame {
-                    flags,
-                    ..frame.clone()
-                },
-            );
+            return self.to_group(&Frame {
+                flags,
+                ..frame.clone()
+            });
         };
         let payload = judp::encode(&Frame {
             version,
             ..frame.clone()
         })?;
-        self.transmit(frame.flags.priority(), to_path(path, payload))
+        Ok(vec![to_path(path, payload)])
     }
 
-    /// Queues a frame for the group of every link and for the static peers that multicast does not reach.
-    fn send_to_group(&mut self, now: Instant, frame: &Frame) -> Result<(), SendError> {
+    /// A frame for the group of every link and for the static peers that multicast does not reach.
+    fn to_group(&self, frame: &Frame) -> Result<Vec<Transmit>, SendError> {
         let payload = judp::encode(frame)?;
-        let groups = self.links.keys().map(|&link| Transmit {
+        let group = |&link: &LinkId| Transmit {
             link,
             to: To::Group,
             payload: payload.clone(),
-        });
+        };
         let copies = self.peers.broadcast_copies(frame.destination);
         let copies = copies
             .into_iter()
             .map(|path| to_path(path, payload.clone()));
-        let transmits: Vec<_> = groups.chain(copies).collect();
-        self.sent_to_group
-            .insert(now, self.sent_to_group.fingerprint(frame));
-        let mut result = Ok(());
-        for transmit in transmits {
-            result = result.and(self.transmit(frame.flags.priority(), transmit));
-        }
-        result
+        Ok(self.links.keys().map(group).chain(copies).collect())
     }
 }
 

@@ -13,6 +13,8 @@ mod error;
 mod flags;
 pub mod judp;
 pub mod ra;
+#[cfg(test)]
+mod tests;
 
 use std::fmt;
 
