@@ -39,6 +39,8 @@ mod queue;
 mod receive;
 mod recent;
 mod send;
+#[cfg(test)]
+mod tests;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::SocketAddr;

@@ -20,8 +20,7 @@ fn only_frame(datagram: &str) -> Frame {
 }
 
 fn error(datagram: &str) -> String {
-    let datagram = hex(datagram);
-    match judp::frames(datagram.clone()) {
+    match judp::frames(hex(datagram)) {
         Ok(mut frames) => {
             let error = frames.next().unwrap().unwrap_err();
             assert_eq!(

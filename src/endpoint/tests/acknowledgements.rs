@@ -1,0 +1,229 @@
+//! Acknowledgements in both directions.
+
+use super::*;
+
+fn request() -> Frame {
+    let flags = Flags::new(Priority::High)
+        .with_acknowledgement(Acknowledgement::Request)
+        .with_broadcast(Broadcast::Global);
+    Frame {
+        flags,
+        sequence: 7,
+        ..from_peer(QUERY_IDENTIFICATION)
+    }
+}
+
+fn answer(to: &Frame, acknowledgement: Acknowledgement) -> Frame {
+    let flags = Flags::default().with_acknowledgement(acknowledgement);
+    Frame {
+        flags,
+        sequence: to.sequence,
+        ..Frame::new(to.destination, to.source, Bytes::new())
+    }
+}
+
+#[test]
+fn a_request_is_acknowledged_at_once_to_where_it_came_from() {
+    let mut rig = Rig::new();
+    rig.hear(&request());
+    let flags = Flags::new(Priority::High).with_acknowledgement(Acknowledgement::Positive);
+    let expected = Frame {
+        flags,
+        sequence: 7,
+        ..Frame::new(US, PEER, Bytes::new())
+    };
+    assert_eq!(rig.sent(), [(To::Peer(path(PEER_HOST).peer), expected)]);
+    assert_eq!(rig.received().len(), 1);
+}
+
+#[test]
+fn a_repeated_request_is_acknowledged_again_but_not_delivered_again() {
+    let mut rig = Rig::new();
+    for _copy in 0..4 {
+        rig.hear(&request());
+        rig.pass(Duration::from_millis(105));
+    }
+    assert_eq!(
+        (rig.sent().len(), rig.received().len()),
+        (4, 1),
+        "Junior's timing of retries"
+    );
+    assert_eq!(rig.count(Counter::AcknowledgementsSent), 4);
+}
+
+#[test]
+fn a_request_to_many_is_not_acknowledged() {
+    let mut rig = Rig::new();
+    rig.hear(&Frame {
+        destination: JausId::EVERYONE,
+        ..request()
+    });
+    assert_eq!((rig.transmits(), rig.received().len()), (vec![], 1));
+}
+
+#[test]
+fn a_request_for_somebody_else_is_not_acknowledged() {
+    let mut rig = Rig::new();
+    rig.hear(&Frame {
+        destination: id("101.1.9"),
+        ..request()
+    });
+    assert_eq!(rig.transmits(), []);
+}
+
+#[test]
+fn an_older_header_is_acknowledged_with_its_own_and_its_code() {
+    let mut rig = Rig::new();
+    let flags = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    for version in [Version::As5669, Version::Ra] {
+        rig.hear(&Frame {
+            version,
+            flags,
+            ..from_peer(QUERY_IDENTIFICATION)
+        });
+        let (_, answer) = rig.sent().remove(0);
+        assert_eq!((answer.version, answer.code()), (version, Some(0x2B00)));
+        assert!(answer.is_acknowledgement() && answer.payload.len() == 2);
+        rig.pass(Duration::from_secs(1));
+    }
+}
+
+#[test]
+fn an_acknowledged_message_is_told_and_not_sent_again() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    let message = rig
+        .send(Outgoing {
+            acknowledge: true,
+            ..to_peer()
+        })
+        .unwrap();
+    let (_, sent) = rig.sent().remove(0);
+    assert_eq!(sent.flags.acknowledgement(), Acknowledgement::Request);
+    assert!(rig.endpoint.poll_timeout().is_some());
+    rig.hear(&answer(&sent, Acknowledgement::Positive));
+    assert_eq!(rig.events(), [Event::Acknowledged { message, by: PEER }]);
+    assert_eq!(rig.endpoint.poll_timeout(), None);
+    rig.pass(Duration::from_secs(10));
+    assert_eq!(rig.transmits(), []);
+}
+
+#[test]
+fn an_unacknowledged_message_is_sent_again_and_then_given_up() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    let message = rig
+        .send(Outgoing {
+            acknowledge: true,
+            ..to_peer()
+        })
+        .unwrap();
+    let first = rig.transmits();
+    for _retry in 0..3 {
+        let wait = rig.endpoint.poll_timeout().unwrap() - rig.now;
+        assert_eq!(wait, Duration::from_millis(100));
+        rig.pass(wait - Duration::from_millis(1));
+        assert_eq!(rig.transmits(), [], "not before the time");
+        rig.pass(Duration::from_millis(1));
+        assert_eq!(rig.transmits(), first, "the same again");
+    }
+    rig.pass(Duration::from_millis(100));
+    assert_eq!(rig.transmits(), []);
+    assert_eq!(
+        rig.events(),
+        [Event::NotAcknowledged {
+            message,
+            destination: PEER,
+            refused: false
+        }]
+    );
+    assert_eq!(
+        (
+            rig.endpoint.poll_timeout(),
+            rig.count(Counter::Retransmissions)
+        ),
+        (None, 3)
+    );
+}
+
+#[test]
+fn a_retry_goes_to_where_the_receiver_is_by_then() {
+    let mut rig = Rig::new();
+    rig.send(Outgoing {
+        acknowledge: true,
+        ..to_peer()
+    })
+    .unwrap();
+    assert_eq!(rig.sent()[0].0, To::Group);
+    rig.meet_peer();
+    rig.pass(Duration::from_millis(100));
+    assert_eq!(rig.sent()[0].0, To::Peer(path(PEER_HOST).peer));
+}
+
+#[test]
+fn a_refused_message_is_told() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    let message = rig
+        .send(Outgoing {
+            acknowledge: true,
+            ..to_peer()
+        })
+        .unwrap();
+    let (_, sent) = rig.sent().remove(0);
+    rig.hear(&answer(&sent, Acknowledgement::Negative));
+    assert_eq!(
+        rig.events(),
+        [Event::NotAcknowledged {
+            message,
+            destination: PEER,
+            refused: true
+        }]
+    );
+}
+
+#[test]
+fn answers_that_nobody_waits_for_are_dropped_quietly() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    rig.send(Outgoing {
+        acknowledge: true,
+        ..to_peer()
+    })
+    .unwrap();
+    let (_, sent) = rig.sent().remove(0);
+    let right = answer(&sent, Acknowledgement::Positive);
+    rig.hear(&Frame {
+        sequence: right.sequence + 1,
+        ..right.clone()
+    });
+    rig.hear(&Frame {
+        source: id("42.1.2"),
+        ..right.clone()
+    });
+    rig.events();
+    rig.hear(&Frame {
+        payload: Bytes::from_static(QUERY_HEARTBEAT),
+        ..right
+    });
+    assert_eq!((rig.events(), rig.transmits()), (vec![], vec![]));
+    assert_eq!(rig.count(Counter::UnexpectedAcknowledgement), 2);
+    assert_eq!(rig.count(Counter::AcknowledgementWithPayload), 1);
+    assert!(
+        rig.endpoint.poll_timeout().is_some(),
+        "still waiting for the right one"
+    );
+}
+
+#[test]
+fn a_component_that_leaves_waits_for_nothing() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    rig.send(Outgoing {
+        acknowledge: true,
+        ..to_peer()
+    })
+    .unwrap();
+    rig.endpoint.detach(US);
+    assert_eq!(rig.endpoint.poll_timeout(), None);
+}

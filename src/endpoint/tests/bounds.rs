@@ -1,0 +1,149 @@
+//! Nothing that peers or components do makes an endpoint grow without end; what is dropped for that is counted.
+
+use super::*;
+
+fn small() -> Config {
+    Config {
+        queue_limit: 4,
+        max_peers: 3,
+        max_recent: 8,
+        max_unacknowledged: 2,
+        ..Config::default()
+    }
+}
+
+#[test]
+fn a_full_table_of_peers_forgets_the_one_heard_longest_ago() {
+    let mut rig = Rig::with(small());
+    for component in [1, 2, 3, 1, 4] {
+        let source = JausId::new(42, 1, component);
+        rig.hear(&Frame {
+            source,
+            ..from_peer(QUERY_HEARTBEAT)
+        });
+        rig.pass(Duration::from_secs(1));
+        let _ = rig.received();
+    }
+    let peers: Vec<_> = rig
+        .endpoint
+        .peers()
+        .map(|peer| peer.id.to_string())
+        .collect();
+    assert_eq!(peers, ["42.1.1", "42.1.3", "42.1.4"]);
+    assert_eq!(rig.count(Counter::PeersEvicted), 1);
+}
+
+#[test]
+fn a_forgotten_peer_is_told_and_reached_through_the_group() {
+    let mut rig = Rig::with(Config {
+        max_peers: 1,
+        ..Config::default()
+    });
+    rig.meet_peer();
+    rig.hear(&Frame {
+        source: id("42.1.2"),
+        ..from_peer(QUERY_HEARTBEAT)
+    });
+    assert_eq!(rig.events()[0], Event::PeerForgotten { id: PEER });
+    rig.send(to_peer()).unwrap();
+    assert_eq!(rig.sent()[0].0, To::Group);
+}
+
+#[test]
+fn messages_that_nobody_polls_are_dropped_and_counted() {
+    let mut rig = Rig::with(small());
+    for sequence in 0..10 {
+        rig.hear(&Frame {
+            sequence,
+            ..from_peer(QUERY_HEARTBEAT)
+        });
+    }
+    let urgent = Frame {
+        flags: Flags::new(Priority::SafetyCritical),
+        ..from_peer(QUERY_HEARTBEAT)
+    };
+    rig.hear(&Frame {
+        sequence: 99,
+        ..urgent
+    });
+    assert_eq!(
+        rig.received().len(),
+        5,
+        "the urgent one has a queue of its own"
+    );
+    assert_eq!(rig.count(Counter::DeliveryQueueFull), 6);
+    assert_eq!(rig.count(Counter::MessagesDelivered), 5);
+}
+
+#[test]
+fn datagrams_that_nobody_polls_are_refused() {
+    let mut rig = Rig::with(small());
+    rig.meet_peer();
+    for _message in 0..4 {
+        rig.send(to_peer()).unwrap();
+    }
+    assert_eq!(
+        rig.send(to_peer()).unwrap_err().to_string(),
+        "4 messages of this priority wait already"
+    );
+    assert_eq!(
+        (rig.transmits().len(), rig.count(Counter::TransmitQueueFull)),
+        (4, 1)
+    );
+    let in_five_fragments = Outgoing {
+        payload: vec![0; 1425 * 5].into(),
+        ..to_peer()
+    };
+    assert!(rig.send(in_five_fragments).is_err());
+    assert_eq!(rig.transmits(), [], "all of a message or nothing");
+}
+
+#[test]
+fn news_that_nobody_polls_is_dropped_and_counted() {
+    let mut rig = Rig::with(Config {
+        max_peers: 100,
+        ..small()
+    });
+    for component in 1..=10 {
+        let source = JausId::new(42, 1, component);
+        rig.hear(&Frame {
+            source,
+            ..from_peer(QUERY_HEARTBEAT)
+        });
+    }
+    assert_eq!(
+        (
+            rig.endpoint.peers().count(),
+            rig.count(Counter::NewsQueueFull)
+        ),
+        (10, 6)
+    );
+}
+
+#[test]
+fn only_so_many_messages_wait_for_acknowledgements() {
+    let mut rig = Rig::with(small());
+    rig.meet_peer();
+    let message = Outgoing {
+        acknowledge: true,
+        ..to_peer()
+    };
+    rig.send(message.clone()).unwrap();
+    rig.send(message.clone()).unwrap();
+    assert_eq!(
+        rig.send(message),
+        Err(SendError::TooManyUnacknowledged { limit: 2 })
+    );
+}
+
+#[test]
+fn counters_are_listed_by_name_and_only_if_something_happened() {
+    let mut rig = Rig::new();
+    assert_eq!(rig.endpoint.counters().to_string(), "");
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    assert_eq!(
+        rig.endpoint.counters().to_string(),
+        "         1  datagrams received\n         1  messages received\n         1  messages delivered\n"
+    );
+    assert_eq!(rig.endpoint.counters().iter().count(), Counter::ALL.len());
+}

@@ -1,0 +1,144 @@
+//! What an endpoint must and must not do, one rule a test. Time is virtual; peers are frames written by hand.
+
+mod acknowledgements;
+mod bounds;
+mod fragments;
+mod identity;
+mod receiving;
+mod sending;
+
+use std::time::Duration;
+
+use super::*;
+use crate::wire::{Acknowledgement, Broadcast, Flags, Frame, Version, judp};
+
+/// Query Identification about a subsystem.
+const QUERY_IDENTIFICATION: &[u8] = b"\x00\x2B\x02";
+/// Query Heartbeat Pulse.
+const QUERY_HEARTBEAT: &[u8] = b"\x02\x22";
+
+const WIRE: LinkId = LinkId(0);
+const US: JausId = JausId::new(101, 1, 1);
+const SIBLING: JausId = JausId::new(101, 1, 2);
+const PEER: JausId = JausId::new(42, 1, 1);
+
+fn id(text: &str) -> JausId {
+    text.parse().unwrap()
+}
+
+/// The path of host `host` on the wire, with the ordinary port.
+fn path(host: u8) -> Path {
+    Path {
+        link: WIRE,
+        peer: SocketAddr::from(([10, 0, 0, host], judp::PORT)),
+    }
+}
+
+const OUR_HOST: u8 = 1;
+const PEER_HOST: u8 = 2;
+
+/// An endpoint with a link and [`US`] attached, and a clock.
+struct Rig {
+    endpoint: Endpoint,
+    now: Instant,
+}
+
+impl Rig {
+    fn new() -> Self {
+        Self::with(Config::default())
+    }
+
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "an arbitrary beginning of virtual time"
+    )]
+    fn with(config: Config) -> Self {
+        let mut endpoint = Endpoint::new(config);
+        endpoint.add_link(WIRE, [path(OUR_HOST).peer]);
+        endpoint.attach(US).unwrap();
+        Self {
+            endpoint,
+            now: Instant::now(),
+        }
+    }
+
+    fn pass(&mut self, time: Duration) {
+        self.now += time;
+        self.endpoint.handle_timeout(self.now);
+    }
+
+    fn hear_from(&mut self, host: u8, frame: &Frame) {
+        self.hear_octets(host, judp::encode(frame).unwrap());
+    }
+
+    fn hear(&mut self, frame: &Frame) {
+        self.hear_from(PEER_HOST, frame);
+    }
+
+    fn hear_octets(&mut self, host: u8, datagram: Bytes) {
+        self.endpoint
+            .handle_datagram(self.now, path(host), datagram);
+    }
+
+    /// Lets [`PEER`] be known.
+    fn meet_peer(&mut self) {
+        self.hear(&Frame {
+            sequence: 900,
+            ..from_peer(QUERY_HEARTBEAT)
+        });
+        self.events();
+    }
+
+    fn send(&mut self, message: Outgoing) -> Result<MessageHandle, SendError> {
+        self.endpoint.send(self.now, message)
+    }
+
+    fn events(&mut self) -> Vec<Event> {
+        std::iter::from_fn(|| self.endpoint.poll_event()).collect()
+    }
+
+    /// The messages among the events.
+    fn received(&mut self) -> Vec<Received> {
+        let message = |event| match event {
+            Event::Received(received) => Some(received),
+            _ => None,
+        };
+        self.events().into_iter().filter_map(message).collect()
+    }
+
+    fn transmits(&mut self) -> Vec<Transmit> {
+        std::iter::from_fn(|| self.endpoint.poll_transmit()).collect()
+    }
+
+    /// What is sent, read again.
+    fn sent(&mut self) -> Vec<(To, Frame)> {
+        let read = |transmit: Transmit| {
+            (
+                transmit.to,
+                judp::frames(transmit.payload)
+                    .unwrap()
+                    .next()
+                    .unwrap()
+                    .unwrap(),
+            )
+        };
+        self.transmits().into_iter().map(read).collect()
+    }
+
+    fn count(&self, counter: Counter) -> u64 {
+        self.endpoint.counters().get(counter)
+    }
+}
+
+/// A message from [`PEER`] to [`US`].
+fn from_peer(payload: &'static [u8]) -> Frame {
+    Frame {
+        sequence: 1,
+        ..Frame::new(PEER, US, Bytes::from_static(payload))
+    }
+}
+
+/// A message from [`US`] to [`PEER`].
+fn to_peer() -> Outgoing {
+    Outgoing::new(US, PEER, Bytes::from_static(QUERY_IDENTIFICATION))
+}
