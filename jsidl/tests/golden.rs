@@ -9,13 +9,19 @@
 mod support;
 
 use std::fs;
+use std::path::{Path, PathBuf};
 
-use jsidl::dynamic::{raw_from_real, real_from_raw, shortest_real};
-use jsidl::model::{Rounding, Scale, Unsigned};
-use serde_json::Value as Json;
+use jsidl::Library;
+use jsidl::dynamic::{
+    decode, encode, from_json, raw_from_real, real_from_raw, shortest_real, to_json,
+};
+use jsidl::model::{
+    Id, Item, Meaning, Message, Number, Rounding, Scalar, Scale, Shape, Unsigned, Version,
+};
+use serde_json::{Map, Value as Json, json};
 
 /// The lines of a file of golden data.
-fn lines(path: &std::path::Path) -> Vec<Json> {
+fn lines(path: &Path) -> Vec<Json> {
     let text = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     text.lines()
         .map(|line| serde_json::from_str(line).unwrap())
@@ -79,4 +85,236 @@ fn integers_become_the_real_numbers_they_stand_for() {
     }
     println!("{} integers", rows.len());
     assert!(rows.len() > 300);
+}
+
+/// Where the definitions of a source lie, the source's own first.
+fn directories(shared: &Path, source: &str) -> Vec<PathBuf> {
+    let corpus = shared.join("jsidl-corpus");
+    // Types and services of one set are used in others of the same family.
+    match source.split_once('-') {
+        Some(("jts", "examples")) => vec![corpus.join(source), corpus.join("jts")],
+        Some((family, set)) => {
+            let family = corpus.join(family);
+            vec![family.join(format!("urn.jaus.jss.{set}")), family]
+        }
+        None => vec![corpus.join(source)],
+    }
+}
+
+fn load(shared: &Path, source: &str) -> Library {
+    let mut loader = jsidl::Loader::new();
+    for directory in directories(shared, source) {
+        loader.path(directory);
+    }
+    loader.load().library
+}
+
+fn id_of(row: &Json) -> Id {
+    let (major, minor) = row["version"].as_str().unwrap().split_once('.').unwrap();
+    let version = Version {
+        major: major.parse().unwrap(),
+        minor: minor.parse().unwrap(),
+    };
+    Id {
+        urn: row["service_id"].as_str().unwrap().into(),
+        version,
+    }
+}
+
+fn message_of<'a>(library: &'a Library, row: &Json) -> &'a Message {
+    let id = id_of(row);
+    let service = library
+        .service(&id)
+        .unwrap_or_else(|| panic!("service {id} is not loaded"));
+    let code = u16::from_str_radix(row["message_id"].as_str().unwrap(), 16).unwrap();
+    let mut messages = service.messages();
+    messages
+        .find(|message| message.code == code && row["message"] == message.name)
+        .unwrap_or_else(|| panic!("{id} has no message {} {code:04X}h", row["message"]))
+}
+
+fn octets_of(hex: &Json) -> Vec<u8> {
+    let hex = hex.as_str().unwrap().as_bytes();
+    let octet = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+    hex.chunks(2).map(octet).collect()
+}
+
+/// Which number of a scaled field goes into the JSON.
+#[derive(Clone, Copy, PartialEq)]
+enum Real {
+    /// What the other generator was given: a quarter of a step above the exact value.
+    Given,
+    /// What we show for the integer that it gave.
+    Shown,
+}
+
+/// The JSON view of golden fields: the same content in our form.
+fn view(item: &Item, golden: &Json, real: Real) -> Json {
+    match &item.shape {
+        Shape::Group(group) => {
+            let golden = golden
+                .as_object()
+                .unwrap_or_else(|| panic!("{}: {golden}", item.name));
+            let member = |name: &String| group.members.iter().find(|member| member.name == *name);
+            let view = |(name, golden): (&String, &Json)| {
+                let member = member(name).unwrap_or_else(|| panic!("{} has no {name}", item.name));
+                (name.clone(), view(member, golden, real))
+            };
+            Json::Object(golden.iter().map(view).collect())
+        }
+        Shape::List(list) => {
+            let golden = golden.as_array().unwrap().iter();
+            golden
+                .map(|golden| view(&list.element, &golden[&list.element.name], real))
+                .collect()
+        }
+        Shape::Variant(variant) if variant.alternatives.is_empty() => {
+            assert_eq!(*golden, json!({ "vtag": 0, "name": null, "value": null }));
+            json!({})
+        }
+        Shape::Variant(variant) => {
+            let tag = usize::try_from(golden["vtag"].as_u64().unwrap()).unwrap();
+            let chosen = &variant.alternatives[tag];
+            assert_eq!(golden["name"], chosen.name);
+            let value = view(chosen, &golden["value"], real);
+            Json::Object(Map::from_iter([(chosen.name.clone(), value)]))
+        }
+        Shape::Scalar(scalar) => number(scalar, golden, real),
+        Shape::Bits(bits) => {
+            let golden = golden.as_object().unwrap();
+            assert_eq!(golden.len(), bits.fields.len());
+            let field = |name: &String| (name.clone(), integer(&golden[name]));
+            Json::Object(
+                bits.fields
+                    .iter()
+                    .map(|sub_field| field(&sub_field.name))
+                    .collect(),
+            )
+        }
+        Shape::FixedString { .. } | Shape::VariableString { .. } => golden.clone(),
+        Shape::Blob { .. } => golden["hex"].clone(),
+        Shape::FormattedBlob { .. } => {
+            json!({ "format": golden["format"], "data": golden["hex"] })
+        }
+        Shape::Measure { choices } => {
+            let index = golden["index"].as_u64().unwrap();
+            let choice = choices
+                .iter()
+                .find(|choice| u64::from(choice.index) == index)
+                .unwrap();
+            assert_eq!(golden["units"], choice.scalar.units);
+            let value = number(&choice.scalar, &golden["value"], real);
+            json!({ "index": index, "units": golden["units"], "value": value })
+        }
+        Shape::Array(array) => array_view(array.dimensions.len(), &array.element, golden, real),
+        other => panic!("{other:?} is unknown here"),
+    }
+}
+
+fn array_view(dimensions: usize, element: &Item, golden: &Json, real: Real) -> Json {
+    if dimensions == 0 {
+        return view(element, golden, real);
+    }
+    let inner = golden.as_array().unwrap().iter();
+    inner
+        .map(|golden| array_view(dimensions - 1, element, golden, real))
+        .collect()
+}
+
+fn number(scalar: &Scalar, golden: &Json, real: Real) -> Json {
+    match (&scalar.meaning, scalar.number) {
+        (Meaning::Scaled(scale), Number::Unsigned(width)) => {
+            let (given, raw) = (
+                golden["real"].as_f64().unwrap(),
+                golden["raw"].as_u64().unwrap(),
+            );
+            let shown = shortest_real(scale, width, raw);
+            let step = (scale.upper - scale.lower) / width.max() as f64;
+            assert!(
+                (shown - given).abs() <= 0.76 * step,
+                "{shown} shown for {given} ({raw})"
+            );
+            if real == Real::Given {
+                given.into()
+            } else {
+                shown.into()
+            }
+        }
+        (_, Number::F32) if real == Real::Shown => {
+            let shortest = (golden.as_f64().unwrap() as f32).to_string();
+            shortest.parse::<f64>().unwrap().into()
+        }
+        (_, Number::F32 | Number::F64) => golden.as_f64().unwrap().into(),
+        _ => integer(golden),
+    }
+}
+
+/// Integers from 2^53 are text in the golden data.
+fn integer(golden: &Json) -> Json {
+    match golden {
+        Json::String(text) => text
+            .parse::<u64>()
+            .map_or_else(|_| text.parse::<i64>().unwrap().into(), Json::from),
+        number => number.clone(),
+    }
+}
+
+/// Checks one vector: octets to view, octets to octets, and both views to octets.
+fn check(message: &Message, row: &Json) {
+    let octets = octets_of(&row["hex"]);
+    let value = decode(message, &octets).unwrap_or_else(|error| panic!("{error}\n{row}"));
+    assert_eq!(encode(message, &value).as_ref(), Ok(&octets), "{row}");
+    let body = |real| match &message.body {
+        Some(body) => view(body, &row["fields"]["body"][&body.name], real),
+        None => {
+            assert_eq!(row["fields"].get("body"), None, "{row}");
+            json!({})
+        }
+    };
+    let shown = to_json(message, &value).unwrap();
+    assert_eq!(shown.to_string(), body(Real::Shown).to_string(), "{row}");
+    for written in [shown, body(Real::Given)] {
+        let read = from_json(message, &written).unwrap_or_else(|error| panic!("{error}\n{row}"));
+        assert_eq!(
+            encode(message, &read).as_ref(),
+            Ok(&octets),
+            "{written}\n{row}"
+        );
+    }
+}
+
+#[test]
+fn every_golden_message_is_read_shown_and_written_as_it_is() {
+    let Some(shared) = support::shared() else {
+        return;
+    };
+    let mut files: Vec<_> = fs::read_dir(shared.join("golden"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| {
+            path.extension()
+                .is_some_and(|extension| extension == "jsonl")
+        })
+        .filter(|path| {
+            !path
+                .file_name()
+                .unwrap()
+                .to_string_lossy()
+                .starts_with("scaling_")
+        })
+        .collect();
+    files.sort();
+    let mut total = 0;
+    for file in files {
+        let source = file.file_stem().unwrap().to_str().unwrap();
+        let library = load(&shared, source);
+        let rows = lines(&file);
+        for row in &rows {
+            check(message_of(&library, row), row);
+        }
+        println!("{source}: {} vectors", rows.len());
+        total += rows.len();
+    }
+    println!("{total} vectors in all");
+    assert!(total > 2000, "the golden data have 2116 vectors");
 }

@@ -4,7 +4,7 @@
 //! keeps the integers of the wire, so that decoding and encoding is exact; what they mean (names,
 //! units, scaling) is in the definition.
 
-use crate::model::{Array, Number, Shape, Signed, SubField, Unsigned};
+use crate::model::{Array, Number, Shape, Signed, Unsigned};
 
 /// What a message or a part of it holds.
 ///
@@ -154,16 +154,5 @@ impl Array {
         } else {
             sizes.fold(1, u64::saturating_mul)
         }
-    }
-}
-
-impl SubField {
-    /// The bits that it owns; none where the definition reaches beyond 64.
-    pub(super) const fn mask(&self) -> u64 {
-        if self.from > self.to || self.to >= u64::BITS as u8 {
-            return 0;
-        }
-        let width = self.to - self.from + 1;
-        (u64::MAX >> (u64::BITS as u8 - width)) << self.from
     }
 }
