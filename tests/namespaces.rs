@@ -66,6 +66,11 @@ impl TwoHosts {
         Ok(())
     }
 
+    /// Runs `ip` on one of the two hosts.
+    fn ip(&self, host: usize, arguments: &[&str]) {
+        ip(&[&["-n", &self.names[host]], arguments].concat()).unwrap();
+    }
+
     /// Starts this test binary in the role of a node on one of the two hosts.
     fn start(&self, host: usize, role: &str) -> Process {
         let mut child = Command::new("ip")
@@ -202,6 +207,29 @@ fn nodes_on_two_hosts_meet_by_multicast_and_go_on_by_unicast() {
     );
 }
 
+#[test]
+fn an_interface_that_comes_up_later_is_used_and_again_after_it_was_down() {
+    on_two_hosts(
+        "an_interface_that_comes_up_later_is_used_and_again_after_it_was_down",
+        |hosts| {
+            hosts.ip(0, &["address", "flush", "dev", "jaus0"]);
+            let echo = hosts.start(0, "echo");
+            assert_eq!(echo.says("listening on"), "127.0.0.1:3794");
+
+            hosts.ip(0, &["address", "add", "10.213.77.1/24", "dev", "jaus0"]);
+            let caller = hosts.start(1, "caller");
+            assert_eq!(caller.says("answered by"), "101.1.33 at 10.213.77.1:3794");
+
+            hosts.ip(0, &["link", "set", "jaus0", "down"]);
+            hosts.ip(0, &["address", "flush", "dev", "jaus0"]);
+            hosts.ip(0, &["link", "set", "jaus0", "up"]);
+            hosts.ip(0, &["address", "add", "10.213.77.9/24", "dev", "jaus0"]);
+            let caller = hosts.start(1, "caller");
+            assert_eq!(caller.says("answered by"), "101.1.33 at 10.213.77.9:3794");
+        },
+    );
+}
+
 /// Not a test of its own: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
@@ -235,18 +263,18 @@ async fn echo() {
     }
 }
 
-/// Asks everyone once, and waits for the answer.
+/// Asks everyone until somebody answers.
 async fn call() {
     let node = Node::start(Config::new(102, 1)).unwrap();
     let mut port = node.attach(1).unwrap();
     let query_identification = Bytes::from_static(&[0x00, 0x2B, 0x02]);
-    port.send(Outgoing::new(
-        port.id(),
-        JausId::EVERYONE,
-        query_identification,
-    ))
-    .unwrap();
-    let answer = port.recv().await.unwrap();
+    let answer = loop {
+        let query = Outgoing::new(port.id(), JausId::EVERYONE, query_identification.clone());
+        port.send(query).unwrap();
+        if let Ok(answer) = tokio::time::timeout(Duration::from_millis(200), port.recv()).await {
+            break answer.unwrap();
+        }
+    };
     println!(
         "\nanswered by {} at {}",
         answer.source,

@@ -101,14 +101,8 @@ async fn configured_peers_get_a_copy_of_what_goes_to_the_group() {
         },
     )
     .unwrap();
-    let mut a = UdpLink::open(
-        &loopback(),
-        &Settings {
-            peers: vec![deaf.local()],
-            ..settings()
-        },
-    )
-    .unwrap();
+    let mut a = UdpLink::open(&loopback(), &settings()).unwrap();
+    a.set_peers(vec![deaf.local()]);
     a.send_to_group(&Bytes::from_static(b"hello"));
     assert_eq!(
         receive(&mut deaf).await,

@@ -176,6 +176,11 @@ impl Endpoint {
         self.transmits.retain(|transmit| transmit.link != link);
     }
 
+    /// Changes the peers whose address is configured, for instance because links have come or gone.
+    pub fn set_static_peers(&mut self, peers: Vec<StaticPeer>) {
+        self.peers.configure(peers);
+    }
+
     /// The peers whose addresses are known, in order of their ids.
     pub fn peers(&self) -> impl Iterator<Item = Peer> + '_ {
         self.peers.iter()

@@ -48,6 +48,10 @@ impl Peers {
         }
     }
 
+    pub(super) fn configure(&mut self, peers: Vec<StaticPeer>) {
+        self.configured = peers;
+    }
+
     /// Takes note of where a message came from. The latest word counts; a full table forgets whom it heard longest ago.
     pub(super) fn learn(&mut self, peer: Peer) -> Learned {
         if let Some(known) = self.learned.get_mut(&peer.id) {

@@ -95,27 +95,53 @@ impl Interfaces {
     }
 
     fn choose_from(&self, available: &[Interface]) -> Result<Vec<Interface>, Error> {
-        match self {
-            Self::All => all(available),
-            Self::Loopback => available
+        if let Self::Only(wanted) = self {
+            wanted
                 .iter()
-                .find(|i| i.is_loopback() && i.up)
-                .map(|i| vec![i.clone()])
-                .ok_or_else(|| Error::NoInterface(Available(available.to_vec()))),
+                .try_for_each(|name| named(name, available).map(drop))?;
+        }
+        let chosen = self.present(available);
+        if chosen.is_empty() {
+            return Err(Error::NoInterface(Available(available.to_vec())));
+        }
+        Ok(chosen)
+    }
+
+    /// Those of the available interfaces that are meant and are up. May be none.
+    #[must_use]
+    pub fn present(&self, available: &[Interface]) -> Vec<Interface> {
+        let up = |i: &&Interface| i.up;
+        let mut chosen: Vec<Interface> = Vec::new();
+        match self {
+            // One address of each: its first.
+            Self::All => {
+                for interface in available.iter().filter(up).filter(|i| !i.is_loopback()) {
+                    if !chosen.iter().any(|c| c.index == interface.index) {
+                        chosen.push(interface.clone());
+                    }
+                }
+                if chosen.is_empty() {
+                    return Self::Loopback.present(available);
+                }
+            }
+            Self::Loopback => {
+                chosen.extend(
+                    available
+                        .iter()
+                        .filter(up)
+                        .find(|i| i.is_loopback())
+                        .cloned(),
+                );
+            }
             Self::Only(wanted) => {
-                let mut chosen: Vec<Interface> = Vec::with_capacity(wanted.len());
-                for name in wanted {
-                    let interface = named(name, available)?;
+                for interface in wanted.iter().filter_map(|name| named(name, available).ok()) {
                     if !chosen.iter().any(|c| c.address == interface.address) {
                         chosen.push(interface);
                     }
                 }
-                if chosen.is_empty() {
-                    return Err(Error::NoInterface(Available(available.to_vec())));
-                }
-                Ok(chosen)
             }
         }
+        chosen
     }
 }
 
@@ -216,21 +242,7 @@ fn sysfs_flags(name: &str) -> Option<u32> {
     u32::from_str_radix(text.trim().trim_start_matches("0x"), 16).ok()
 }
 
-/// One address per interface that is up: its first.
-fn all(available: &[Interface]) -> Result<Vec<Interface>, Error> {
-    let mut chosen: Vec<Interface> = Vec::new();
-    for interface in available.iter().filter(|i| i.up && !i.is_loopback()) {
-        if !chosen.iter().any(|c| c.index == interface.index) {
-            chosen.push(interface.clone());
-        }
-    }
-    if chosen.is_empty() {
-        Interfaces::Loopback.choose_from(available)
-    } else {
-        Ok(chosen)
-    }
-}
-
+/// The interface that was asked for, which must be up.
 fn named(wanted: &str, available: &[Interface]) -> Result<Interface, Error> {
     let found = match wanted.parse::<Ipv4Addr>() {
         Ok(address) => by_address(address, available),

@@ -42,9 +42,6 @@ pub struct Settings {
     pub ttl: u8,
     /// How many octets of received datagrams the kernel is asked to hold for each socket.
     pub receive_buffer: usize,
-    /// Peers that get a unicast copy of everything sent to the group, for networks that do not
-    /// carry multicast.
-    pub peers: Vec<SocketAddr>,
 }
 
 impl Default for Settings {
@@ -55,7 +52,6 @@ impl Default for Settings {
             group: Group::default(),
             ttl: 16,
             receive_buffer: 4 << 20,
-            peers: Vec::new(),
         }
     }
 }
@@ -129,7 +125,7 @@ impl UdpLink {
             local,
             unicast,
             group,
-            peers: settings.peers.clone(),
+            peers: Vec::new(),
             outbox: VecDeque::new(),
             group_first: false,
             last_error: None,
@@ -159,6 +155,12 @@ impl UdpLink {
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         &self.counters
+    }
+
+    /// Names the peers that get a unicast copy of everything sent to the group, for networks that
+    /// do not carry multicast.
+    pub fn set_peers(&mut self, peers: Vec<SocketAddr>) {
+        self.peers = peers;
     }
 
     /// Sends a datagram to one peer.

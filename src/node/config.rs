@@ -155,7 +155,6 @@ impl Config {
             group: self.group,
             ttl: self.ttl,
             receive_buffer: self.receive_buffer,
-            peers: Vec::new(),
         }
     }
 }

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::{broadcast, watch};
 
-use super::links::{Links, link_id};
+use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
 use crate::address::JausId;
 use crate::endpoint::{
@@ -19,7 +19,6 @@ use crate::endpoint::{
     Transmit,
 };
 use crate::link::Slab;
-use crate::link::udp::UdpLink;
 
 /// Datagrams taken from one link before the others have their turn.
 const BATCH: usize = 32;
@@ -47,11 +46,10 @@ pub(super) struct Shared {
 impl Shared {
     pub(super) fn new(links: Links, mailbox: MailboxLimits) -> Self {
         let config = endpoint::Config {
-            static_peers: links.static_peers,
             first_sequence: random(),
             ..endpoint::Config::default()
         };
-        let core = Core::new(Endpoint::new(config), links.links, mailbox);
+        let core = Core::new(Endpoint::new(config), links, mailbox);
         Self {
             core: Mutex::new(core),
             stopped: watch::Sender::new(false),
@@ -72,23 +70,22 @@ fn random() -> u16 {
 #[derive(Debug)]
 pub(super) struct Core {
     pub(super) endpoint: Endpoint,
-    pub(super) links: Vec<UdpLink>,
+    pub(super) links: Links,
     pub(super) mailboxes: BTreeMap<JausId, Arc<Mailbox>>,
     limits: MailboxLimits,
     /// Gone when the node has stopped, which ends the listeners' streams.
     events: Option<broadcast::Sender<Event>>,
     slab: Slab,
     driver: Option<Waker>,
+    follow_at: Option<Instant>,
     stop_at: Option<Instant>,
     stopped: bool,
 }
 
 impl Core {
-    fn new(mut endpoint: Endpoint, links: Vec<UdpLink>, limits: MailboxLimits) -> Self {
-        for place in 0..links.len() {
-            endpoint.add_link(link_id(place), links.iter().map(UdpLink::local));
-        }
-        Self {
+    fn new(endpoint: Endpoint, links: Links, limits: MailboxLimits) -> Self {
+        let follow_at = links.follows().then(|| now() + links::INTERVAL);
+        let mut core = Self {
             endpoint,
             links,
             mailboxes: BTreeMap::new(),
@@ -96,8 +93,35 @@ impl Core {
             events: Some(broadcast::Sender::new(EVENTS)),
             slab: Slab::new(),
             driver: None,
+            follow_at,
             stop_at: None,
             stopped: false,
+        };
+        core.announce_links();
+        core
+    }
+
+    /// Tells the endpoint which links there are. A node's own multicast may come back to it on
+    /// any of them, so each is told all addresses.
+    fn announce_links(&mut self) {
+        for (id, _) in self.links.iter() {
+            self.endpoint
+                .add_link(id, self.links.iter().map(|(_, link)| link.local()));
+        }
+        self.endpoint.set_static_peers(self.links.static_peers());
+    }
+
+    /// Follows the host's interfaces, now and then.
+    fn follow(&mut self, now: Instant) {
+        if self.follow_at.is_none_or(|due| now < due) {
+            return;
+        }
+        self.follow_at = Some(now + links::INTERVAL);
+        if let Some(gone) = self.links.follow() {
+            for id in gone {
+                self.endpoint.remove_link(id);
+            }
+            self.announce_links();
         }
     }
 
@@ -140,6 +164,7 @@ impl Core {
     pub(super) fn turn(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         self.driver = Some(cx.waker().clone());
         let now = now();
+        self.follow(now);
         let more = self.receive(now, cx);
         if self
             .endpoint
@@ -165,7 +190,7 @@ impl Core {
 
     /// When the driver wants its next turn, if nothing else happens.
     pub(super) fn deadline(&self) -> Option<Instant> {
-        [self.endpoint.poll_timeout(), self.stop_at]
+        [self.endpoint.poll_timeout(), self.follow_at, self.stop_at]
             .into_iter()
             .flatten()
             .min()
@@ -185,7 +210,7 @@ impl Core {
     }
 
     fn transmit(&mut self, transmit: &Transmit) {
-        let Some(link) = self.links.get_mut(usize::from(transmit.link.0)) else {
+        let Some(link) = self.links.get_mut(transmit.link) else {
             return;
         };
         match transmit.to {
@@ -210,13 +235,10 @@ impl Core {
     /// Takes in what has arrived; whether a link had more than its share.
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
         let mut more = false;
-        for (place, link) in self.links.iter_mut().enumerate() {
+        for (id, link) in self.links.iter_mut() {
             let mut batch = 0;
             while let Poll::Ready((peer, datagram)) = link.poll_recv(cx, &mut self.slab) {
-                let path = Path {
-                    link: link_id(place),
-                    peer,
-                };
+                let path = Path { link: id, peer };
                 self.endpoint.handle_datagram(now, path, datagram);
                 batch += 1;
                 if batch == BATCH {
@@ -231,7 +253,7 @@ impl Core {
     /// Sends what waits for the network; whether nothing waits any more.
     fn flush(&mut self, cx: &mut Context<'_>) -> bool {
         let mut flushed = true;
-        for link in &mut self.links {
+        for (_, link) in self.links.iter_mut() {
             flushed &= link.poll_flush(cx).is_ready();
         }
         flushed
@@ -244,10 +266,10 @@ impl Core {
             self.endpoint.detach(id);
             mailbox.close();
         }
-        for place in 0..self.links.len() {
-            self.endpoint.remove_link(link_id(place));
+        for (id, _) in self.links.iter() {
+            self.endpoint.remove_link(id);
         }
-        self.links.clear();
+        self.links.close();
         self.events = None;
     }
 

@@ -1,99 +1,220 @@
-//! Opening the links of a node: which interfaces, and which peer is reached through which.
+//! The links of a node: one on each chosen interface, also when interfaces come and go.
+//!
+//! A board may start its node before its network is up, and Wi-Fi comes back with another
+//! address. So the node looks at the host's interfaces again every [`INTERVAL`], opens links on
+//! those that came and closes those that went.
 
-use std::net::IpAddr;
+use std::collections::{BTreeMap, BTreeSet};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::time::Duration;
 
 use super::{Config, Peer, StartError};
 use crate::endpoint::{LinkId, Path, StaticPeer};
 use crate::link::udp::UdpLink;
 use crate::link::{Available, Error, Group, Interface, Interfaces, interface};
 
-/// The links of a node, numbered by their place, and the peers that have an id.
+/// The time between two looks at the host's interfaces.
+pub(super) const INTERVAL: Duration = Duration::from_secs(2);
+
+/// The open links of a node.
 #[derive(Debug)]
 pub(super) struct Links {
-    pub(super) links: Vec<UdpLink>,
-    pub(super) static_peers: Vec<StaticPeer>,
+    config: Config,
+    open: BTreeMap<LinkId, UdpLink>,
+    next: LinkId,
+    /// Addresses where a link could not be opened; said once.
+    refused: BTreeSet<Ipv4Addr>,
 }
 
-/// Opens a link on every chosen interface. Nothing stays open if one fails.
-pub(super) fn open(config: &Config) -> Result<Links, StartError> {
-    let mut interfaces = config.interfaces.choose()?;
-    let mut placed = Vec::with_capacity(config.peers.len());
-    for &peer in &config.peers {
-        let may_add = config.interfaces == Interfaces::All;
-        placed.push((place(peer, &mut interfaces, may_add)?, peer));
-    }
-    let deaf = !interfaces.iter().any(|interface| interface.multicast);
-    if config.group != Group::Off && deaf && config.peers.is_empty() {
-        return Err(Error::NoMulticast(Available(interfaces)).into());
-    }
-    let mut links = Vec::with_capacity(interfaces.len());
-    for (i, interface) in interfaces.iter().enumerate() {
-        let nameless = |&&(place, peer): &&(usize, Peer)| place == i && peer.id().is_none();
-        let mut settings = config.udp();
-        settings.peers = placed
-            .iter()
-            .filter(nameless)
-            .map(|(_, peer)| peer.address())
-            .collect();
-        links.push(UdpLink::open(interface, &settings)?);
-    }
-    let static_peers = placed
-        .iter()
-        .filter_map(|&(place, peer)| named(place, peer))
-        .collect();
-    Ok(Links {
-        links,
-        static_peers,
-    })
-}
-
-/// The number of the link at this place. There are never as many interfaces as numbers.
-pub(super) fn link_id(place: usize) -> LinkId {
-    LinkId(u16::try_from(place).unwrap_or(u16::MAX))
-}
-
-fn named(place: usize, peer: Peer) -> Option<StaticPeer> {
-    let path = Path {
-        link: link_id(place),
-        peer: peer.address(),
-    };
-    Some(StaticPeer {
-        id: peer.id()?,
-        path,
-        gets_broadcasts: true,
-    })
-}
-
-/// Which of the interfaces leads to a peer: the one whose network it is in, else the one that
-/// the operating system would use.
-fn place(peer: Peer, chosen: &mut Vec<Interface>, may_add: bool) -> Result<usize, StartError> {
-    let ip = peer.address().ip();
-    let near = |i: &Interface| matches!(ip, IpAddr::V4(v4) if i.reaches(v4));
-    if let Some(place) = chosen.iter().position(near) {
-        return Ok(place);
-    }
-    let Some(local) = interface::local_address_for(peer.address()) else {
-        tracing::warn!(%peer, "no route there just now; sending to it through the first link");
-        return Ok(0);
-    };
-    if let Some(place) = chosen.iter().position(|i| i.address == local) {
-        return Ok(place);
-    }
-    let through = interface::list()?.into_iter().find(|i| i.address == local);
-    match through {
-        Some(interface) if may_add => {
-            chosen.push(interface);
-            Ok(chosen.len() - 1)
+impl Links {
+    /// Opens a link on every chosen interface. Nothing stays open if one fails.
+    pub(super) fn open(config: &Config) -> Result<Self, StartError> {
+        let mut chosen = config.interfaces.choose()?;
+        for &peer in &config.peers {
+            lead_to(peer, &config.interfaces, &mut chosen)?;
         }
+        let deaf = !chosen.iter().any(|interface| interface.multicast);
+        if config.group != Group::Off && deaf && config.peers.is_empty() {
+            return Err(Error::NoMulticast(Available(chosen)).into());
+        }
+        let mut links = Self {
+            config: config.clone(),
+            open: BTreeMap::new(),
+            next: LinkId(0),
+            refused: BTreeSet::new(),
+        };
+        for interface in &chosen {
+            links.add(interface)?;
+        }
+        links.distribute_peers();
+        Ok(links)
+    }
+
+    pub(super) fn get_mut(&mut self, link: LinkId) -> Option<&mut UdpLink> {
+        self.open.get_mut(&link)
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = (LinkId, &UdpLink)> {
+        self.open.iter().map(|(&id, link)| (id, link))
+    }
+
+    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = (LinkId, &mut UdpLink)> {
+        self.open.iter_mut().map(|(&id, link)| (id, link))
+    }
+
+    pub(super) fn close(&mut self) {
+        self.open.clear();
+    }
+
+    /// Whether interfaces that come and go matter to this node.
+    pub(super) fn follows(&self) -> bool {
+        self.config.interfaces != Interfaces::Loopback
+    }
+
+    /// Opens links on interfaces that came and closes those that went, which are returned;
+    /// `None` if nothing has changed.
+    pub(super) fn follow(&mut self) -> Option<Vec<LinkId>> {
+        let available = interface::list().ok()?;
+        let mut wanted = self.config.interfaces.present(&available);
+        for &peer in &self.config.peers {
+            // Out of reach just now; it was not when the node started.
+            let _ = lead_to(peer, &self.config.interfaces, &mut wanted);
+        }
+        let gone = self.close_all_but(&wanted);
+        let mut came = false;
+        for interface in &wanted {
+            if !self.open.values().any(|link| link.interface() == interface) {
+                came |= self.try_add(interface);
+            }
+        }
+        if gone.is_empty() && !came {
+            return None;
+        }
+        self.distribute_peers();
+        Some(gone)
+    }
+
+    /// Which peers with an id live where.
+    pub(super) fn static_peers(&self) -> Vec<StaticPeer> {
+        let named = |&peer: &Peer| {
+            let path = Path {
+                link: self.link_to(peer.address())?,
+                peer: peer.address(),
+            };
+            Some(StaticPeer {
+                id: peer.id()?,
+                path,
+                gets_broadcasts: true,
+            })
+        };
+        self.config.peers.iter().filter_map(named).collect()
+    }
+
+    fn add(&mut self, interface: &Interface) -> Result<(), Error> {
+        let link = UdpLink::open(interface, &self.config.udp())?;
+        while self.open.contains_key(&self.next) {
+            self.next = LinkId(self.next.0.wrapping_add(1));
+        }
+        self.open.insert(self.next, link);
+        self.next = LinkId(self.next.0.wrapping_add(1));
+        Ok(())
+    }
+
+    fn try_add(&mut self, interface: &Interface) -> bool {
+        match self.add(interface) {
+            Ok(()) => {
+                self.refused.remove(&interface.address);
+                true
+            }
+            Err(error) => {
+                if self.refused.insert(interface.address) {
+                    tracing::warn!(%interface, %error, "no link on an interface that came up");
+                }
+                false
+            }
+        }
+    }
+
+    fn close_all_but(&mut self, wanted: &[Interface]) -> Vec<LinkId> {
+        let is_gone = |link: &UdpLink| !wanted.contains(link.interface());
+        let gone: Vec<_> = self
+            .iter()
+            .filter(|(_, link)| is_gone(link))
+            .map(|(id, _)| id)
+            .collect();
+        for id in &gone {
+            if let Some(link) = self.open.remove(id) {
+                tracing::info!(interface = %link.interface(), "link closed: the interface is gone");
+            }
+        }
+        gone
+    }
+
+    /// Gives each link the peers without id that are reached through it.
+    fn distribute_peers(&mut self) {
+        let nameless = self.config.peers.iter().filter(|peer| peer.id().is_none());
+        let placed: Vec<_> = nameless
+            .filter_map(|peer| Some((self.link_to(peer.address())?, peer.address())))
+            .collect();
+        for (&id, link) in &mut self.open {
+            link.set_peers(
+                placed
+                    .iter()
+                    .filter(|(at, _)| *at == id)
+                    .map(|(_, a)| *a)
+                    .collect(),
+            );
+        }
+    }
+
+    /// The link that leads to an address; any if there is no way there just now.
+    fn link_to(&self, address: SocketAddr) -> Option<LinkId> {
+        let interfaces = || self.open.values().map(UdpLink::interface);
+        let local = way_to(address, interfaces());
+        let leads = |link: &UdpLink| Some(link.interface().address) == local;
+        let link = self
+            .iter()
+            .find(|(_, link)| leads(link))
+            .or_else(|| self.iter().next());
+        link.map(|(id, _)| id)
+    }
+}
+
+/// The local address from which a peer is reached: that of the interface whose network it is in,
+/// else the one that the operating system would use.
+fn way_to<'a>(
+    peer: SocketAddr,
+    mut interfaces: impl Iterator<Item = &'a Interface>,
+) -> Option<Ipv4Addr> {
+    let near = |i: &&Interface| matches!(peer.ip(), IpAddr::V4(v4) if i.reaches(v4));
+    let near = interfaces.find(near).map(|interface| interface.address);
+    near.or_else(|| interface::local_address_for(peer))
+}
+
+/// Makes sure that an interface that leads to the peer is among the chosen ones.
+fn lead_to(peer: Peer, wanted: &Interfaces, chosen: &mut Vec<Interface>) -> Result<(), StartError> {
+    let Some(local) = way_to(peer.address(), chosen.iter()) else {
+        tracing::debug!(%peer, "no way there just now");
+        return Ok(());
+    };
+    if chosen.iter().any(|interface| interface.address == local) {
+        return Ok(());
+    }
+    let through = interface::list()?
+        .into_iter()
+        .find(|interface| interface.address == local);
+    match through {
+        Some(interface) if *wanted == Interfaces::All => chosen.push(interface),
         _ => {
             let chosen = Available(chosen.clone());
-            Err(StartError::PeerOutOfReach {
+            return Err(StartError::PeerOutOfReach {
                 peer,
                 local,
                 chosen,
-            })
+            });
         }
     }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -121,20 +242,26 @@ mod tests {
             interface("eth0", [10, 0, 0, 5]),
             interface("lo", [127, 0, 0, 1]),
         ];
-        assert_eq!(place(peer(), &mut chosen, false).unwrap(), 1);
+        lead_to(peer(), &Interfaces::Loopback, &mut chosen).unwrap();
+        assert_eq!(chosen.len(), 2);
+        assert_eq!(
+            way_to(peer().address(), chosen.iter()),
+            Some([127, 0, 0, 1].into())
+        );
     }
 
     #[test]
     fn the_interface_that_leads_to_a_peer_is_added_when_all_are_wanted() {
         let mut chosen = vec![interface("eth0", [10, 0, 0, 5])];
-        assert_eq!(place(peer(), &mut chosen, true).unwrap(), 1);
+        lead_to(peer(), &Interfaces::All, &mut chosen).unwrap();
         assert_eq!(chosen[1].address.octets(), [127, 0, 0, 1]);
     }
 
     #[test]
     fn a_peer_behind_an_interface_that_was_not_chosen_is_an_error_that_names_it() {
         let mut chosen = vec![interface("eth0", [10, 0, 0, 5])];
-        let error = place(peer(), &mut chosen, false).unwrap_err().to_string();
+        let only = Interfaces::Only(vec!["eth0".into()]);
+        let error = lead_to(peer(), &only, &mut chosen).unwrap_err().to_string();
         assert!(
             error.contains("add `127.0.0.1`") && error.contains("eth0 10.0.0.5"),
             "{error}"

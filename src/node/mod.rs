@@ -53,6 +53,7 @@ pub use crate::endpoint::{AttachError, SendError};
 
 use self::core::Shared;
 use self::driver::Driver;
+use self::links::Links;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
 use crate::link::{Interface, udp};
@@ -85,7 +86,7 @@ impl Node {
     pub fn start(config: Config) -> Result<Self, StartError> {
         config.validate()?;
         let runtime = tokio::runtime::Handle::try_current().map_err(|_| StartError::NoRuntime)?;
-        let links = links::open(&config)?;
+        let links = Links::open(&config)?;
         let shared = Arc::new(Shared::new(links, config.mailbox));
         runtime.spawn(Driver::new(shared.clone()));
         Ok(Self {
@@ -114,14 +115,14 @@ impl Node {
     #[must_use]
     pub fn links(&self) -> Vec<LinkReport> {
         let core = self.shared().lock();
-        let report = |(place, link): (usize, &udp::UdpLink)| LinkReport {
-            link: links::link_id(place),
+        let report = |(id, link): (LinkId, &udp::UdpLink)| LinkReport {
+            link: id,
             interface: link.interface().clone(),
             local: link.local(),
             group: link.group(),
             counters: *link.counters(),
         };
-        core.links.iter().enumerate().map(report).collect()
+        core.links.iter().map(report).collect()
     }
 
     /// The peers whose addresses are known, in order of their ids.
