@@ -1,3 +1,11 @@
 //! Turns the service definitions in `jsidl/services` into typed messages.
 
-fn main() {}
+fn main() {
+    let mut build = jsidl::build::Build::new()
+        .runtime("crate::codec")
+        .module("core", "urn:jaus:jss:core:");
+    if std::env::var_os("CARGO_FEATURE_MOBILITY").is_some() {
+        build = build.module("mobility", "urn:jaus:jss:mobility:");
+    }
+    build.run();
+}

@@ -2,9 +2,11 @@
 #![forbid(unsafe_code)]
 
 pub mod address;
+pub mod codec;
 pub mod endpoint;
 #[cfg(feature = "node")]
 pub mod link;
+pub mod messages;
 #[cfg(feature = "node")]
 pub mod node;
 #[cfg(feature = "view")]

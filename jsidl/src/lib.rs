@@ -1,6 +1,7 @@
 //! JSIDL (AS5684), the language in which JAUS services are defined.
 #![forbid(unsafe_code)]
 
+pub mod build;
 pub mod catalogue;
 mod check;
 mod diagnostic;
@@ -10,6 +11,7 @@ mod library;
 mod loader;
 pub mod model;
 mod resolve;
+pub mod rust;
 mod source;
 mod syntax;
 

@@ -1,0 +1,152 @@
+//! Generates Rust from service definitions in a build script.
+//!
+//! A crate with definitions of its own in `services/` and the crate `jsidl` among its
+//! build-dependencies needs this in the `main` of its `build.rs`:
+//!
+//! ```no_run
+//! jsidl::build::Build::new()
+//!     .path("services")
+//!     .module("messages", "urn:example:")
+//!     .run();
+//! ```
+//!
+//! and this in its library, beside a dependency on `jaus`:
+//!
+//! ```ignore
+//! pub mod messages {
+//!     include!(concat!(env!("OUT_DIR"), "/messages.rs"));
+//! }
+//! ```
+//!
+//! Mistakes in definitions come out as errors of the build, with file, line and column.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::model::Service;
+use crate::{Diagnostic, Loader, Severity, rust};
+
+/// What to generate, and from which definitions.
+#[derive(Debug)]
+pub struct Build {
+    loader: Loader,
+    runtime: String,
+    modules: Vec<(String, String)>,
+    paths: Vec<PathBuf>,
+    out_dir: Option<PathBuf>,
+}
+
+impl Default for Build {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Build {
+    /// Generates nothing yet. The definitions that come with this crate are there to be referred
+    /// to; types are generated only for what [`module`](Self::module) names.
+    pub fn new() -> Self {
+        let mut loader = Loader::new();
+        loader.catalogue();
+        Self {
+            loader,
+            runtime: "::jaus::codec".to_owned(),
+            modules: Vec::new(),
+            paths: Vec::new(),
+            out_dir: None,
+        }
+    }
+
+    /// Adds a file of definitions, or a directory with all below it. The script runs again when
+    /// something in it changes.
+    #[must_use]
+    pub fn path(mut self, path: impl AsRef<Path>) -> Self {
+        self.loader.path(&path);
+        self.paths.push(path.as_ref().to_owned());
+        self
+    }
+
+    /// Generates `<name>.rs` with the services whose URN begins with `urn`, for example
+    /// `urn:jaus:jss:core:`.
+    #[must_use]
+    pub fn module(mut self, name: &str, urn: &str) -> Self {
+        self.modules.push((name.to_owned(), urn.to_owned()));
+        self
+    }
+
+    /// Where the generated code finds the codec runtime; `::jaus::codec` if nothing is said.
+    #[must_use]
+    pub fn runtime(mut self, path: &str) -> Self {
+        path.clone_into(&mut self.runtime);
+        self
+    }
+
+    /// Where to write; `OUT_DIR` if nothing is said.
+    #[must_use]
+    pub fn out_dir(mut self, path: impl Into<PathBuf>) -> Self {
+        self.out_dir = Some(path.into());
+        self
+    }
+
+    /// Writes the modules, and tells Cargo what to watch and what is wrong.
+    pub fn run(mut self) {
+        let mut watched = std::mem::take(&mut self.paths);
+        watched.push("build.rs".into());
+        for path in watched {
+            println!("cargo::rerun-if-changed={}", path.display());
+        }
+        let out_dir = self
+            .out_dir
+            .take()
+            .or_else(|| env::var_os("OUT_DIR").map(PathBuf::from));
+        let Some(out_dir) = out_dir else {
+            error("there is no OUT_DIR: call this from a build script, or name an `out_dir`");
+            return;
+        };
+        let (files, diagnostics) = self.generate();
+        for diagnostic in &diagnostics {
+            report(diagnostic);
+        }
+        for (name, text) in files {
+            let path = out_dir.join(name);
+            if let Err(reason) = fs::write(&path, text) {
+                error(&format!("{} cannot be written: {reason}", path.display()));
+            }
+        }
+    }
+
+    /// The modules as files, name and text, and everything that is to be said about the
+    /// definitions; a module is left out if it would be empty.
+    pub fn generate(self) -> (Vec<(String, String)>, crate::Diagnostics) {
+        let loaded = self.loader.load();
+        let module = |(name, urn): &(String, String)| {
+            let services = || loaded.library.services().map(AsRef::<Service>::as_ref);
+            let chosen: Vec<_> = services()
+                .filter(|service| service.id.urn.starts_with(urn))
+                .collect();
+            (!chosen.is_empty())
+                .then(|| (format!("{name}.rs"), rust::module(chosen, &self.runtime)))
+        };
+        let files: Vec<_> = self.modules.iter().filter_map(module).collect();
+        (files, loaded.diagnostics)
+    }
+}
+
+fn report(diagnostic: &Diagnostic) {
+    match diagnostic.severity {
+        Severity::Error => error(&diagnostic.to_string()),
+        Severity::Warning => instruct("warning", &diagnostic.to_string()),
+    }
+}
+
+fn error(text: &str) {
+    instruct("error", text);
+}
+
+/// An instruction to Cargo is one line.
+fn instruct(kind: &str, text: &str) {
+    for line in text.lines() {
+        println!("cargo::{kind}={line}");
+    }
+}

@@ -1,0 +1,293 @@
+//! How values become octets: `encoded_len` and `write`.
+
+use super::ident::local;
+use super::structs::optional;
+use super::types::{Field, Type, unsigned_type};
+use super::writer::Writer;
+use crate::model::{Count, Number, Unsigned};
+
+/// Writes `fn encoded_len` and `fn write` of a struct.
+pub(super) fn group(out: &mut Writer, fields: &[Field<'_>], presence: Option<Unsigned>) {
+    encoded_len(out, fields, presence);
+    out.gap();
+    write(out, fields, presence);
+}
+
+fn encoded_len(out: &mut Writer, fields: &[Field<'_>], presence: Option<Unsigned>) {
+    let mut constant = presence.map_or(0, Unsigned::size);
+    let mut terms = Vec::new();
+    for field in fields {
+        let value = format!("self.{}", field.ident);
+        match (optional(field), constant_len(&field.ty)) {
+            (false, Some(size)) => constant += size,
+            (false, None) => terms.push(length(&field.ty, &value)),
+            (true, Some(size)) => {
+                terms.push(times(size, &format!("usize::from({value}.is_some())")));
+            }
+            (true, None) => {
+                let each = measure(&field.ty);
+                terms.push(format!("{value}.as_ref().map_or(0, {each})"));
+            }
+        }
+    }
+    out.push("fn encoded_len(&self) -> usize {");
+    sum(out, constant, &terms);
+    out.push("}");
+}
+
+fn sum(out: &mut Writer, constant: usize, terms: &[String]) {
+    if terms.is_empty() {
+        out.push(constant.to_string());
+        return;
+    }
+    let first = if constant > 0 {
+        vec![constant.to_string()]
+    } else {
+        Vec::new()
+    };
+    let all: Vec<_> = first.into_iter().chain(terms.iter().cloned()).collect();
+    out.push(all.join("\n+ "));
+}
+
+/// Octets of a value, if all have the same number.
+fn constant_len(ty: &Type) -> Option<usize> {
+    match ty {
+        Type::FixedText(length) => Some(*length as usize),
+        Type::Array {
+            dimensions,
+            element,
+        } => constant_len(element).map(|size| size * dimensions.iter().product::<u32>() as usize),
+        _ => ty.size(),
+    }
+}
+
+/// An expression for the octets of a value at a place.
+pub(super) fn length(ty: &Type, value: &str) -> String {
+    if let Some(size) = constant_len(ty) {
+        return size.to_string();
+    }
+    match ty {
+        Type::Text(count) | Type::Blob(count) => {
+            format!("{} + {value}.len()", count.unsigned.size())
+        }
+        Type::Formatted { count, .. } => {
+            format!("{} + {value}.data.len()", 1 + count.unsigned.size())
+        }
+        Type::List { count, element } => {
+            let before = count.unsigned.size();
+            match constant_len(element) {
+                Some(size) => format!("{before} + {}", times(size, &format!("{value}.len()"))),
+                None => format!("{before} + {}", total(value, element)),
+            }
+        }
+        Type::Array {
+            dimensions,
+            element,
+        } => {
+            let flat = ".as_flattened()".repeat(dimensions.len() - 1);
+            total(&format!("{value}{flat}"), element)
+        }
+        // `value` is the reference of a closure or a pattern, anything else a place.
+        _ if value == "value" => "codec::Composite::encoded_len(value)".to_owned(),
+        _ => format!("codec::Composite::encoded_len(&{value})"),
+    }
+}
+
+fn times(size: usize, count: &str) -> String {
+    if size == 1 {
+        count.to_owned()
+    } else {
+        format!("{size} * {count}")
+    }
+}
+
+/// The octets of all elements.
+fn total(elements: &str, element: &Type) -> String {
+    format!("{elements}.iter().map({}).sum::<usize>()", measure(element))
+}
+
+/// A function for the octets of a value: a path or a closure.
+fn measure(ty: &Type) -> String {
+    match ty {
+        Type::Composite { .. } => "codec::Composite::encoded_len".to_owned(),
+        _ => format!("|value| {}", length(ty, "value")),
+    }
+}
+
+fn write(out: &mut Writer, fields: &[Field<'_>], presence: Option<Unsigned>) {
+    let output = if fields.is_empty() { "_" } else { "output" };
+    out.push(format!(
+        "fn write(&self, {output}: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {{"
+    ));
+    if let Some(unsigned) = presence {
+        full(out, fields, unsigned);
+        let ty = unsigned_type(unsigned);
+        let bits = fields
+            .iter()
+            .filter(|field| optional(field))
+            .enumerate()
+            .map(|(bit, field)| {
+                let shift = if bit == 0 {
+                    String::new()
+                } else {
+                    format!(" << {bit}")
+                };
+                format!("{ty}::from(self.{}.is_some()){shift}", field.ident)
+            });
+        out.push("output.fixed(");
+        out.push(bits.collect::<Vec<_>>().join("\n| "));
+        out.push(");");
+    }
+    let mut rest = fields;
+    while let Some((field, after)) = rest.split_first() {
+        let run = rest
+            .iter()
+            .take_while(|f| !optional(f) && f.ty.size().is_some())
+            .count();
+        if run > 1 {
+            let values = rest[..run]
+                .iter()
+                .map(|field| (format!("self.{}", field.ident), &field.ty));
+            put_run(out, values);
+            rest = &rest[run..];
+        } else {
+            member(out, field);
+            rest = after;
+        }
+    }
+    out.push("Ok(())\n}");
+}
+
+/// The fast path: all optional members are there, and everything has one size.
+fn full(out: &mut Writer, fields: &[Field<'_>], presence: Unsigned) {
+    if fields.iter().any(|field| field.ty.size().is_none()) {
+        return;
+    }
+    let taken: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
+    out.push("if let &Self {");
+    for field in fields {
+        let ident = binding(field, &taken);
+        let pattern = if optional(field) {
+            format!("Some({ident})")
+        } else {
+            ident.clone()
+        };
+        let short = pattern == field.ident;
+        out.push(if short {
+            format!("{pattern},")
+        } else {
+            format!("{}: {pattern},", field.ident)
+        });
+    }
+    out.push("} = self");
+    out.push("{");
+    let all = all_bits(fields);
+    let vector = Type::Number(Number::Unsigned(presence));
+    let present = (format!("{all:#x}_{}", unsigned_type(presence)), &vector);
+    let values = fields
+        .iter()
+        .map(|field| (binding(field, &taken), &field.ty));
+    put_run(out, std::iter::once(present).chain(values));
+    out.push("return Ok(());\n}");
+}
+
+/// The name of a field's value beside the variables `run` and `output`.
+fn binding(field: &Field<'_>, taken: &[&str]) -> String {
+    if matches!(field.ident.as_str(), "run" | "output") {
+        local(&field.ident, taken)
+    } else {
+        field.ident.clone()
+    }
+}
+
+/// The presence vector with all bits that have a meaning.
+pub(super) fn all_bits(fields: &[Field<'_>]) -> u64 {
+    fields
+        .iter()
+        .filter(|field| optional(field))
+        .fold(0, |bits, _| bits << 1 | 1)
+}
+
+/// Several values of fixed size as one block of octets.
+fn put_run<'t>(out: &mut Writer, values: impl IntoIterator<Item = (String, &'t Type)>) {
+    let values: Vec<_> = values.into_iter().collect();
+    let size: usize = values.iter().filter_map(|(_, ty)| ty.size()).sum();
+    out.push(format!("let mut run = [0; {size}];"));
+    let mut at = 0;
+    for (value, ty) in values {
+        out.push(format!("codec::Fixed::put({value}, &mut run, {at});"));
+        at += ty.size().unwrap_or(0);
+    }
+    out.push("output.run(&run);");
+}
+
+fn member(out: &mut Writer, field: &Field<'_>) {
+    let ident = &field.ident;
+    let name = &field.item.name;
+    match (optional(field), field.ty.size()) {
+        (true, Some(_)) => out.push(format!("output.optional(self.{ident});")),
+        (false, Some(_)) => out.push(format!("output.fixed(self.{ident});")),
+        (true, None) => {
+            out.push(format!("if let Some(value) = &self.{ident} {{"));
+            named(out, name, &value(&field.ty, "value"));
+            out.push("}");
+        }
+        (false, None) => named(out, name, &value(&field.ty, &format!("&self.{ident}"))),
+    }
+}
+
+fn named(out: &mut Writer, name: &str, write: &str) {
+    out.push(format!("output.member({name:?}, |output| {write})?;"));
+}
+
+/// An expression that writes the value behind a reference, of type `Result`.
+pub(super) fn value(ty: &Type, place: &str) -> String {
+    let limits = |count: &Count| format!("{}, {}", count.min, count.max);
+    let counted = |call: &str, count: &Count| {
+        let ty = unsigned_type(count.unsigned);
+        format!(
+            "output.{call}::<{ty}{}>({place}, {})",
+            generics(call),
+            limits(count)
+        )
+    };
+    match ty {
+        Type::FixedText(length) => format!("output.fixed_text({place}, {length})"),
+        Type::Text(count) => counted("text", count),
+        Type::Blob(count) => counted("blob", count),
+        Type::Formatted { count, .. } => counted("formatted", count),
+        Type::Composite { .. } => format!("codec::Composite::write({place}, output)"),
+        Type::List { count, element } => {
+            let unsigned = unsigned_type(count.unsigned);
+            let limits = limits(count);
+            let inner = value(element, "value");
+            format!("output.list::<{unsigned}, _>({place}, {limits}, |value, output| {inner})")
+        }
+        Type::Array {
+            dimensions,
+            element,
+        } if ty.size().is_none() => array(dimensions, element, place),
+        _ => {
+            let place = match place.strip_prefix('&') {
+                Some(place) => place.to_owned(),
+                None => format!("*{place}"),
+            };
+            format!("{{ output.fixed({place}); Ok(()) }}")
+        }
+    }
+}
+
+fn generics(call: &str) -> &'static str {
+    if call == "formatted" { ", _" } else { "" }
+}
+
+/// The first dimension is the innermost loop.
+fn array(dimensions: &[u32], element: &Type, place: &str) -> String {
+    let indices: String = (0..dimensions.len()).map(|i| format!("[i{i}]")).collect();
+    let place = place.trim_start_matches('&');
+    let mut body = format!("{}?;", value(element, &format!("&{place}{indices}")));
+    for (i, size) in dimensions.iter().enumerate() {
+        body = format!("for i{i} in 0..{size} {{ {body} }}");
+    }
+    format!("{{ {body} Ok(()) }}")
+}

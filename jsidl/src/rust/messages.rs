@@ -1,0 +1,259 @@
+//! A message: its struct, its codec, and the module of its nested types.
+
+use std::collections::HashMap;
+
+use super::types::{Definition, Field, Kind, Nested};
+use super::writer::Writer;
+use super::{choices, decode, docs, encode, newtypes, random, structs, view};
+use crate::model::{Group, Id, Item, Message, Shape, Unsigned};
+
+/// A message type that is to be written.
+#[derive(Debug)]
+pub(super) struct Plan<'m> {
+    pub(super) message: &'m Message,
+    /// The type's name, and the name of the module of its nested types.
+    pub(super) ident: String,
+    pub(super) module: String,
+    /// The module of an older layout; `None` for the newest.
+    pub(super) version: Option<String>,
+    /// The services that declare it, the newest version first.
+    pub(super) services: Vec<&'m Id>,
+}
+
+impl Plan<'_> {
+    /// The type as seen from the root of the set.
+    pub(super) fn path(&self) -> String {
+        match &self.version {
+            Some(version) => format!("{version}::{}", self.ident),
+            None => self.ident.clone(),
+        }
+    }
+}
+
+/// What the struct of a message holds.
+enum Content<'m> {
+    /// The members of the body's group.
+    Flat(Vec<Field<'m>>, Option<Unsigned>),
+    /// A body that is a list or a variant, as the only member.
+    Single(Vec<Field<'m>>),
+}
+
+/// Writes a message and the module of its nested types.
+pub(super) fn message<'m>(
+    out: &mut Writer,
+    plan: &Plan<'m>,
+    sections: &'m [Item],
+    shared: &mut HashMap<String, String>,
+) {
+    let inside = match &plan.version {
+        Some(version) => format!("{version}::{}", plan.module),
+        None => plan.module.clone(),
+    };
+    let mut nested = Nested::new(shared, inside);
+    let content = content(plan.message, sections, &mut nested);
+    let definitions = nested.definitions;
+    let prefix = format!("{}::", plan.module);
+    let ident = &plan.ident;
+    let message = plan.message;
+
+    out.gap();
+    out.doc([
+        format!(
+            "`{}` ({:04X}h){}.",
+            message.name,
+            message.code,
+            kind(message)
+        )
+        .as_str(),
+        &docs::prose(&message.description),
+        &format!("Declared by {}.", services(&plan.services)),
+    ]);
+    let (fields, presence) = match &content {
+        Content::Flat(fields, presence) => (fields, *presence),
+        Content::Single(fields) => (fields, None),
+    };
+    structs::declare(out, ident, fields, &prefix, false);
+    out.gap();
+    out.push(format!("impl codec::Message for {ident} {{"));
+    out.push(format!("const CODE: u16 = 0x{:04X};", message.code));
+    out.push(format!("const NAME: &'static str = {:?};", message.name));
+    out.push(format!(
+        "const IS_COMMAND: bool = {};\n}}",
+        message.is_command
+    ));
+    composite(out, ident, fields, presence);
+    match &content {
+        Content::Flat(fields, _) => view::group(out, ident, fields),
+        Content::Single(fields) => view::transparent(out, ident, &fields[0]),
+    }
+    random::group(out, ident, fields);
+    if !definitions.is_empty() {
+        module(out, plan, &definitions);
+    }
+}
+
+fn kind(message: &Message) -> &'static str {
+    if message.is_command {
+        ", a command"
+    } else {
+        ""
+    }
+}
+
+fn services(services: &[&Id]) -> String {
+    let mut names: Vec<String> = Vec::new();
+    for id in services {
+        let name = format!("`{id}`");
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names.join(", ")
+}
+
+/// The parts of a message that its struct shows as members: those of header, body and footer, if
+/// there is more than a body.
+pub(super) fn sections(message: &Message) -> Vec<Item> {
+    if message.header.is_none() && message.footer.is_none() {
+        return Vec::new();
+    }
+    let named = |(name, section): (&str, &Option<Item>)| {
+        section.clone().map(|item| Item {
+            name: name.to_owned(),
+            ..item
+        })
+    };
+    [
+        ("header", &message.header),
+        ("body", &message.body),
+        ("footer", &message.footer),
+    ]
+    .into_iter()
+    .filter_map(named)
+    .collect()
+}
+
+fn content<'m>(
+    message: &'m Message,
+    sections: &'m [Item],
+    nested: &mut Nested<'m, '_>,
+) -> Content<'m> {
+    if !sections.is_empty() {
+        return Content::Flat(nested.fields(sections), None);
+    }
+    match &message.body {
+        None => Content::Flat(Vec::new(), None),
+        Some(Item {
+            shape: Shape::Group(group),
+            ..
+        }) => Content::Flat(nested.fields(&group.members), group.presence),
+        Some(body) => Content::Single(nested.fields([body])),
+    }
+}
+
+fn composite(out: &mut Writer, ident: &str, fields: &[Field<'_>], presence: Option<Unsigned>) {
+    let required = fields.iter().filter(|field| !structs::optional(field));
+    let least = required.map(|field| field.ty.least()).sum::<usize>();
+    out.gap();
+    out.push(format!("impl codec::Composite for {ident} {{"));
+    out.push(format!(
+        "const MIN_LEN: usize = {};",
+        least + presence.map_or(0, Unsigned::size)
+    ));
+    out.gap();
+    encode::group(out, fields, presence);
+    out.gap();
+    decode::group(out, fields, presence);
+    out.push("}");
+}
+
+fn module(out: &mut Writer, plan: &Plan<'_>, definitions: &[Definition<'_>]) {
+    out.gap();
+    out.push(format!(
+        "/// The types inside [`{0}`](super::{0}).",
+        plan.ident
+    ));
+    out.push(format!("pub mod {} {{", plan.module));
+    let root = if plan.version.is_some() {
+        "super::super::"
+    } else {
+        "super::"
+    };
+    if definitions
+        .iter()
+        .any(|definition| !matches!(definition.kind, Kind::Reused(_)))
+    {
+        out.push("use super::codec;");
+    }
+    for definition in definitions {
+        if let Kind::Reused(path) = &definition.kind {
+            out.push("#[doc(inline)]");
+            let renamed = match path.rsplit_once("::") {
+                Some((_, last)) if last == definition.ident => String::new(),
+                _ => format!(" as {}", definition.ident),
+            };
+            out.push(format!("pub use {root}{path}{renamed};"));
+        }
+    }
+    for definition in definitions {
+        define(out, definition);
+    }
+    out.push("}");
+}
+
+fn define(out: &mut Writer, Definition { ident, kind }: &Definition<'_>) {
+    if !matches!(kind, Kind::Reused(_)) {
+        out.gap();
+    }
+    match kind {
+        Kind::Reused(_) => {}
+        Kind::Struct {
+            item,
+            group,
+            fields,
+        } => structure(out, ident, item, group, fields),
+        Kind::Variant {
+            item,
+            variant,
+            alternatives,
+        } => {
+            choices::variant(out, ident, item, variant, alternatives);
+        }
+        Kind::Measure { item, choices } => choices::measure(out, ident, item, choices),
+        Kind::Scaled {
+            name,
+            unsigned,
+            scale,
+            unit,
+        } => {
+            newtypes::scaled(out, ident, name, *unsigned, *scale, unit);
+        }
+        Kind::Enumeration {
+            name,
+            number,
+            values,
+            set,
+        } => {
+            newtypes::enumeration(out, ident, name, *number, values, *set);
+        }
+        Kind::Bits { item, bits, fields } => newtypes::bits(out, ident, item, bits, fields),
+    }
+}
+
+fn structure(out: &mut Writer, ident: &str, item: &Item, group: &Group, fields: &[Field<'_>]) {
+    out.doc([
+        format!("`{}`.", item.name).as_str(),
+        &docs::interpretation(item),
+    ]);
+    let fixed = group.presence.is_none()
+        && !fields.is_empty()
+        && fields.iter().all(|field| field.ty.size().is_some());
+    structs::declare(out, ident, fields, "", fixed);
+    if fixed {
+        structs::fixed(out, ident, fields);
+    } else {
+        composite(out, ident, fields, group.presence);
+    }
+    view::group(out, ident, fields);
+    random::group(out, ident, fields);
+}

@@ -1,0 +1,158 @@
+//! Rust from resolved services: typed messages over the codec runtime of the crate `jaus`.
+//!
+//! The text comes out indented and documented, to be included from a build script's `OUT_DIR`;
+//! [`build`](crate::build) does all of that. Messages are flat in the module; the types inside a
+//! message are in a module of its name. A message that several services or versions declare with
+//! one layout is one type; an older layout stands in a module of its version, such as `v1_0`.
+
+mod choices;
+mod decode;
+mod docs;
+mod encode;
+mod fingerprint;
+mod ident;
+mod messages;
+mod newtypes;
+mod random;
+mod registry;
+mod structs;
+mod types;
+mod view;
+mod writer;
+
+use std::collections::{BTreeMap, HashMap};
+
+use self::ident::{Names, version_module};
+use self::messages::Plan;
+use self::writer::Writer;
+use crate::model::{Id, Message, Service, Version};
+
+/// The Rust module of a set of services.
+///
+/// `runtime` is the path of the codec runtime as the generated module sees it, for example
+/// `::jaus::codec`.
+pub fn module<'m>(services: impl IntoIterator<Item = &'m Service>, runtime: &str) -> String {
+    let mut services: Vec<_> = services.into_iter().collect();
+    services.sort_by_key(|service| &service.id);
+    let mut out = Writer::default();
+    let rename = if runtime.ends_with("::codec") {
+        ""
+    } else {
+        " as codec"
+    };
+    out.push(format!("use {runtime}{rename};"));
+    let mut names = Names::reserving(&["codec"]);
+    let plans = plan(&services, &mut names);
+    let paths = registry::services(&mut out, &services, &mut names);
+    registry::tables(&mut out, &services, &paths, &plans);
+    write(&mut out, &plans);
+    out.finish()
+}
+
+/// Which types there are to be: one for every code, name and layout; sorted by code, the newest
+/// layout of a message first.
+fn plan<'m>(services: &[&'m Service], names: &mut Names) -> Vec<Plan<'m>> {
+    let mut messages: BTreeMap<(u16, &str), Vec<Declared<'m>>> = BTreeMap::new();
+    for service in services {
+        for message in service.messages() {
+            let layouts = messages.entry((message.code, &message.name)).or_default();
+            declare(layouts, message, &service.id);
+        }
+    }
+    let mut plans = Vec::new();
+    let mut versions: BTreeMap<String, Names> = BTreeMap::new();
+    for mut layouts in messages.into_values() {
+        layouts.sort_by_key(|layout| std::cmp::Reverse(layout.version()));
+        for (age, mut layout) in layouts.into_iter().enumerate() {
+            layout
+                .services
+                .sort_by_key(|id| std::cmp::Reverse(id.version));
+            let version = (age > 0).then(|| version_module(layout.version()));
+            let names = match &version {
+                Some(version) => versions
+                    .entry(version.clone())
+                    .or_insert_with(|| Names::reserving(&["codec"])),
+                None => &mut *names,
+            };
+            plans.push(Plan {
+                message: layout.message,
+                ident: names.camel(&layout.message.name),
+                module: names.snake(&layout.message.name),
+                version,
+                services: layout.services,
+            });
+        }
+    }
+    // The modules of versions are names of the root, too.
+    for version in versions.keys() {
+        names.snake(version);
+    }
+    plans
+}
+
+/// One layout of a message and who declares it.
+struct Declared<'m> {
+    layout: String,
+    /// The newest declaration.
+    message: &'m Message,
+    services: Vec<&'m Id>,
+}
+
+impl Declared<'_> {
+    fn version(&self) -> Version {
+        let versions = self.services.iter().map(|id| id.version);
+        versions.max().unwrap_or(Version { major: 0, minor: 0 })
+    }
+}
+
+fn declare<'m>(layouts: &mut Vec<Declared<'m>>, message: &'m Message, service: &'m Id) {
+    let layout = fingerprint::layout(message);
+    match layouts
+        .iter_mut()
+        .find(|declared| declared.layout == layout)
+    {
+        Some(declared) => {
+            if service.version > declared.version() {
+                declared.message = message;
+            }
+            if !declared.services.contains(&service) {
+                declared.services.push(service);
+            }
+        }
+        None => layouts.push(Declared {
+            layout,
+            message,
+            services: vec![service],
+        }),
+    }
+}
+
+fn write(out: &mut Writer, plans: &[Plan<'_>]) {
+    let sections: Vec<_> = plans
+        .iter()
+        .map(|plan| messages::sections(plan.message))
+        .collect();
+    let all = || plans.iter().zip(&sections);
+    let mut shared = HashMap::new();
+    for (plan, sections) in all().filter(|(plan, _)| plan.version.is_none()) {
+        messages::message(out, plan, sections, &mut shared);
+    }
+    let mut versions: Vec<_> = plans
+        .iter()
+        .filter_map(|plan| plan.version.as_ref())
+        .collect();
+    versions.sort();
+    versions.dedup();
+    for version in versions {
+        out.gap();
+        let number = version.trim_start_matches('v').replace('_', ".");
+        out.push(format!(
+            "/// Messages as services of version {number} had them, where newer ones differ."
+        ));
+        out.push(format!("pub mod {version} {{\nuse super::codec;"));
+        for (plan, sections) in all().filter(|(plan, _)| plan.version.as_ref() == Some(version)) {
+            messages::message(out, plan, sections, &mut shared);
+        }
+        out.push("}");
+    }
+}

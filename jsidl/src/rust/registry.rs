@@ -1,0 +1,124 @@
+//! The tables of a set: services by identity, messages by code.
+
+use std::collections::BTreeMap;
+
+use super::docs;
+use super::ident::{Names, version_module};
+use super::messages::Plan;
+use super::writer::Writer;
+use crate::model::{Id, Message, Service};
+
+/// The constants of services: identity to path from the root of the set.
+pub(super) type ServicePaths<'m> = BTreeMap<&'m Id, String>;
+
+/// Writes a module of constants for every service, all versions in one.
+pub(super) fn services<'m>(
+    out: &mut Writer,
+    services: &[&'m Service],
+    names: &mut Names,
+) -> ServicePaths<'m> {
+    let mut by_urn: BTreeMap<&str, Vec<&Service>> = BTreeMap::new();
+    for &service in services {
+        by_urn.entry(&service.id.urn).or_default().push(service);
+    }
+    let mut paths = ServicePaths::new();
+    for (urn, mut versions) in by_urn {
+        versions.sort_by_key(|service| std::cmp::Reverse(service.id.version));
+        let newest = versions[0];
+        let module = names.snake(&newest.name);
+        out.gap();
+        out.doc([
+            format!("The service `{}`.", newest.name).as_str(),
+            &docs::prose(&newest.description),
+        ]);
+        out.push(format!("pub mod {module} {{\nuse super::codec;"));
+        out.gap();
+        out.push(format!(
+            "/// What the service is called, whatever its version.\npub const URN: &str = {urn:?};"
+        ));
+        for service in &versions {
+            let version = service.id.version;
+            let constant = version_module(version).to_uppercase();
+            out.gap();
+            out.push(format!("/// Version {version}."));
+            out.push(format!(
+                "pub const {constant}: codec::ServiceId = codec::ServiceId {{"
+            ));
+            out.push(format!(
+                "urn: URN,\nmajor: {},\nminor: {},\n}};",
+                version.major, version.minor
+            ));
+            paths.insert(&service.id, format!("{module}::{constant}"));
+        }
+        out.gap();
+        let constant = version_module(newest.id.version).to_uppercase();
+        out.push(format!(
+            "/// The newest version.\npub const LATEST: codec::ServiceId = {constant};\n}}"
+        ));
+    }
+    paths
+}
+
+/// Writes `SERVICES` and `MESSAGES`.
+pub(super) fn tables(
+    out: &mut Writer,
+    services: &[&Service],
+    paths: &ServicePaths<'_>,
+    plans: &[Plan<'_>],
+) {
+    out.gap();
+    out.push("/// The services of the set, by URN and version.");
+    out.push("pub static SERVICES: &[codec::ServiceInfo] = &[");
+    for service in services {
+        out.push("codec::ServiceInfo {");
+        out.push(format!(
+            "name: {:?},\nid: {},",
+            service.name, paths[&service.id]
+        ));
+        let base = match &service.inherits_from {
+            Some(base) => format!("Some({})", service_id(&base.id, paths)),
+            None => "None".to_owned(),
+        };
+        out.push(format!("inherits_from: {base},"));
+        out.push(format!(
+            "inputs: &[{}],",
+            codes(service.inputs.iter().map(AsRef::as_ref))
+        ));
+        out.push(format!(
+            "outputs: &[{}],\n}},",
+            codes(service.outputs.iter().map(AsRef::as_ref))
+        ));
+    }
+    out.push("];");
+    out.gap();
+    out.push(
+        "/// The message types of the set, by code; of several with one code the newest first.",
+    );
+    out.push("pub static MESSAGES: &[codec::MessageInfo] = &[");
+    for plan in plans {
+        out.push(format!("codec::MessageInfo::of::<{}>(&[", plan.path()));
+        for id in &plan.services {
+            out.push(format!("{},", service_id(id, paths)));
+        }
+        out.push("]),");
+    }
+    out.push("];");
+}
+
+/// The constant of a service of the set, or the identity of another one.
+fn service_id(id: &Id, paths: &ServicePaths<'_>) -> String {
+    paths.get(id).cloned().unwrap_or_else(|| {
+        let (urn, version) = (&id.urn, id.version);
+        format!(
+            "codec::ServiceId {{ urn: {urn:?}, major: {}, minor: {} }}",
+            version.major, version.minor
+        )
+    })
+}
+
+fn codes<'m>(messages: impl Iterator<Item = &'m Message>) -> String {
+    let codes: Vec<_> = messages
+        .map(|message| format!("0x{:04X}", message.code))
+        .collect();
+    codes.join(", ")
+}

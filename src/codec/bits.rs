@@ -1,0 +1,133 @@
+//! Several small numbers in one integer: `bit_field`.
+
+use super::OutOfRange;
+
+/// An unsigned integer that is divided into sub-fields. Bits outside all of them are kept.
+pub trait Bits: Copy {
+    /// Name, lowest and highest bit of every sub-field, in the order of the definition.
+    const FIELDS: &'static [(&'static str, u32, u32)];
+
+    /// The integer on the wire.
+    fn raw(self) -> u64;
+
+    /// The named values of a sub-field.
+    fn names(field: &str) -> &'static [(u64, &'static str)] {
+        let _ = field;
+        &[]
+    }
+}
+
+/// The bits `from..=to` of an integer.
+#[doc(hidden)]
+pub const fn get(raw: u64, from: u32, to: u32) -> u64 {
+    (raw >> from) & mask(from, to)
+}
+
+/// The integer with its bits `from..=to` replaced; the value fits.
+#[doc(hidden)]
+pub const fn set(raw: u64, from: u32, to: u32, value: u64) -> u64 {
+    raw & !(mask(from, to) << from) | value << from
+}
+
+/// As many ones as there are bits in `from..=to`.
+const fn mask(from: u32, to: u32) -> u64 {
+    u64::MAX >> (63 - (to - from))
+}
+
+/// The integer with its bits `from..=to` replaced.
+///
+/// # Errors
+/// If the value is not in the limits that the definition states.
+#[doc(hidden)]
+pub const fn set_checked(
+    raw: u64,
+    (field, from, to): (&'static str, u32, u32),
+    value: u64,
+    (lower, upper): (u64, u64),
+) -> Result<u64, OutOfRange> {
+    if value < lower || value > upper {
+        return Err(OutOfRange {
+            field,
+            value: value as f64,
+            lower: lower as f64,
+            upper: upper as f64,
+            unit: "one",
+        });
+    }
+    Ok(set(raw, from, to, value))
+}
+
+/// Gives a newtype over an unsigned integer what a bit field needs.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_bit_field {
+    ($name:ident($raw:ty), [$(($field:literal, $from:literal, $to:literal $(, $values:ident)?)),* $(,)?]) => {
+        impl $crate::codec::Bits for $name {
+            const FIELDS: &'static [(&'static str, u32, u32)] = &[$(($field, $from, $to)),*];
+
+            fn raw(self) -> u64 {
+                u64::from(self.0)
+            }
+
+            fn names(field: &str) -> &'static [(u64, &'static str)] {
+                match field {
+                    $($($field => <$values as $crate::codec::Enumeration>::VALUES,)?)*
+                    _ => &[],
+                }
+            }
+        }
+
+        impl $crate::codec::Fixed for $name {
+            const SIZE: usize = <$raw as $crate::codec::Fixed>::SIZE;
+
+            #[inline(always)]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self($crate::codec::Fixed::get(run, at))
+            }
+
+            #[inline(always)]
+            fn put(self, run: &mut [u8], at: usize) {
+                $crate::codec::Fixed::put(self.0, run, at);
+            }
+        }
+
+        impl ::core::fmt::Debug for $name {
+            fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
+                $crate::codec::bits::debug(*self, f)
+            }
+        }
+
+        $crate::codec::if_serde! {
+            impl $crate::codec::view::View for $name {
+                fn view(&self) -> $crate::codec::view::Value {
+                    $crate::codec::view::bits(*self)
+                }
+
+                fn from_view(
+                    value: &$crate::codec::view::Value,
+                ) -> Result<Self, $crate::codec::view::Error> {
+                    $crate::codec::view::raw_bits::<Self>(value).map(|raw| Self(raw as $raw))
+                }
+            }
+        }
+
+        $crate::codec::arbitrary_integer!($name);
+    };
+}
+
+/// Prints the sub-fields as a set of names and numbers.
+#[doc(hidden)]
+pub fn debug<B: Bits>(bits: B, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+    let fields = B::FIELDS
+        .iter()
+        .map(|&(name, from, to)| (name, get(bits.raw(), from, to)));
+    f.debug_map().entries(fields).finish()
+}
+
+/// The bits that no sub-field of `B` owns.
+#[cfg(feature = "serde")]
+pub(super) fn reserved<B: Bits>() -> u64 {
+    !B::FIELDS
+        .iter()
+        .fold(0, |owned, &(_, from, to)| owned | mask(from, to) << from)
+}

@@ -1,0 +1,79 @@
+//! Integers with named values: `value_set`.
+
+/// An integer with named values. Peers send others too, and those are kept.
+pub trait Enumeration: Copy {
+    /// The values that the definition names, in its order.
+    const VALUES: &'static [(u64, &'static str)];
+
+    /// The integer on the wire.
+    fn raw(self) -> u64;
+
+    /// The definition's name for the value, if it has one.
+    fn name(self) -> Option<&'static str> {
+        Self::VALUES
+            .iter()
+            .find(|(value, _)| *value == self.raw())
+            .map(|(_, name)| *name)
+    }
+}
+
+/// Gives a newtype over an integer what an enumerated field needs.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_enumeration {
+    ($name:ident($raw:ty), [$(($value:literal, $text:literal)),* $(,)?]) => {
+        impl $crate::codec::Enumeration for $name {
+            const VALUES: &'static [(u64, &'static str)] = &[$(($value, $text)),*];
+
+            fn raw(self) -> u64 {
+                self.0 as u64
+            }
+        }
+
+        impl From<$raw> for $name {
+            fn from(raw: $raw) -> Self {
+                Self(raw)
+            }
+        }
+
+        impl $crate::codec::Fixed for $name {
+            const SIZE: usize = <$raw as $crate::codec::Fixed>::SIZE;
+
+            #[inline(always)]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self($crate::codec::Fixed::get(run, at))
+            }
+
+            #[inline(always)]
+            fn put(self, run: &mut [u8], at: usize) {
+                $crate::codec::Fixed::put(self.0, run, at);
+            }
+        }
+
+        impl ::core::fmt::Debug for $name {
+            fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
+                match $crate::codec::Enumeration::name(*self) {
+                    Some(name) => write!(f, "{} ({name})", self.0),
+                    None => write!(f, "{}", self.0),
+                }
+            }
+        }
+
+        $crate::codec::if_serde! {
+            impl $crate::codec::view::View for $name {
+                fn view(&self) -> $crate::codec::view::Value {
+                    $crate::codec::view::View::view(&self.0)
+                }
+
+                fn from_view(
+                    value: &$crate::codec::view::Value,
+                ) -> Result<Self, $crate::codec::view::Error> {
+                    let named = value.named(<Self as $crate::codec::Enumeration>::VALUES)?;
+                    $crate::codec::view::View::from_view(&named).map(Self)
+                }
+            }
+        }
+
+        $crate::codec::arbitrary_integer!($name);
+    };
+}

@@ -1,0 +1,100 @@
+//! Exact arithmetic on floating-point numbers, for the few values that lie so close to a rounding
+//! boundary that ordinary arithmetic cannot tell the side.
+//!
+//! A sum of products is kept as an expansion: floating-point numbers that do not overlap and whose
+//! exact sum is the value (Shewchuk 1997). Its sign is the sign of the largest part.
+
+use std::cmp::Ordering;
+
+/// An exact sum of at most [`PARTS`](Self::PARTS) floating-point numbers.
+#[derive(Debug, Default)]
+pub(super) struct Expansion {
+    /// From small to large, without zeros, `len` of them.
+    parts: [f64; Self::PARTS],
+    len: usize,
+}
+
+impl Expansion {
+    const PARTS: usize = 16;
+
+    /// Adds `(a - b) * factor`; at most twice per expansion.
+    pub(super) fn add_product_of_difference(&mut self, a: f64, b: f64, factor: i128) {
+        let (difference, rest) = two_sum(a, -b);
+        let low = factor % (1 << 33);
+        for factor in [low as f64, (factor - low) as f64] {
+            self.add_product(rest, factor);
+            self.add_product(difference, factor);
+        }
+    }
+
+    fn add_product(&mut self, a: f64, b: f64) {
+        let product = a * b;
+        self.add(a.mul_add(b, -product));
+        self.add(product);
+    }
+
+    fn add(&mut self, value: f64) {
+        let mut sum = value;
+        let mut kept = 0;
+        for i in 0..self.len {
+            let (high, low) = two_sum(sum, self.parts[i]);
+            sum = high;
+            if low != 0.0 {
+                self.parts[kept] = low;
+                kept += 1;
+            }
+        }
+        if sum != 0.0 && kept < Self::PARTS {
+            self.parts[kept] = sum;
+            kept += 1;
+        }
+        self.len = kept;
+    }
+
+    /// How the sum compares with zero.
+    pub(super) fn sign(&self) -> Ordering {
+        match self.parts[..self.len].last() {
+            Some(&largest) if largest > 0.0 => Ordering::Greater,
+            Some(_) => Ordering::Less,
+            None => Ordering::Equal,
+        }
+    }
+}
+
+/// The rounded sum and the exact error of rounding it (Knuth).
+fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let b_part = sum - a;
+    let a_part = sum - b_part;
+    (sum, (a - a_part) + (b - b_part))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sign_of(a: f64, b: f64, factor: i128, c: f64, d: f64, other: i128) -> Ordering {
+        let mut sum = Expansion::default();
+        sum.add_product_of_difference(a, b, factor);
+        sum.add_product_of_difference(c, d, -other);
+        sum.sign()
+    }
+
+    #[test]
+    fn a_difference_below_the_precision_of_f64_is_seen() {
+        let above = f64::from_bits(0.3_f64.to_bits() + 1);
+        assert_eq!(sign_of(0.3, -1e9, 3, 0.3, -1e9, 3), Ordering::Equal);
+        assert_eq!(sign_of(above, -1e9, 3, 0.3, -1e9, 3), Ordering::Greater);
+        assert_eq!(sign_of(0.3, -1e9, 3, above, -1e9, 3), Ordering::Less);
+    }
+
+    #[test]
+    fn factors_of_sixty_five_bits_are_exact() {
+        let factor = (1 << 65) - 1;
+        assert_eq!(
+            sign_of(1.0, 0.0, factor, 1.0, 0.0, factor - 1),
+            Ordering::Greater
+        );
+        assert_eq!(sign_of(1.0, 0.0, factor, 1.0, 0.0, factor), Ordering::Equal);
+    }
+}

@@ -1,0 +1,190 @@
+//! What every message can do: by its type, and as a trait object when the type is known only by
+//! its code.
+
+use std::any::Any;
+use std::fmt::Debug;
+
+use bytes::Bytes;
+
+use super::error::DecodeErrorKind;
+use super::{Composite, DecodeError, EncodeError, Fixed, Reader, Writer};
+
+/// A message as its definition describes it. Generated, never written by hand.
+///
+/// The encoded form begins with the two octets of the message code; transport headers are not
+/// part of it.
+pub trait Message: Composite + View + Clone + Debug + PartialEq + Send + Sync + 'static {
+    /// The message code, for example `0x4B00`.
+    const CODE: u16;
+    /// The name in the definition, for example `ReportIdentification`.
+    const NAME: &'static str;
+    /// Whether only the controlling client may send it.
+    const IS_COMMAND: bool;
+
+    /// The message as octets.
+    ///
+    /// # Errors
+    /// If a count or a length is outside the limits of the definition.
+    fn encode(&self) -> Result<Bytes, EncodeError> {
+        let mut buffer = Vec::with_capacity(u16::SIZE + self.encoded_len());
+        self.encode_into(&mut buffer)?;
+        Ok(buffer.into())
+    }
+
+    /// Appends the message to a buffer, which is left as it was if there is an error.
+    ///
+    /// # Errors
+    /// As [`encode`](Self::encode).
+    #[inline]
+    fn encode_into(&self, buffer: &mut Vec<u8>) -> Result<(), EncodeError> {
+        let start = buffer.len();
+        let mut output = Writer::new(buffer);
+        output.fixed(Self::CODE);
+        match self.write(&mut output) {
+            Ok(()) => Ok(()),
+            Err(error) => {
+                buffer.truncate(start);
+                Err(error.of(Self::NAME, Self::CODE))
+            }
+        }
+    }
+
+    /// Reads a message, which must fill the octets to the end.
+    ///
+    /// # Errors
+    /// If the octets are not exactly one message of this type.
+    #[inline]
+    fn decode(octets: &Bytes) -> Result<Self, DecodeError> {
+        let mut input = Reader::new(octets);
+        read_all(&mut input).map_err(|error| error.of(Self::NAME, Self::CODE))
+    }
+}
+
+#[inline]
+fn read_all<M: Message>(input: &mut Reader<'_>) -> Result<M, DecodeError> {
+    let found = input.fixed::<u16>()?;
+    if found != M::CODE {
+        let kind = DecodeErrorKind::Code {
+            found,
+            expected: M::CODE,
+        };
+        return Err(DecodeError::new(kind, 0));
+    }
+    let message = M::read(input)?;
+    match input.remaining() {
+        0 => Ok(message),
+        octets => Err(DecodeError::new(
+            DecodeErrorKind::Trailing { octets },
+            input.offset(),
+        )),
+    }
+}
+
+#[cfg(feature = "serde")]
+use super::view::View;
+
+/// Stands for `view::View`, which needs the feature `serde`.
+#[cfg(not(feature = "serde"))]
+#[doc(hidden)]
+pub trait View {}
+
+#[cfg(not(feature = "serde"))]
+impl<T> View for T {}
+
+/// A message of a type that is known only at run time.
+pub trait AnyMessage: Any + Debug + Send + Sync {
+    /// [`Message::CODE`].
+    fn code(&self) -> u16;
+
+    /// [`Message::NAME`].
+    fn name(&self) -> &'static str;
+
+    /// [`Message::IS_COMMAND`].
+    fn is_command(&self) -> bool;
+
+    /// [`Message::encode`].
+    ///
+    /// # Errors
+    /// As there.
+    fn encode(&self) -> Result<Bytes, EncodeError>;
+
+    /// What people see.
+    #[cfg(feature = "serde")]
+    fn view(&self) -> super::view::Value;
+
+    /// Whether both are the same message with the same content.
+    fn equals(&self, other: &dyn AnyMessage) -> bool;
+
+    /// A copy.
+    fn clone_box(&self) -> Box<dyn AnyMessage>;
+}
+
+impl<M: Message> AnyMessage for M {
+    fn code(&self) -> u16 {
+        M::CODE
+    }
+
+    fn name(&self) -> &'static str {
+        M::NAME
+    }
+
+    fn is_command(&self) -> bool {
+        M::IS_COMMAND
+    }
+
+    fn encode(&self) -> Result<Bytes, EncodeError> {
+        Message::encode(self)
+    }
+
+    #[cfg(feature = "serde")]
+    fn view(&self) -> super::view::Value {
+        View::view(self)
+    }
+
+    fn equals(&self, other: &dyn AnyMessage) -> bool {
+        other.downcast_ref::<M>() == Some(self)
+    }
+
+    fn clone_box(&self) -> Box<dyn AnyMessage> {
+        Box::new(self.clone())
+    }
+}
+
+impl dyn AnyMessage {
+    /// Whether it is an `M`.
+    pub fn is<M: Message>(&self) -> bool {
+        self.downcast_ref::<M>().is_some()
+    }
+
+    /// The message as the type it is.
+    pub fn downcast_ref<M: Message>(&self) -> Option<&M> {
+        (self as &dyn Any).downcast_ref()
+    }
+
+    /// The message as the type it is, or itself if it is another.
+    ///
+    /// # Errors
+    /// The message, if it is not an `M`.
+    pub fn downcast<M: Message>(self: Box<Self>) -> Result<M, Box<Self>> {
+        if !self.is::<M>() {
+            return Err(self);
+        }
+        let any: Box<dyn Any> = self;
+        match any.downcast::<M>() {
+            Ok(message) => Ok(*message),
+            Err(_) => unreachable!("its type has just been checked"),
+        }
+    }
+}
+
+impl Clone for Box<dyn AnyMessage> {
+    fn clone(&self) -> Self {
+        (**self).clone_box()
+    }
+}
+
+impl PartialEq for dyn AnyMessage {
+    fn eq(&self, other: &Self) -> bool {
+        self.equals(other)
+    }
+}

@@ -1,0 +1,115 @@
+//! The small runtime under generated messages.
+//!
+//! A JAUS message is little-endian, unaligned and unpadded: its code, then its body. What the
+//! generator of the `jsidl` crate emits is plain Rust over the types of this module: a
+//! [`Reader`] over shared octets, a [`Writer`] that appends, [`Fixed`] for what has one size,
+//! [`Composite`] for what has many, and open types for what people read: [`Scale`]d integers,
+//! enumerations, bit fields, [`Text`].
+//!
+//! Three promises hold for every generated type:
+//! - the integers on the wire are what is kept, so `encode(decode(b)) == b` for every accepted `b`;
+//! - decoding never panics and never allocates more than the input can fill;
+//! - errors name the message, the path to the field and the octet.
+
+#[cfg(feature = "arbitrary")]
+pub mod arbitrary;
+#[doc(hidden)]
+pub mod bits;
+mod blob;
+mod composite;
+mod enumeration;
+mod error;
+mod exact;
+mod fixed;
+mod message;
+mod reader;
+mod registry;
+mod scale;
+mod text;
+#[cfg(feature = "serde")]
+pub mod view;
+mod writer;
+
+#[doc(no_inline)]
+pub use bytes::Bytes;
+
+pub use bits::Bits;
+pub use blob::FormattedBlob;
+pub use composite::Composite;
+pub use enumeration::Enumeration;
+pub use error::{DecodeError, DecodeErrorKind, EncodeError, EncodeErrorKind};
+pub use fixed::{Count, Fixed};
+#[cfg(not(feature = "serde"))]
+#[doc(hidden)]
+pub use message::View;
+pub use message::{AnyMessage, Message};
+pub use reader::Reader;
+#[doc(hidden)]
+pub use registry::RandomMessage;
+pub use registry::{MessageInfo, Registry, ServiceId, ServiceInfo};
+pub use scale::{OutOfRange, Rounding, Scale, Scaled};
+pub use text::Text;
+pub use writer::Writer;
+
+#[doc(hidden)]
+pub use crate::{
+    __codec_arbitrary_integer as arbitrary_integer, __codec_bit_field as bit_field,
+    __codec_enumeration as enumeration, __codec_if_arbitrary as if_arbitrary,
+    __codec_if_serde as if_serde, __codec_scaled as scaled,
+};
+
+/// Passes its content on if this crate has the feature `serde`, wherever it is expanded.
+#[cfg(feature = "serde")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_if_serde {
+    ($($content:tt)*) => { $($content)* };
+}
+
+/// Passes its content on if this crate has the feature `serde`, wherever it is expanded.
+#[cfg(not(feature = "serde"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_if_serde {
+    ($($content:tt)*) => {};
+}
+
+/// Passes its content on if this crate has the feature `arbitrary`, wherever it is expanded.
+#[cfg(feature = "arbitrary")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_if_arbitrary {
+    ($($content:tt)*) => { $($content)* };
+}
+
+/// Passes its content on if this crate has the feature `arbitrary`, wherever it is expanded.
+#[cfg(not(feature = "arbitrary"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_if_arbitrary {
+    ($($content:tt)*) => {};
+}
+
+/// Any integer is a value of the newtype around it.
+#[cfg(feature = "arbitrary")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_arbitrary_integer {
+    ($name:ident) => {
+        impl<'a> $crate::codec::arbitrary::Arbitrary<'a> for $name {
+            fn arbitrary(
+                random: &mut $crate::codec::arbitrary::Unstructured<'a>,
+            ) -> $crate::codec::arbitrary::Result<Self> {
+                $crate::codec::arbitrary::Arbitrary::arbitrary(random).map(Self)
+            }
+        }
+    };
+}
+
+/// Needs the feature `arbitrary`.
+#[cfg(not(feature = "arbitrary"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_arbitrary_integer {
+    ($name:ident) => {};
+}

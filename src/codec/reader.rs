@@ -1,0 +1,285 @@
+//! A cursor over a received message.
+
+use bytes::Bytes;
+
+use super::error::{DecodeError, DecodeErrorKind};
+use super::{Count, Fixed, FormattedBlob, Text};
+
+/// A cursor over a received message: a slice for the fields, and the shared octets themselves for
+/// strings and raw octets, which are not copied.
+#[derive(Debug)]
+pub struct Reader<'a> {
+    shared: &'a Bytes,
+    rest: &'a [u8],
+}
+
+impl<'a> Reader<'a> {
+    /// Starts at the first octet.
+    #[inline]
+    pub fn new(octets: &'a Bytes) -> Self {
+        Self {
+            shared: octets,
+            rest: octets,
+        }
+    }
+
+    /// Octets read so far.
+    #[inline]
+    pub fn offset(&self) -> usize {
+        self.shared.len() - self.rest.len()
+    }
+
+    /// Octets left.
+    #[inline]
+    pub fn remaining(&self) -> usize {
+        self.rest.len()
+    }
+
+    /// Reads several fixed fields under one check.
+    ///
+    /// # Errors
+    /// The first of `fields` (name and size) that the input has no room for.
+    #[inline(always)]
+    pub fn run<const N: usize>(
+        &mut self,
+        fields: &'static [(&'static str, usize)],
+    ) -> Result<&'a [u8; N], DecodeError> {
+        match self.rest.split_first_chunk() {
+            Some((run, rest)) => {
+                self.rest = rest;
+                Ok(run)
+            }
+            None => Err(self.short_run(fields)),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn short_run(&self, fields: &[(&'static str, usize)]) -> DecodeError {
+        let mut at = 0;
+        for &(name, size) in fields {
+            if at + size > self.rest.len() {
+                let kind = DecodeErrorKind::Short {
+                    wanted: size as u64,
+                    left: self.rest.len() - at,
+                };
+                return DecodeError::new(kind, self.offset() + at).within(name);
+            }
+            at += size;
+        }
+        self.short(at as u64)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn short(&self, wanted: u64) -> DecodeError {
+        DecodeError::new(
+            DecodeErrorKind::Short {
+                wanted,
+                left: self.remaining(),
+            },
+            self.offset(),
+        )
+    }
+
+    /// Reads one fixed value.
+    ///
+    /// # Errors
+    /// If the input ends inside it.
+    #[inline]
+    pub fn fixed<T: Fixed>(&mut self) -> Result<T, DecodeError> {
+        match self.rest.split_at_checked(T::SIZE) {
+            Some((run, rest)) => {
+                self.rest = rest;
+                Ok(T::get(run, 0))
+            }
+            None => Err(self.short(T::SIZE as u64)),
+        }
+    }
+
+    /// Reads a member and names it in errors.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    #[inline]
+    pub fn member<T>(
+        &mut self,
+        name: &'static str,
+        read: impl FnOnce(&mut Self) -> Result<T, DecodeError>,
+    ) -> Result<T, DecodeError> {
+        read(self).map_err(|error| error.within(name))
+    }
+
+    /// Reads a member if it is present, and names it in errors.
+    ///
+    /// # Errors
+    /// Those of `read`.
+    #[inline]
+    pub fn optional<T>(
+        &mut self,
+        present: bool,
+        name: &'static str,
+        read: impl FnOnce(&mut Self) -> Result<T, DecodeError>,
+    ) -> Result<Option<T>, DecodeError> {
+        if present {
+            self.member(name, read).map(Some)
+        } else {
+            Ok(None)
+        }
+    }
+
+    /// Reads a presence vector.
+    ///
+    /// # Errors
+    /// If it sets bits that no member owns.
+    #[inline]
+    pub fn presence<C: Count>(&mut self, defined: u64) -> Result<u64, DecodeError> {
+        let offset = self.offset();
+        let found = self.fixed::<C>()?.to_u64();
+        if found & !defined != 0 {
+            return Err(DecodeError::new(
+                DecodeErrorKind::Presence { found, defined },
+                offset,
+            ));
+        }
+        Ok(found)
+    }
+
+    /// Reads the tag of a variant.
+    ///
+    /// # Errors
+    /// If there is no such alternative.
+    #[inline]
+    pub fn tag<C: Count>(&mut self, alternatives: u64) -> Result<u64, DecodeError> {
+        let offset = self.offset();
+        let found = self.fixed::<C>()?.to_u64();
+        // A variant without alternatives is its tag alone, 0.
+        if found >= alternatives.max(1) {
+            return Err(DecodeError::new(
+                DecodeErrorKind::Tag {
+                    found,
+                    alternatives,
+                },
+                offset,
+            ));
+        }
+        Ok(found)
+    }
+
+    /// The error for a `variable_field` whose index, just read, chooses nothing.
+    #[cold]
+    #[inline(never)]
+    pub fn unknown_choice(&self, found: u8) -> DecodeError {
+        DecodeError::new(DecodeErrorKind::Choice { found }, self.offset() - 1)
+    }
+
+    /// Reads a count and checks it against its limits and against what is left, given that each
+    /// thing counted takes at least `least` octets.
+    #[inline]
+    fn count<C: Count>(&mut self, min: u64, max: u64, least: usize) -> Result<usize, DecodeError> {
+        let offset = self.offset();
+        let found = self.fixed::<C>()?.to_u64();
+        if found < min || found > max {
+            return Err(DecodeError::new(
+                DecodeErrorKind::Count { found, min, max },
+                offset,
+            ));
+        }
+        match usize::try_from(found) {
+            Ok(count)
+                if count
+                    .checked_mul(least)
+                    .is_some_and(|all| all <= self.rest.len()) =>
+            {
+                Ok(count)
+            }
+            _ => Err(self.short(found.saturating_mul(least as u64))),
+        }
+    }
+
+    /// Reads a list whose elements take at least `least` octets each.
+    ///
+    /// # Errors
+    /// A count beyond its limits or the input; those of `element`, with the index added.
+    #[inline]
+    pub fn list<C: Count, T>(
+        &mut self,
+        min: u64,
+        max: u64,
+        least: usize,
+        mut element: impl FnMut(&mut Self) -> Result<T, DecodeError>,
+    ) -> Result<Vec<T>, DecodeError> {
+        let count = self.count::<C>(min, max, least)?;
+        // `least` octets of input stand behind every element; one that takes none gets no memory
+        // in advance.
+        let mut list = Vec::with_capacity(if least == 0 { 0 } else { count });
+        for index in 0..count {
+            match element(self) {
+                Ok(value) => list.push(value),
+                Err(error) => return Err(error.element(index)),
+            }
+        }
+        Ok(list)
+    }
+
+    /// Reads counted raw octets; they stay shared with the message.
+    ///
+    /// # Errors
+    /// A count beyond its limits or the input.
+    #[inline]
+    pub fn blob<C: Count>(&mut self, min: u64, max: u64) -> Result<Bytes, DecodeError> {
+        let length = self.count::<C>(min, max, 1)?;
+        Ok(self.share(length))
+    }
+
+    /// Shares the next octets, of which there are enough.
+    #[inline]
+    fn share(&mut self, length: usize) -> Bytes {
+        let start = self.offset();
+        self.rest = &self.rest[length..];
+        self.shared.slice(start..start + length)
+    }
+
+    /// Reads a format index and counted raw octets.
+    ///
+    /// # Errors
+    /// As [`blob`](Self::blob).
+    #[inline]
+    pub fn formatted<C: Count, F: Fixed>(
+        &mut self,
+        min: u64,
+        max: u64,
+    ) -> Result<FormattedBlob<F>, DecodeError> {
+        Ok(FormattedBlob {
+            format: self.fixed()?,
+            data: self.blob::<C>(min, max)?,
+        })
+    }
+
+    /// Reads a counted string.
+    ///
+    /// # Errors
+    /// As [`blob`](Self::blob).
+    #[inline]
+    pub fn text<C: Count>(&mut self, min: u64, max: u64) -> Result<Text, DecodeError> {
+        self.blob::<C>(min, max).map(Text::from)
+    }
+
+    /// Reads a string of fixed length; the zeros that fill it up are left out.
+    ///
+    /// # Errors
+    /// If the input ends inside it.
+    #[inline]
+    pub fn fixed_text(&mut self, length: usize) -> Result<Text, DecodeError> {
+        if length > self.rest.len() {
+            return Err(self.short(length as u64));
+        }
+        let mut text = self.share(length);
+        let filled = text
+            .iter()
+            .rposition(|&octet| octet != 0)
+            .map_or(0, |last| last + 1);
+        text.truncate(filled);
+        Ok(Text::from(text))
+    }
+}

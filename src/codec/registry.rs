@@ -1,0 +1,169 @@
+//! Tables of what was generated: services by identity, messages by code and by name.
+
+use std::fmt;
+
+use bytes::Bytes;
+
+use super::{AnyMessage, DecodeError, Message};
+
+/// What identifies a service: its URN and version.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ServiceId {
+    /// For example `urn:jaus:jss:core:Discovery`.
+    pub urn: &'static str,
+    /// Raised by incompatible changes.
+    pub major: u8,
+    /// Raised by additions.
+    pub minor: u8,
+}
+
+impl fmt::Display for ServiceId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}.{}", self.urn, self.major, self.minor)
+    }
+}
+
+/// What a definition says about a service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ServiceInfo {
+    /// For example `Discovery`.
+    pub name: &'static str,
+    /// URN and version.
+    pub id: ServiceId,
+    /// The service that this one extends.
+    pub inherits_from: Option<ServiceId>,
+    /// Codes of the messages that it receives; inherited ones are not repeated.
+    pub inputs: &'static [u16],
+    /// Codes of the messages that it sends; inherited ones are not repeated.
+    pub outputs: &'static [u16],
+}
+
+/// What is known about a message type, and how to make one from octets.
+#[derive(Clone, Copy)]
+#[non_exhaustive]
+pub struct MessageInfo {
+    /// [`Message::CODE`]
+    pub code: u16,
+    /// [`Message::NAME`]
+    pub name: &'static str,
+    /// [`Message::IS_COMMAND`]
+    pub is_command: bool,
+    /// The services that declare exactly this layout, the newest version first.
+    pub services: &'static [ServiceId],
+    /// [`Message::decode`]
+    pub decode: fn(&Bytes) -> Result<Box<dyn AnyMessage>, DecodeError>,
+    /// Makes the message from what people write.
+    #[cfg(feature = "serde")]
+    pub from_view: fn(&super::view::Value) -> Result<Box<dyn AnyMessage>, super::view::Error>,
+    /// Makes a valid message from random octets.
+    #[cfg(feature = "arbitrary")]
+    pub arbitrary: fn(&mut arbitrary::Unstructured<'_>) -> arbitrary::Result<Box<dyn AnyMessage>>,
+}
+
+impl MessageInfo {
+    /// The entry for a message type.
+    #[doc(hidden)]
+    pub const fn of<M: Message + RandomMessage>(services: &'static [ServiceId]) -> Self {
+        Self {
+            code: M::CODE,
+            name: M::NAME,
+            is_command: M::IS_COMMAND,
+            services,
+            decode: |octets| Ok(Box::new(M::decode(octets)?)),
+            #[cfg(feature = "serde")]
+            from_view: |value| Ok(Box::new(M::from_view(value)?)),
+            #[cfg(feature = "arbitrary")]
+            arbitrary: |random| {
+                Ok(Box::new(<M as arbitrary::Arbitrary<'_>>::arbitrary(
+                    random,
+                )?))
+            },
+        }
+    }
+}
+
+impl fmt::Debug for MessageInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({:04X}h)", self.name, self.code)
+    }
+}
+
+/// Stands for `arbitrary::Arbitrary` with any lifetime, if there is the feature `arbitrary`.
+#[cfg(feature = "arbitrary")]
+#[doc(hidden)]
+pub trait RandomMessage: for<'a> arbitrary::Arbitrary<'a> {}
+
+#[cfg(feature = "arbitrary")]
+impl<T: for<'a> arbitrary::Arbitrary<'a>> RandomMessage for T {}
+
+/// Stands for `arbitrary::Arbitrary`, which needs the feature `arbitrary`.
+#[cfg(not(feature = "arbitrary"))]
+#[doc(hidden)]
+pub trait RandomMessage {}
+
+#[cfg(not(feature = "arbitrary"))]
+impl<T> RandomMessage for T {}
+
+/// The message types of several service sets, found by code or by name.
+#[derive(Debug, Clone, Copy)]
+pub struct Registry {
+    sets: &'static [&'static [MessageInfo]],
+}
+
+impl Registry {
+    /// A registry over the `MESSAGES` of generated modules, each of which is sorted by code.
+    pub const fn new(sets: &'static [&'static [MessageInfo]]) -> Self {
+        Self { sets }
+    }
+
+    /// All message types.
+    pub fn iter(&self) -> impl Iterator<Item = &'static MessageInfo> + use<> {
+        self.sets.iter().copied().flatten()
+    }
+
+    /// The types with this code. There is mostly one; where versions differ on the wire the
+    /// newest comes first.
+    pub fn by_code(&self, code: u16) -> impl Iterator<Item = &'static MessageInfo> + use<> {
+        self.sets.iter().flat_map(move |set| {
+            let start = set.partition_point(|info| info.code < code);
+            set[start..]
+                .iter()
+                .take_while(move |info| info.code == code)
+        })
+    }
+
+    /// The types with this name, as definitions spell it; the newest first.
+    pub fn by_name<'n>(
+        &self,
+        name: &'n str,
+    ) -> impl Iterator<Item = &'static MessageInfo> + use<'n> {
+        self.sets
+            .iter()
+            .copied()
+            .flatten()
+            .filter(move |info| info.name == name)
+    }
+
+    /// The type that a service declares for this code.
+    pub fn in_service(&self, service: ServiceId, code: u16) -> Option<&'static MessageInfo> {
+        self.by_code(code)
+            .find(|info| info.services.contains(&service))
+    }
+
+    /// Reads a message by its code, as the first of its types that fits;
+    /// `None` if the code is unknown or missing.
+    ///
+    /// # Errors
+    /// The first type's, if none fits.
+    pub fn decode(&self, octets: &Bytes) -> Option<Result<Box<dyn AnyMessage>, DecodeError>> {
+        let code = u16::from_le_bytes(*octets.first_chunk()?);
+        let mut first_error = None;
+        for info in self.by_code(code) {
+            match (info.decode)(octets) {
+                Ok(message) => return Some(Ok(message)),
+                Err(error) => _ = first_error.get_or_insert(error),
+            }
+        }
+        first_error.map(Err)
+    }
+}

@@ -1,0 +1,314 @@
+//! Real numbers carried as integers: `scale_range`.
+
+use std::cmp::Ordering;
+use std::fmt;
+
+use super::exact::Expansion;
+
+/// A range of real numbers spread evenly over all values of an unsigned integer.
+///
+/// `value = raw * (upper - lower) / (2^n - 1) + lower`, both limits inclusive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    lower: f64,
+    upper: f64,
+    max: u64,
+    step: f64,
+    rounding: Rounding,
+}
+
+/// How a real number between two steps becomes an integer: `integer_function`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rounding {
+    /// To the nearest, halves up; the only one in published definitions.
+    Round,
+    /// Down.
+    Floor,
+    /// Up.
+    Ceiling,
+}
+
+impl Scale {
+    /// The range for an integer whose greatest value is `max`.
+    pub const fn new(lower: f64, upper: f64, max: u64, rounding: Rounding) -> Self {
+        let step = (upper - lower) / max as f64;
+        Self {
+            lower,
+            upper,
+            max,
+            step,
+            rounding,
+        }
+    }
+
+    /// The least real number.
+    pub const fn lower(&self) -> f64 {
+        self.lower
+    }
+
+    /// The greatest real number.
+    pub const fn upper(&self) -> f64 {
+        self.upper
+    }
+
+    /// The distance between neighbouring values.
+    pub const fn step(&self) -> f64 {
+        self.step
+    }
+
+    /// The real number that an integer stands for.
+    #[inline]
+    pub fn value(&self, raw: u64) -> f64 {
+        (raw as f64 * self.step + self.lower).min(self.upper)
+    }
+
+    /// The integer for a real number, exactly rounded; `None` for what is outside the range or not
+    /// a number.
+    #[inline]
+    pub fn raw(&self, value: f64) -> Option<u64> {
+        if !(self.lower <= value && value <= self.upper) {
+            return None;
+        }
+        let steps = (value - self.lower) / self.step;
+        let shifted = match self.rounding {
+            Rounding::Round => steps + 0.5,
+            Rounding::Floor => steps,
+            Rounding::Ceiling => steps + 1.0,
+        };
+        // A few roundings separate `steps` from the truth; so close to an integer they matter.
+        let doubt = (steps + 1.0) * (8.0 * f64::EPSILON);
+        let below = shifted as u64;
+        let fraction = shifted - below as f64;
+        if fraction > doubt && fraction < 1.0 - doubt {
+            Some(below.min(self.max))
+        } else {
+            Some(self.raw_exactly(value))
+        }
+    }
+
+    /// The integer for a number in the range, by bisection with exact comparisons.
+    #[cold]
+    #[inline(never)]
+    fn raw_exactly(&self, value: f64) -> u64 {
+        let (mut least, mut greatest) = (0, self.max);
+        while least < greatest {
+            let middle = greatest - (greatest - least) / 2;
+            if self.reaches(value, middle) {
+                least = middle;
+            } else {
+                greatest = middle - 1;
+            }
+        }
+        least
+    }
+
+    /// Whether a number in the range is rounded to `raw` (at least 1) or higher.
+    fn reaches(&self, value: f64, raw: u64) -> bool {
+        let twice = 2 * i128::from(raw);
+        let boundary = match self.rounding {
+            Rounding::Round => twice - 1,
+            Rounding::Floor => twice,
+            Rounding::Ceiling => twice - 2,
+        };
+        let mut excess = Expansion::default();
+        excess.add_product_of_difference(value, self.lower, 2 * i128::from(self.max));
+        excess.add_product_of_difference(self.upper, self.lower, -boundary);
+        match excess.sign() {
+            Ordering::Greater => true,
+            Ordering::Equal => self.rounding != Rounding::Ceiling,
+            Ordering::Less => false,
+        }
+    }
+
+    /// The decimal with the fewest significant digits that stands for `raw`: what people are
+    /// shown. Zero has no digits; of two with equally many digits the nearer one is taken.
+    pub fn shortest(&self, raw: u64) -> f64 {
+        let stands_for_raw = |&candidate: &f64| self.raw(candidate) == Some(raw);
+        if stands_for_raw(&0.0) {
+            return 0.0;
+        }
+        let value = raw as f64 * self.step + self.lower;
+        // Halfway to where another integer begins, away from doubts of rounding.
+        let inside = match self.rounding {
+            Rounding::Round => value,
+            Rounding::Floor => value + self.step / 2.0,
+            Rounding::Ceiling => value - self.step / 2.0,
+        };
+        [value, inside]
+            .into_iter()
+            .flat_map(|value| (1..=17).flat_map(move |digits| decimals(value, digits)))
+            .find(stands_for_raw)
+            .unwrap_or(value)
+    }
+}
+
+/// The decimals with so many significant digits around a number that is not 0, the nearest first.
+fn decimals(value: f64, digits: usize) -> impl Iterator<Item = f64> {
+    let text = format!("{:.*e}", digits - 1, value.abs()).replace('.', "");
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let mantissa: u64 = mantissa.parse().unwrap_or(0);
+    let exponent = exponent.parse::<i32>().unwrap_or(0) - (digits as i32 - 1);
+    // Decimals are ten times as dense below a power of ten.
+    let below = if mantissa == 10_u64.pow(digits as u32 - 1) {
+        (10 * mantissa - 1, exponent - 1)
+    } else {
+        (mantissa.saturating_sub(1), exponent)
+    };
+    [(mantissa, exponent), below, (mantissa + 1, exponent)]
+        .into_iter()
+        .filter_map(|(mantissa, exponent)| format!("{mantissa}e{exponent}").parse::<f64>().ok())
+        .map(move |decimal| decimal.copysign(value))
+}
+
+/// An integer that stands for a real number in a range.
+pub trait Scaled: Copy {
+    /// The field's name in the definition.
+    const NAME: &'static str;
+    /// The unit, as the definition spells it.
+    const UNIT: &'static str;
+    /// The range.
+    const SCALE: Scale;
+}
+
+/// A number that a field cannot hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutOfRange {
+    /// The field's name in the definition.
+    pub field: &'static str,
+    /// The number.
+    pub value: f64,
+    /// The least number that the field holds.
+    pub lower: f64,
+    /// The greatest number that the field holds.
+    pub upper: f64,
+    /// The unit, as the definition spells it; `one` for a bare number.
+    pub unit: &'static str,
+}
+
+impl OutOfRange {
+    /// The error for a field with a scale.
+    #[doc(hidden)]
+    #[cold]
+    pub const fn of<T: Scaled>(value: f64) -> Self {
+        Self {
+            field: T::NAME,
+            value,
+            lower: T::SCALE.lower,
+            upper: T::SCALE.upper,
+            unit: T::UNIT,
+        }
+    }
+}
+
+impl std::error::Error for OutOfRange {}
+
+impl fmt::Display for OutOfRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            field,
+            value,
+            lower,
+            upper,
+            unit,
+        } = self;
+        let unit = if *unit == "one" {
+            String::new()
+        } else {
+            format!(" {unit}")
+        };
+        write!(f, "{field}: {value} is not in {lower} to {upper}{unit}")
+    }
+}
+
+/// Gives a newtype over an unsigned integer what a scaled field needs.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_scaled {
+    ($name:ident($raw:ty), $field:literal, $lower:literal to $upper:literal $unit:literal, $rounding:ident) => {
+        #[allow(clippy::approx_constant)]
+        impl $crate::codec::Scaled for $name {
+            const NAME: &'static str = $field;
+            const UNIT: &'static str = $unit;
+            const SCALE: $crate::codec::Scale = $crate::codec::Scale::new(
+                $lower,
+                $upper,
+                <$raw>::MAX as u64,
+                $crate::codec::Rounding::$rounding,
+            );
+        }
+
+        impl $name {
+            /// The nearest value that the field can hold.
+            ///
+            /// # Errors
+            /// If the value is outside the range, which includes its limits.
+            #[inline]
+            pub fn new(value: f64) -> Result<Self, $crate::codec::OutOfRange> {
+                match <Self as $crate::codec::Scaled>::SCALE.raw(value) {
+                    Some(raw) => Ok(Self(raw as $raw)),
+                    None => Err($crate::codec::OutOfRange::of::<Self>(value)),
+                }
+            }
+
+            /// The value in the unit of the field.
+            #[inline]
+            pub fn value(self) -> f64 {
+                <Self as $crate::codec::Scaled>::SCALE.value(u64::from(self.0))
+            }
+
+            /// The integer on the wire.
+            pub const fn raw(self) -> $raw {
+                self.0
+            }
+
+            /// From the integer on the wire; each one stands for a value.
+            pub const fn from_raw(raw: $raw) -> Self {
+                Self(raw)
+            }
+        }
+
+        impl $crate::codec::Fixed for $name {
+            const SIZE: usize = <$raw as $crate::codec::Fixed>::SIZE;
+
+            #[inline(always)]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self($crate::codec::Fixed::get(run, at))
+            }
+
+            #[inline(always)]
+            fn put(self, run: &mut [u8], at: usize) {
+                $crate::codec::Fixed::put(self.0, run, at);
+            }
+        }
+
+        impl ::core::fmt::Display for $name {
+            fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
+                let scale = <Self as $crate::codec::Scaled>::SCALE;
+                ::core::fmt::Display::fmt(&scale.shortest(u64::from(self.0)), f)
+            }
+        }
+
+        impl ::core::fmt::Debug for $name {
+            fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
+                ::core::fmt::Display::fmt(self, f)
+            }
+        }
+
+        $crate::codec::if_serde! {
+            impl $crate::codec::view::View for $name {
+                fn view(&self) -> $crate::codec::view::Value {
+                    let scale = <Self as $crate::codec::Scaled>::SCALE;
+                    $crate::codec::view::Value::F64(scale.shortest(u64::from(self.0)))
+                }
+
+                fn from_view(
+                    value: &$crate::codec::view::Value,
+                ) -> Result<Self, $crate::codec::view::Error> {
+                    Ok(Self::new(value.number()?)?)
+                }
+            }
+        }
+
+        $crate::codec::arbitrary_integer!($name);
+    };
+}

@@ -1,0 +1,254 @@
+//! The views of what generated types are made of.
+
+use std::fmt::Write;
+
+use bytes::Bytes;
+
+use super::{Error, Object, Value, View};
+use crate::codec::{Bits, FormattedBlob, Text, bits};
+
+/// The member for the bits of a bit field that no sub-field owns.
+const RESERVED: &str = "_reserved";
+
+macro_rules! integer {
+    ($($integer:ty => $kind:ident),*) => {$(
+        impl View for $integer {
+            fn view(&self) -> Value {
+                Value::$kind((*self).into())
+            }
+
+            fn from_view(value: &Value) -> Result<Self, Error> {
+                value.integer()
+            }
+        }
+    )*};
+}
+
+integer!(
+    u8 => Unsigned, u16 => Unsigned, u32 => Unsigned, u64 => Unsigned,
+    i8 => Signed, i16 => Signed, i32 => Signed, i64 => Signed
+);
+
+macro_rules! float {
+    ($($float:ident => $kind:ident),*) => {$(
+        impl View for $float {
+            fn view(&self) -> Value {
+                match *self {
+                    value if value.is_nan() => Value::Text("NaN".into()),
+                    Self::INFINITY => Value::Text("Infinity".into()),
+                    Self::NEG_INFINITY => Value::Text("-Infinity".into()),
+                    value => Value::$kind(value),
+                }
+            }
+
+            fn from_view(value: &Value) -> Result<Self, Error> {
+                let number = match value {
+                    Value::Text(text) => match &**text {
+                        "NaN" => return Ok(Self::NAN),
+                        "Infinity" => return Ok(Self::INFINITY),
+                        "-Infinity" => return Ok(Self::NEG_INFINITY),
+                        _ => return Err(value.unexpected("a number")),
+                    },
+                    _ => value.number()?,
+                };
+                let narrow = number as Self;
+                if narrow.is_infinite() {
+                    return Err(value.unexpected("a number that its type can hold"));
+                }
+                Ok(narrow)
+            }
+        }
+    )*};
+}
+
+float!(f32 => F32, f64 => F64);
+
+impl<T: View> View for Option<T> {
+    fn view(&self) -> Value {
+        self.as_ref().map_or(Value::Null, View::view)
+    }
+
+    fn from_view(value: &Value) -> Result<Self, Error> {
+        T::from_view(value).map(Some)
+    }
+
+    fn absent() -> Option<Self> {
+        Some(None)
+    }
+}
+
+impl<T: View> View for Vec<T> {
+    fn view(&self) -> Value {
+        Value::list(self)
+    }
+
+    fn from_view(value: &Value) -> Result<Self, Error> {
+        value.elements()
+    }
+}
+
+impl<T: View, const N: usize> View for [T; N] {
+    fn view(&self) -> Value {
+        Value::list(self)
+    }
+
+    fn from_view(value: &Value) -> Result<Self, Error> {
+        let elements: Vec<T> = value.elements()?;
+        let found = elements.len();
+        let wrong = |_| Error::new(format!("expected {N} elements, found {found}"));
+        Self::try_from(elements).map_err(wrong)
+    }
+}
+
+impl View for Text {
+    fn view(&self) -> Value {
+        match self.as_str() {
+            Some(text) => Value::Text(text.to_owned().into()),
+            None => Value::object([("hex", hex(self.as_bytes()))]),
+        }
+    }
+
+    fn from_view(value: &Value) -> Result<Self, Error> {
+        match value {
+            Value::Text(text) => Ok(Self::from(&**text)),
+            Value::Object(_) => {
+                let object = Object::new(value, &["hex"])?;
+                object.member::<Bytes>("hex").map(Self::from)
+            }
+            _ => Err(value.unexpected("text or {\"hex\": …}")),
+        }
+    }
+}
+
+impl View for Bytes {
+    fn view(&self) -> Value {
+        hex(self)
+    }
+
+    fn from_view(value: &Value) -> Result<Self, Error> {
+        let octets = match value {
+            Value::Text(text) => from_hex(text),
+            _ => None,
+        };
+        let octets = octets.map(Self::from);
+        octets.ok_or_else(|| value.unexpected("text of hexadecimal digits, two for each octet"))
+    }
+}
+
+fn hex(octets: &[u8]) -> Value {
+    let mut text = String::with_capacity(2 * octets.len());
+    for octet in octets {
+        // Writing to a string does not fail.
+        let _ = write!(text, "{octet:02x}");
+    }
+    Value::Text(text.into())
+}
+
+fn from_hex(text: &str) -> Option<Vec<u8>> {
+    let digit = |digit: u8| char::from(digit).to_digit(16).map(|digit| digit as u8);
+    let octet = |pair: &[u8]| match *pair {
+        [high, low] => Some(digit(high)? << 4 | digit(low)?),
+        _ => None,
+    };
+    text.as_bytes().chunks(2).map(octet).collect()
+}
+
+impl<F: View> View for FormattedBlob<F> {
+    fn view(&self) -> Value {
+        Value::object([("format", self.format.view()), ("data", self.data.view())])
+    }
+
+    fn from_view(value: &Value) -> Result<Self, Error> {
+        let object = Object::new(value, &["format", "data"])?;
+        Ok(Self {
+            format: object.member("format")?,
+            data: object.member("data")?,
+        })
+    }
+}
+
+/// What people see of a bit field.
+#[doc(hidden)]
+pub fn bits<B: Bits>(field: B) -> Value {
+    let raw = field.raw();
+    let sub_field = |&(name, from, to): &(&'static str, u32, u32)| {
+        (name.into(), Value::Unsigned(bits::get(raw, from, to)))
+    };
+    let mut members: Vec<_> = B::FIELDS.iter().map(sub_field).collect();
+    let reserved = raw & bits::reserved::<B>();
+    if reserved != 0 {
+        members.push((RESERVED.into(), Value::Unsigned(reserved)));
+    }
+    Value::Object(members)
+}
+
+/// The integer of a bit field from what people write; a sub-field that is left out is 0.
+///
+/// # Errors
+/// If a number does not fit its bits.
+#[doc(hidden)]
+pub fn raw_bits<B: Bits>(value: &Value) -> Result<u64, Error> {
+    let names: Vec<_> = B::FIELDS
+        .iter()
+        .map(|&(name, ..)| name)
+        .chain([RESERVED])
+        .collect();
+    let object = Object::new(value, &names)?;
+    let mut raw = 0;
+    if let Some(value) = object.get(RESERVED) {
+        let free = bits::reserved::<B>() & (u64::MAX >> (64 - 8 * size_of::<B>()));
+        raw = value
+            .integer::<u64>()
+            .map_err(|error| error.within(RESERVED))?;
+        if raw & !free != 0 {
+            let expected = format!("an integer with no bits but {free:#x}");
+            return Err(value.unexpected(&expected).within(RESERVED));
+        }
+    }
+    for &(name, from, to) in B::FIELDS {
+        if let Some(value) = object.get(name) {
+            raw |= sub_field::<B>(name, value, from, to).map_err(|error| error.within(name))?;
+        }
+    }
+    Ok(raw)
+}
+
+/// The bits of a sub-field in their place.
+fn sub_field<B: Bits>(name: &str, value: &Value, from: u32, to: u32) -> Result<u64, Error> {
+    let number = value.named(B::names(name))?.integer::<u64>()?;
+    let greatest = u64::MAX >> (63 - (to - from));
+    if number > greatest {
+        return Err(value.unexpected(&format!("an integer from 0 to {greatest}")));
+    }
+    Ok(number << from)
+}
+
+/// What people see of a `variable_field`.
+#[doc(hidden)]
+pub fn choice_of<T: View>(index: u8, units: &'static str, value: &T) -> Value {
+    let units = Value::Text(units.into());
+    Value::object([
+        ("index", index.view()),
+        ("units", units),
+        ("value", value.view()),
+    ])
+}
+
+/// The value of a `variable_field` whose index chooses its type.
+///
+/// # Errors
+/// Those of `read`, which is given the index and the value; a missing or unknown key.
+#[doc(hidden)]
+pub fn choice<T>(
+    value: &Value,
+    read: impl FnOnce(u8, &Value) -> Option<Result<T, Error>>,
+) -> Result<T, Error> {
+    let object = Object::new(value, &["index", "units", "value"])?;
+    let index = object.member("index")?;
+    let missing = || Error::new("required, but absent").within("value");
+    let chosen = object.get("value").ok_or_else(missing)?;
+    match read(index, chosen) {
+        Some(value) => value.map_err(|error| error.within("value")),
+        None => Err(Error::new(format!("index {index} chooses no type")).within("index")),
+    }
+}

@@ -1,0 +1,283 @@
+//! The tree of plain values between a message and a text format.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use super::{Error, View};
+
+/// A plain value, as text formats have them.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// Nothing; an absent member when it is read.
+    Null,
+    /// True or false; no message has one.
+    Bool(bool),
+    /// An integer that is not negative.
+    Unsigned(u64),
+    /// A negative integer, when it is read; any signed field, when it is shown.
+    Signed(i64),
+    /// A number of single precision.
+    F32(f32),
+    /// A number of double precision.
+    F64(f64),
+    /// Text.
+    Text(Cow<'static, str>),
+    /// An array.
+    List(Vec<Self>),
+    /// Names and values, in order.
+    Object(Vec<(Cow<'static, str>, Self)>),
+}
+
+impl Value {
+    /// An object of members, without those that are absent.
+    pub fn object<const N: usize>(members: [(&'static str, Self); N]) -> Self {
+        let present = members
+            .into_iter()
+            .filter(|(_, value)| *value != Self::Null);
+        Self::Object(
+            present
+                .map(|(name, value)| (Cow::Borrowed(name), value))
+                .collect(),
+        )
+    }
+
+    /// An array of shown elements.
+    pub fn list<'a, T: View + 'a>(elements: impl IntoIterator<Item = &'a T>) -> Self {
+        Self::List(elements.into_iter().map(View::view).collect())
+    }
+
+    /// An object whose one key is the name of the chosen alternative.
+    pub fn alternative(name: &'static str, value: Self) -> Self {
+        Self::Object(vec![(Cow::Borrowed(name), value)])
+    }
+
+    /// The name of the chosen alternative, and its value.
+    ///
+    /// # Errors
+    /// If it is not an object with one key.
+    pub fn chosen(&self) -> Result<(&str, &Self), Error> {
+        match self {
+            Self::Object(members) if members.len() == 1 => Ok((&members[0].0, &members[0].1)),
+            _ => Err(self.unexpected("an object whose one key names the alternative")),
+        }
+    }
+
+    /// The elements of an array, each read and its index added to errors.
+    ///
+    /// # Errors
+    /// If it is not an array; those of the elements.
+    pub fn elements<T: View>(&self) -> Result<Vec<T>, Error> {
+        let Self::List(elements) = self else {
+            return Err(self.unexpected("an array"));
+        };
+        let read = |(index, value)| T::from_view(value).map_err(|error| error.element(index));
+        elements.iter().enumerate().map(read).collect()
+    }
+
+    /// Any number.
+    ///
+    /// # Errors
+    /// If it is not a number.
+    pub fn number(&self) -> Result<f64, Error> {
+        match self {
+            Self::Unsigned(value) => Ok(*value as f64),
+            Self::Signed(value) => Ok(*value as f64),
+            Self::F32(value) => Ok(f64::from(*value)),
+            Self::F64(value) => Ok(*value),
+            _ => Err(self.unexpected("a number")),
+        }
+    }
+
+    /// The value as an integer of a type.
+    ///
+    /// # Errors
+    /// If it is not an integer, or does not fit.
+    pub fn integer<T: TryFrom<u64> + TryFrom<i64>>(&self) -> Result<T, Error> {
+        let integer = match *self {
+            Self::Unsigned(value) => T::try_from(value).ok(),
+            Self::Signed(value) => T::try_from(value).ok(),
+            _ => return Err(self.unexpected("an integer")),
+        };
+        let bits = 8 * size_of::<T>();
+        integer.ok_or_else(|| self.unexpected(&format!("an integer of {bits} bits")))
+    }
+
+    /// The value, or if it is one of the names, the integer that the name stands for.
+    ///
+    /// # Errors
+    /// If it is another text.
+    pub fn named(&self, names: &[(u64, &str)]) -> Result<Self, Error> {
+        let Self::Text(text) = self else {
+            return Ok(self.clone());
+        };
+        match names.iter().find(|(_, name)| name == text) {
+            Some((value, _)) => Ok(Self::Unsigned(*value)),
+            None => {
+                let names: Vec<_> = names
+                    .iter()
+                    .map(|(_, name)| format!("\"{name}\""))
+                    .collect();
+                Err(self.unexpected(&format!("an integer or one of {}", names.join(", "))))
+            }
+        }
+    }
+
+    /// The error for a value that is not what it should be.
+    pub(super) fn unexpected(&self, expected: &str) -> Error {
+        Error::new(format!("expected {expected}, found {self}"))
+    }
+}
+
+/// Names the value in an error: itself if it is short, otherwise its kind.
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Null => f.write_str("null"),
+            Self::Bool(value) => value.fmt(f),
+            Self::Unsigned(value) => value.fmt(f),
+            Self::Signed(value) => value.fmt(f),
+            Self::F32(value) => value.fmt(f),
+            Self::F64(value) => value.fmt(f),
+            Self::Text(text) if text.chars().count() <= 40 => write!(f, "{text:?}"),
+            Self::Text(_) => f.write_str("a long text"),
+            Self::List(_) => f.write_str("an array"),
+            Self::Object(_) => f.write_str("an object"),
+        }
+    }
+}
+
+/// An object that is being read, member by member.
+#[derive(Debug)]
+pub struct Object<'a> {
+    members: &'a [(Cow<'static, str>, Value)],
+}
+
+impl<'a> Object<'a> {
+    /// Begins to read.
+    ///
+    /// # Errors
+    /// If it is not an object, or has other members than `known`.
+    pub fn new(value: &'a Value, known: &[&str]) -> Result<Self, Error> {
+        let Value::Object(members) = value else {
+            return Err(value.unexpected("an object"));
+        };
+        if let Some((name, _)) = members.iter().find(|(name, _)| !known.contains(&&**name)) {
+            return Err(Error::unknown_key(name, known));
+        }
+        Ok(Self { members })
+    }
+
+    /// The value of a member, if it is there.
+    pub fn get(&self, name: &str) -> Option<&'a Value> {
+        // The last one counts, as in JSON readers elsewhere.
+        let member = self.members.iter().rev().find(|(member, _)| member == name);
+        member.map(|(_, value)| value)
+    }
+
+    /// Reads a member.
+    ///
+    /// # Errors
+    /// If it is required but absent; its own.
+    pub fn member<T: View>(&self, name: &str) -> Result<T, Error> {
+        let read = match (self.get(name), T::absent()) {
+            (None | Some(Value::Null), Some(absent)) => return Ok(absent),
+            (None, None) => Err(Error::new("required, but absent")),
+            (Some(value), _) => T::from_view(value),
+        };
+        read.map_err(|error| error.within(name))
+    }
+}
+
+impl Serialize for Value {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Null => serializer.serialize_none(),
+            Self::Bool(value) => serializer.serialize_bool(*value),
+            Self::Unsigned(value) => serializer.serialize_u64(*value),
+            Self::Signed(value) => serializer.serialize_i64(*value),
+            Self::F32(value) => serializer.serialize_f32(*value),
+            Self::F64(value) => serializer.serialize_f64(*value),
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::List(elements) => serializer.collect_seq(elements),
+            Self::Object(members) => {
+                let mut map = serializer.serialize_map(Some(members.len()))?;
+                for (name, value) in members {
+                    map.serialize_entry(name.as_ref(), value)?;
+                }
+                map.end()
+            }
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Value {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(AnyValue)
+    }
+}
+
+/// Takes whatever a self-describing format has.
+struct AnyValue;
+
+impl<'de> Visitor<'de> for AnyValue {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a plain value")
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
+        Ok(Value::Bool(value))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
+        Ok(Value::Unsigned(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
+        Ok(u64::try_from(value).map_or(Value::Signed(value), Value::Unsigned))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
+        Ok(Value::F64(value))
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
+        Ok(Value::Text(text.to_owned().into()))
+    }
+
+    fn visit_string<E>(self, text: String) -> Result<Value, E> {
+        Ok(Value::Text(text.into()))
+    }
+
+    fn visit_none<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_some<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value, D::Error> {
+        Value::deserialize(deserializer)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
+        let mut elements = Vec::new();
+        while let Some(element) = access.next_element()? {
+            elements.push(element);
+        }
+        Ok(Value::List(elements))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut access: A) -> Result<Value, A::Error> {
+        let mut members = Vec::new();
+        while let Some((name, value)) = access.next_entry::<String, _>()? {
+            members.push((name.into(), value));
+        }
+        Ok(Value::Object(members))
+    }
+}

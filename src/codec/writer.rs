@@ -1,0 +1,153 @@
+//! Appends a message to a buffer.
+
+use super::error::{EncodeError, EncodeErrorKind};
+use super::{Count, Fixed, FormattedBlob, Text};
+
+/// Appends a message to a buffer, which keeps its capacity from one message to the next.
+#[derive(Debug)]
+pub struct Writer<'a> {
+    buffer: &'a mut Vec<u8>,
+    start: usize,
+}
+
+impl<'a> Writer<'a> {
+    /// Appends after what the buffer holds.
+    #[inline]
+    pub fn new(buffer: &'a mut Vec<u8>) -> Self {
+        Self {
+            start: buffer.len(),
+            buffer,
+        }
+    }
+
+    /// Octets written so far.
+    #[inline]
+    pub fn offset(&self) -> usize {
+        self.buffer.len() - self.start
+    }
+
+    /// Writes octets as they are.
+    #[inline(always)]
+    pub fn run<const N: usize>(&mut self, octets: &[u8; N]) {
+        self.buffer.extend_from_slice(octets);
+    }
+
+    /// Writes one fixed value.
+    #[inline]
+    pub fn fixed<T: Fixed>(&mut self, value: T) {
+        let start = self.buffer.len();
+        self.buffer.resize(start + T::SIZE, 0);
+        value.put(&mut self.buffer[start..], 0);
+    }
+
+    /// Writes a fixed value if there is one.
+    #[inline]
+    pub fn optional<T: Fixed>(&mut self, value: Option<T>) {
+        if let Some(value) = value {
+            self.fixed(value);
+        }
+    }
+
+    /// Writes a member and names it in errors.
+    ///
+    /// # Errors
+    /// Those of `write`.
+    #[inline]
+    pub fn member(
+        &mut self,
+        name: &'static str,
+        write: impl FnOnce(&mut Self) -> Result<(), EncodeError>,
+    ) -> Result<(), EncodeError> {
+        write(self).map_err(|error| error.within(name))
+    }
+
+    #[inline]
+    fn count<C: Count>(&mut self, count: usize, min: u64, max: u64) -> Result<(), EncodeError> {
+        let found = count as u64;
+        match C::from_u64(found) {
+            Some(count) if (min..=max).contains(&found) => {
+                self.fixed(count);
+                Ok(())
+            }
+            _ => Err(self.miscounted(found, min, max)),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn miscounted(&self, found: u64, min: u64, max: u64) -> EncodeError {
+        EncodeError::new(EncodeErrorKind::Count { found, min, max }, self.offset())
+    }
+
+    /// Writes a list.
+    ///
+    /// # Errors
+    /// If there are too many or too few elements; those of `element`, with the index added.
+    #[inline]
+    pub fn list<C: Count, T>(
+        &mut self,
+        list: &[T],
+        min: u64,
+        max: u64,
+        mut element: impl FnMut(&T, &mut Self) -> Result<(), EncodeError>,
+    ) -> Result<(), EncodeError> {
+        self.count::<C>(list.len(), min, max)?;
+        for (index, value) in list.iter().enumerate() {
+            if let Err(error) = element(value, self) {
+                return Err(error.element(index));
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes counted raw octets.
+    ///
+    /// # Errors
+    /// If there are too many or too few.
+    #[inline]
+    pub fn blob<C: Count>(&mut self, octets: &[u8], min: u64, max: u64) -> Result<(), EncodeError> {
+        self.count::<C>(octets.len(), min, max)?;
+        self.buffer.extend_from_slice(octets);
+        Ok(())
+    }
+
+    /// Writes a format index and counted raw octets.
+    ///
+    /// # Errors
+    /// As [`blob`](Self::blob).
+    #[inline]
+    pub fn formatted<C: Count, F: Fixed + Copy>(
+        &mut self,
+        blob: &FormattedBlob<F>,
+        min: u64,
+        max: u64,
+    ) -> Result<(), EncodeError> {
+        self.fixed(blob.format);
+        self.blob::<C>(&blob.data, min, max)
+    }
+
+    /// Writes a counted string.
+    ///
+    /// # Errors
+    /// As [`blob`](Self::blob).
+    #[inline]
+    pub fn text<C: Count>(&mut self, text: &Text, min: u64, max: u64) -> Result<(), EncodeError> {
+        self.blob::<C>(text.as_bytes(), min, max)
+    }
+
+    /// Writes a string of fixed length and fills it up with zeros.
+    ///
+    /// # Errors
+    /// If the text is longer.
+    #[inline]
+    pub fn fixed_text(&mut self, text: &Text, length: usize) -> Result<(), EncodeError> {
+        let octets = text.as_bytes();
+        if octets.len() > length {
+            return Err(self.miscounted(octets.len() as u64, 0, length as u64));
+        }
+        let end = self.buffer.len() + length;
+        self.buffer.extend_from_slice(octets);
+        self.buffer.resize(end, 0);
+        Ok(())
+    }
+}
