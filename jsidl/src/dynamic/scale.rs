@@ -122,13 +122,19 @@ pub fn shortest_real(scale: &Scale, width: Unsigned, raw: u64) -> f64 {
     }
     // With `floor` and `ceiling` the exact value is the edge of what encodes back, and the rounding
     // error of its computation may put it beyond.
-    let half_step = (scale.upper - scale.lower) / width.max() as f64 / 2.0;
+    let step = (scale.upper - scale.lower) / width.max() as f64;
     let inside = match scale.rounding {
         Rounding::Round => exact,
-        Rounding::Floor => exact + half_step,
-        Rounding::Ceiling => exact - half_step,
+        Rounding::Floor => exact + step / 2.0,
+        Rounding::Ceiling => exact - step / 2.0,
     };
-    let around = |number| (1..=17).flat_map(move |digits| neighbours(number, digits));
+    // Most candidates are so far away that they need no exact look.
+    let near = |real: &f64| (real - exact).abs() <= 2.0 * step;
+    let around = |number| {
+        (1..=17)
+            .flat_map(move |digits| neighbours(number, digits))
+            .filter(near)
+    };
     around(exact)
         .chain(around(inside))
         .find(encodes_back)

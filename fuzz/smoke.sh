@@ -1,0 +1,18 @@
+#!/bin/sh
+# Runs fuzz targets one after the other: fuzz/smoke.sh [SECONDS [TARGET...]]
+# Without arguments it runs all of them for 15 seconds each. It stops at the first finding.
+set -eu
+cd "$(dirname "$0")"
+
+seconds=${1:-15}
+[ $# -eq 0 ] || shift
+[ $# -gt 0 ] || set -- judp dynamic jsidl_text
+
+cargo +nightly run --quiet --bin seeds
+for target in "$@"; do
+    options="-max_total_time=$seconds -print_final_stats=1 -verbosity=0"
+    [ ! -f "dictionaries/$target.dict" ] || options="$options -dict=dictionaries/$target.dict"
+    echo "== $target for $seconds s"
+    # shellcheck disable=SC2086 # several options
+    cargo +nightly fuzz run "$target" -- $options
+done

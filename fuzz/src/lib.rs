@@ -1,0 +1,53 @@
+//! What several fuzz targets share.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, LazyLock};
+
+use jsidl::dynamic::{Limits, decode_with, encode_with};
+use jsidl::model::{Id, Message};
+
+/// A message of the embedded definitions, and a service that declares it.
+pub type Declared = (Id, Arc<Message>);
+
+/// Every message of the embedded definitions; of those that several services declare under one code
+/// and name, the last version's.
+pub fn catalogue() -> &'static [Declared] {
+    static MESSAGES: LazyLock<Vec<Declared>> = LazyLock::new(|| {
+        let mut loader = jsidl::Loader::new();
+        loader.catalogue();
+        let library = loader.load().library;
+        let mut messages = BTreeMap::new();
+        for service in library.services() {
+            for message in service.messages() {
+                let key = (message.code, message.name.clone(), service.id.version);
+                messages.insert(key, (service.id.clone(), message.clone()));
+            }
+        }
+        messages.into_values().collect()
+    });
+    &MESSAGES
+}
+
+/// Takes two octets that choose a message.
+pub fn choose(octets: &[u8]) -> Option<(&'static Declared, &[u8])> {
+    let (choice, rest) = octets.split_first_chunk()?;
+    let messages = catalogue();
+    messages
+        .get(usize::from(u16::from_le_bytes(*choice)) % messages.len())
+        .map(|m| (m, rest))
+}
+
+/// Octets of a message: its code and these.
+pub fn with_code(code: u16, body: &[u8]) -> Vec<u8> {
+    [&code.to_le_bytes(), body].concat()
+}
+
+/// Reads octets by their definition; what is accepted must encode back to the same octets.
+pub fn octets_come_back(message: &Message, octets: &[u8]) {
+    for limits in [Limits::Enforced, Limits::Ignored] {
+        if let Ok(value) = decode_with(message, octets, limits) {
+            let again = encode_with(message, &value, limits).expect("what was decoded");
+            assert_eq!(again, octets);
+        }
+    }
+}
