@@ -1,28 +1,17 @@
 //! Loads the public definitions, where they are at hand: all of them resolve, except those that
 //! are known to be wrong.
 
-use std::env;
+mod support;
+
+use std::f64::consts::PI;
+use std::fs;
 use std::path::{Path, PathBuf};
 
+use jsidl::model::{Meaning, Shape, Unsigned};
 use jsidl::{Loaded, Loader, Severity};
 
-/// The directory of public definitions. Says loudly that it is missing, and fails in CI.
 fn corpus() -> Option<PathBuf> {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let shared = env::var_os("JAUS_SHARED").map_or_else(|| "../shared".into(), PathBuf::from);
-    let corpus = workspace.join(shared).join("jsidl-corpus");
-    if corpus.is_dir() {
-        return Some(corpus);
-    }
-    eprintln!(
-        "NOT TESTED: {} is missing; set JAUS_SHARED",
-        corpus.display()
-    );
-    assert!(
-        env::var_os("CI").is_none(),
-        "the shared test data is missing in CI"
-    );
-    None
+    support::shared().map(|shared| shared.join("jsidl-corpus"))
 }
 
 fn load(corpus: &Path, sources: &[&str]) -> Loaded {
@@ -108,16 +97,102 @@ fn of_fkie_only_the_message_that_cannot_be_encoded_is_left_out() {
     assert_eq!(
         findings(&loaded, Severity::Error),
         [
-            "CBRNSensor.xml: `urn:jaus:jss:iop:CBRNSensor 1.1` is kept without `CBRNDetection`, because of errors in what defines that: correct them",
+            "CBRNSensor.xml: `CBRNDetection` is left out of `urn:jaus:jss:iop:CBRNSensor 1.1`, because what it refers to is missing or has errors",
             "CBRNSensorClass.xml: the record `CBRNRec` has 14 optional members, but its `presence_vector` has only 8 bits: use a wider `field_type_unsigned`",
         ]
     );
     assert_eq!(
         findings(&loaded, Severity::Warning),
         [
-            "CBRNSensor.xml: the code F932 stands for `RNDetailedMeasurement` and `CBDetailedMeasurement`: a receiver cannot tell them apart, so give one another `message_id`",
+            "CBRNSensor.xml: `CBDetailedMeasurement` has the code F932, which is also that of `RNDetailedMeasurement`: a receiver cannot tell them apart, so change one `message_id`",
             "HealthMonitor_V1.4.xml: the service `urn:jaus:jss:exp:aeodrs:HealthReporter 1.4`, of which this one is a client, is not loaded",
             "PlatformState_V1.xml: the service `urn:jaus:jss:iop:RenderUseless 1.1`, of which this one is a client, is not loaded",
         ]
     );
+}
+
+/// The golden vectors have every message that their generator could encode: all are known under
+/// the same code, name, service and version.
+#[test]
+fn every_message_of_the_golden_vectors_is_known() {
+    let Some(shared) = support::shared() else {
+        return;
+    };
+    let corpus = shared.join("jsidl-corpus");
+    let libraries = ["jts", "fkie", "ffi"].map(|source| (source, load(&corpus, &[source])));
+    let examples = load(&corpus, &["jts-examples", "jts"]);
+    let mut vectors = 0;
+    for file in fs::read_dir(shared.join("golden")).expect("the folder exists") {
+        let text = fs::read_to_string(file.expect("readable").path()).expect("UTF-8");
+        for line in text.lines().filter(|line| line.contains("\"message_id\"")) {
+            let vector: serde_json::Value = serde_json::from_str(line).expect("JSON");
+            let field = |name: &str| vector[name].as_str().unwrap_or_default();
+            let loaded = match field("source") {
+                "jts-examples" => &examples,
+                source => {
+                    let found = libraries.iter().find(|(name, _)| source.starts_with(name));
+                    &found.expect("a known source").1
+                }
+            };
+            let code = u16::from_str_radix(field("message_id"), 16).expect("hexadecimal");
+            let service = format!("{} {}", field("service_id").trim(), field("version"));
+            let declared = loaded.library.by_code(code).any(|(declaring, message)| {
+                message.name == field("message") && declaring.id.to_string() == service
+            });
+            assert!(declared, "{} {code:04X} of {service}", field("message"));
+            vectors += 1;
+        }
+    }
+    assert!(vectors > 2000, "{vectors} vectors are not all");
+}
+
+#[test]
+fn what_a_definition_says_arrives_in_the_model() {
+    let Some(corpus) = corpus() else { return };
+    let loaded = load(&corpus, &["jts"]);
+    let (_, pose) = loaded
+        .library
+        .by_code(0x4402)
+        .find(|(service, _)| service.id.to_string() == "urn:jaus:jss:mobility:GlobalPoseSensor 1.0")
+        .expect("GlobalPoseSensor reports its pose");
+    assert_eq!(
+        (pose.name.as_str(), pose.is_command),
+        ("ReportGlobalPose", false)
+    );
+    assert_eq!(pose.header, None);
+    let Some(Shape::Group(record)) = pose.body.as_ref().map(|body| &body.shape) else {
+        panic!("the body is a record");
+    };
+    assert_eq!(record.presence, Some(Unsigned::U16));
+    let names: Vec<_> = record.members.iter().map(|m| m.name.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "Latitude",
+            "Longitude",
+            "Altitude",
+            "Position_RMS",
+            "Roll",
+            "Pitch",
+            "Yaw",
+            "Attitude_RMS",
+            "TimeStamp"
+        ]
+    );
+    // A reference: its own name and optionality, the target's bits.
+    let stamp = record.members.last().expect("nine members");
+    assert!(stamp.optional);
+    let Shape::Bits(bits) = &stamp.shape else {
+        panic!("a time stamp is a bit field");
+    };
+    let last = bits.fields.last().expect("five fields");
+    assert_eq!((last.name.as_str(), last.from, last.to), ("Day", 27, 31));
+    // A limit that is computed from a constant of another file.
+    let Shape::Scalar(yaw) = &record.members[6].shape else {
+        panic!("yaw is a number");
+    };
+    let Meaning::Scaled(scale) = yaw.meaning else {
+        panic!("yaw is scaled");
+    };
+    assert_eq!((scale.lower, scale.upper), (-PI, PI));
 }

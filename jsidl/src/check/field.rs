@@ -104,7 +104,7 @@ pub(crate) fn value_set(report: &mut Report, set: &syntax::ValueSet, resolved: &
         .iter()
         .zip(&set.values)
         .map(|(v, s)| (v.index, s.span));
-    unique_indices(report, "value", indices)
+    unique_indices(report, "values", indices)
 }
 
 /// The values fit the type of the field.

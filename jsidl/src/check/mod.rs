@@ -20,9 +20,9 @@ pub(crate) use field::{
     bits, enum_index, octet_index, one_meaning, overlap, scale, value_range, value_set,
     values_of_bits, values_of_number,
 };
-pub(crate) use service::{ambiguities, incomplete, same_service};
+pub(crate) use service::{ambiguous_codes, ambiguous_names, left_out, same_service};
 
-/// Names must differ, because they are how everyone speaks of the things.
+/// Names must differ, because they are how everyone speaks of the things. `what` is their plural.
 pub(crate) fn unique<'n>(
     report: &mut Report,
     what: &str,
@@ -35,7 +35,7 @@ pub(crate) fn unique<'n>(
             report
                 .error(
                     span,
-                    format!("there are two {what}s named `{name}`: rename one"),
+                    format!("there are two {what} named `{name}`: rename one"),
                 )
                 .note(first, "the other one");
             sound = false;
@@ -53,7 +53,7 @@ pub(crate) fn unique_names(report: &mut Report, what: &str, nodes: &[Node]) -> b
     )
 }
 
-/// Indices must differ, because they are all that stands on the wire.
+/// Indices must differ, because they are all that stands on the wire. `what` is a plural.
 pub(crate) fn unique_indices(
     report: &mut Report,
     what: &str,
@@ -66,7 +66,7 @@ pub(crate) fn unique_indices(
             report
                 .error(
                     span,
-                    format!("there are two {what}s with index {index}: renumber one"),
+                    format!("there are two {what} with the index {index}: renumber one"),
                 )
                 .note(first, "the other one");
             sound = false;

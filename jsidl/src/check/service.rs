@@ -6,38 +6,31 @@ use std::collections::HashMap;
 use super::layout::same_message;
 use crate::diagnostic::Report;
 use crate::library::Library;
-use crate::model::{Id, Service};
+use crate::model::{Message, Service};
 use crate::source::Span;
-use crate::syntax::{Program, ServiceDef};
+use crate::syntax::{Declaration, ServiceDef};
 
-/// Says which messages a service has lost to errors.
-pub(crate) fn incomplete(report: &mut Report, definition: &ServiceDef, lost: &[String]) {
-    let lost: Vec<_> = lost
-        .iter()
-        .map(String::as_str)
-        .filter(|name| !name.is_empty())
-        .collect();
-    if !lost.is_empty() {
-        report.error(
-            definition.span,
-            format!(
-                "`{}` is kept without `{}`, because of errors in what defines that: correct them",
-                definition.id,
-                lost.join("`, `"),
-            ),
-        );
-    }
+/// Says that a service has lost a message to an error elsewhere.
+pub(crate) fn left_out(report: &mut Report, service: &ServiceDef, message: &Declaration) {
+    report.error(
+        message.span,
+        format!(
+            "`{}` is left out of `{}`, because what it refers to is missing or has errors",
+            message.name, service.id
+        ),
+    );
 }
 
 /// A service that is loaded twice should be the same both times; the first one counts.
 pub(crate) fn same_service(
     report: &mut Report,
     definition: &ServiceDef,
-    kept: &Service,
+    first: &Service,
     other: &Service,
 ) {
-    let same = kept.messages().count() == other.messages().count()
-        && kept
+    let same = first.inputs.len() == other.inputs.len()
+        && first.outputs.len() == other.outputs.len()
+        && first
             .messages()
             .zip(other.messages())
             .all(|(a, b)| same_message(a, b));
@@ -45,59 +38,52 @@ pub(crate) fn same_service(
         report.warning(
             definition.span,
             format!(
-                "`{}` is already declared, with other messages, in {}: the one there counts",
-                definition.id, kept.location
+                "`{}` is declared with other messages at {}, which counts because it was loaded first",
+                definition.id, first.location
             ),
         );
     }
 }
 
-/// A message code should mean one message to a service and those that it inherits from.
-pub(crate) fn ambiguities(report: &mut Report, program: &Program, library: &Library) {
-    let mut spans: HashMap<&Id, Span> = HashMap::new();
-    for definition in &program.services {
-        spans.entry(&definition.id).or_insert(definition.span);
+/// A code should stand for one message in a service and those that it inherits from.
+pub(crate) fn ambiguous_codes(
+    report: &mut Report,
+    library: &Library,
+    service: &Service,
+    places: &[Span],
+) {
+    let mut known: HashMap<u16, &Message> = HashMap::new();
+    for inherited in library.lineage(service).skip(1).flat_map(Service::messages) {
+        known.entry(inherited.code).or_insert(inherited);
     }
-    for service in library.services() {
-        let Some(&span) = spans.get(&service.id) else {
+    for (message, &place) in service.messages().zip(places) {
+        let other = *known.entry(message.code).or_insert(message);
+        if same_message(other, message) {
             continue;
-        };
-        ambiguous_codes(report, library, service, span);
-        ambiguous_names(report, service, span);
-    }
-}
-
-fn ambiguous_codes(report: &mut Report, library: &Library, service: &Service, span: Span) {
-    for (index, message) in service.messages().enumerate() {
-        let earlier = service.messages().take(index);
-        let inherited = library.lineage(service).skip(1).flat_map(Service::messages);
-        let mut others = earlier.chain(inherited);
-        let other =
-            others.find(|other| other.code == message.code && !same_message(other, message));
-        if let Some(other) = other {
-            let (name, other, code) = (&message.name, &other.name, message.code);
-            let what = if name == other {
-                format!("two different layouts of `{name}`")
-            } else {
-                format!("`{other}` and `{name}`")
-            };
-            report.warning(
-                span,
-                format!("the code {code:04X} stands for {what}: a receiver cannot tell them apart, so give one another `message_id`"),
-            );
         }
+        let (name, code) = (&message.name, message.code);
+        let other = if other.name == *name {
+            format!("another `{name}` with a different layout")
+        } else {
+            format!("`{}`", other.name)
+        };
+        report.warning(
+            place,
+            format!("`{name}` has the code {code:04X}, which is also that of {other}: a receiver cannot tell them apart, so change one `message_id`"),
+        );
     }
 }
 
-fn ambiguous_names(report: &mut Report, service: &Service, span: Span) {
+/// A name should stand for one message in a service.
+pub(crate) fn ambiguous_names(report: &mut Report, service: &Service, places: &[Span]) {
     let mut codes: HashMap<&str, u16> = HashMap::new();
-    for message in service.messages() {
-        let code = *codes.entry(&message.name).or_insert(message.code);
-        if code != message.code {
-            let (name, other) = (&message.name, message.code);
+    for (message, &place) in service.messages().zip(places) {
+        let (name, code) = (&message.name, message.code);
+        let other = *codes.entry(name).or_insert(code);
+        if other != code {
             report.warning(
-                span,
-                format!("`{name}` names the messages {code:04X} and {other:04X}: rename one"),
+                place,
+                format!("`{name}` is also the name of the message {other:04X} in this service: rename one"),
             );
         }
     }

@@ -1,6 +1,7 @@
 //! Computes constant expressions.
 
 use super::{Memo, Resolver};
+use crate::check;
 use crate::expr::Value;
 use crate::model::Number;
 use crate::source::Span;
@@ -39,7 +40,10 @@ impl Resolver<'_> {
 
     /// Computes the constants of a set, whether they are used or not.
     pub(super) fn const_set(&mut self, set: usize) {
-        for position in 0..self.program.const_sets[set].definitions.len() {
+        let definitions = &self.program.const_sets[set].definitions;
+        let names = definitions.iter().map(|d| (d.name.as_str(), d.value.span));
+        check::unique(self.report, "constants", names);
+        for position in 0..definitions.len() {
             // A constant that is wrong has been reported.
             let _ = self.constant(set, position);
         }
@@ -117,10 +121,11 @@ impl Resolver<'_> {
         };
         let found = self
             .index
-            .const_set(&reference.id, reference.span, self.sources);
+            .const_sets
+            .nearest(&reference.id, reference.span, self.sources);
         if found.is_none() {
-            let versions = self.index.versions_of_const_set(&reference.id.urn);
-            self.missing_set(reference, "constant set", &versions);
+            let advice = self.index.const_sets.advice(&reference.id);
+            self.missing_set(reference, "constant set", &advice);
         }
         found.map(Some)
     }

@@ -122,7 +122,7 @@ impl Resolver<'_> {
         fields: &[syntax::SubField],
     ) -> Option<BitField> {
         let names = fields.iter().map(|f| (f.name.as_str(), f.span));
-        let unique = check::unique(self.report, "sub-field", names);
+        let unique = check::unique(self.report, "sub-fields", names);
         let resolved: Vec<_> = fields
             .iter()
             .map(|field| self.sub_field(scope, base, field))
@@ -185,7 +185,7 @@ impl Resolver<'_> {
             .iter()
             .zip(formats)
             .map(|(f, s)| (f.index.into(), s.span));
-        check::unique_indices(self.report, "format", indices).then_some(resolved)
+        check::unique_indices(self.report, "formats", indices).then_some(resolved)
     }
 
     /// Resolves the `type_and_units_enum`s of a `variable_field`.
@@ -211,6 +211,6 @@ impl Resolver<'_> {
             .iter()
             .zip(choices)
             .map(|(c, s)| (c.index.into(), s.span));
-        check::unique_indices(self.report, "type and units", indices).then_some(resolved)
+        check::unique_indices(self.report, "choices of type and units", indices).then_some(resolved)
     }
 }

@@ -3,110 +3,135 @@
 //! Published directories carry copies of each other's sets under one identity. Among copies the
 //! one nearest to the file that asks is meant.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use crate::model::Id;
+use crate::diagnostic::Report;
+use crate::model::{Id, Version};
 use crate::source::{Sources, Span};
-use crate::syntax::Program;
+use crate::syntax::{Program, TypeSetIndex};
 
-/// Everything that has an identity, by position in the [`Program`].
+/// Copies of a set beyond these are not looked at.
+const MOST_COPIES: usize = 64;
+
+/// Everything that has an identity, by position in the [`Program`], and every declaration of a
+/// type set by name.
 pub(super) struct Index<'a> {
-    type_sets: Positions<'a>,
-    const_sets: Positions<'a>,
-    services: Positions<'a>,
+    pub(super) type_sets: Identities<'a>,
+    pub(super) const_sets: Identities<'a>,
+    pub(super) services: Identities<'a>,
+    declarations: Vec<HashMap<&'a str, usize>>,
 }
 
-type Positions<'a> = HashMap<&'a Id, Vec<(usize, Span)>>;
+/// Things of one kind by URN and version.
+#[derive(Default)]
+pub(super) struct Identities<'a>(BTreeMap<(&'a str, Version), Vec<(usize, Span)>>);
 
 impl<'a> Index<'a> {
     pub(super) fn new(program: &'a Program) -> Self {
-        let identified = program
-            .type_sets
-            .iter()
-            .map(|s| s.id.as_ref().map(|id| (id, s.span)));
-        let type_sets = positions(identified);
-        let identified = program
-            .const_sets
-            .iter()
-            .map(|s| s.id.as_ref().map(|id| (id, s.span)));
-        let const_sets = positions(identified);
-        let services = positions(program.services.iter().map(|s| Some((&s.id, s.span))));
+        let type_sets = program.type_sets.iter().map(|s| (s.id.as_ref(), s.span));
+        let const_sets = program.const_sets.iter().map(|s| (s.id.as_ref(), s.span));
+        let services = program.services.iter().map(|s| (Some(&s.id), s.span));
+        let declarations = program.type_sets.iter().map(|set| {
+            let mut positions = HashMap::new();
+            for (position, declaration) in set.declarations.iter().enumerate() {
+                positions
+                    .entry(declaration.name.as_str())
+                    .or_insert(position);
+            }
+            positions
+        });
         Self {
-            type_sets,
-            const_sets,
-            services,
+            type_sets: Identities::new(type_sets),
+            const_sets: Identities::new(const_sets),
+            services: Identities::new(services),
+            declarations: declarations.collect(),
         }
     }
 
-    pub(super) fn type_set(&self, id: &Id, from: Span, sources: &Sources) -> Option<usize> {
-        nearest(self.type_sets.get(id)?, from, sources)
+    /// Position of a declaration in a type set.
+    pub(super) fn declaration(&self, set: TypeSetIndex, name: &str) -> Option<usize> {
+        self.declarations[set].get(name).copied()
     }
 
-    pub(super) fn const_set(&self, id: &Id, from: Span, sources: &Sources) -> Option<usize> {
-        nearest(self.const_sets.get(id)?, from, sources)
-    }
-
-    /// The service that counts under this identity: the one loaded first.
-    pub(super) fn service(&self, id: &Id) -> Option<usize> {
-        self.services.get(id)?.first().map(|(index, _)| *index)
-    }
-
-    /// The versions under which something is loaded as `what` says.
-    pub(super) fn versions_of_type_set(&self, urn: &str) -> Vec<String> {
-        versions(&self.type_sets, urn)
-    }
-
-    /// As [`versions_of_type_set`](Self::versions_of_type_set).
-    pub(super) fn versions_of_const_set(&self, urn: &str) -> Vec<String> {
-        versions(&self.const_sets, urn)
-    }
-
-    /// As [`versions_of_type_set`](Self::versions_of_type_set).
-    pub(super) fn versions_of_service(&self, urn: &str) -> Vec<String> {
-        versions(&self.services, urn)
+    /// Warns of sets that are declared twice where nobody can say which one is nearer.
+    pub(super) fn report_copies(&self, sources: &Sources, report: &mut Report) {
+        self.type_sets.report_copies("type set", sources, report);
+        self.const_sets
+            .report_copies("constant set", sources, report);
     }
 }
 
-fn positions<'a>(found: impl Iterator<Item = Option<(&'a Id, Span)>>) -> Positions<'a> {
-    let mut positions = Positions::new();
-    for (index, found) in found.enumerate() {
-        if let Some((id, span)) = found {
-            positions.entry(id).or_default().push((index, span));
+impl<'a> Identities<'a> {
+    fn new(found: impl Iterator<Item = (Option<&'a Id>, Span)>) -> Self {
+        let mut identities = Self::default();
+        for (position, (id, span)) in found.enumerate() {
+            let Some(id) = id else { continue };
+            let copies = identities.0.entry((&id.urn, id.version)).or_default();
+            if copies.len() < MOST_COPIES {
+                copies.push((position, span));
+            }
+        }
+        identities
+    }
+
+    /// The one that was loaded first.
+    pub(super) fn first(&self, id: &Id) -> Option<usize> {
+        self.copies(id).first().map(|(position, _)| *position)
+    }
+
+    /// The one nearest to the file that asks; among equally near ones the first.
+    pub(super) fn nearest(&self, id: &Id, from: Span, sources: &Sources) -> Option<usize> {
+        let copies = self.copies(id);
+        if let [(only, _)] = copies {
+            return Some(*only);
+        }
+        let home = sources.path(from);
+        let nearest = copies.iter().min_by_key(|(_, span)| {
+            let steps = steps(home, sources.path(*span));
+            (!span.same_file(from), steps)
+        });
+        nearest.map(|(position, _)| *position)
+    }
+
+    /// What to do about a reference to something that is not loaded.
+    pub(super) fn advice(&self, id: &Id) -> String {
+        let urn = &*id.urn;
+        let least = Version { major: 0, minor: 0 };
+        let greatest = Version {
+            major: u8::MAX,
+            minor: u8::MAX,
+        };
+        let others = self.0.range((urn, least)..=(urn, greatest));
+        let versions: Vec<_> = others
+            .map(|((_, version), _)| version.to_string())
+            .collect();
+        if versions.is_empty() {
+            "load the file that declares it as well".into()
+        } else {
+            format!("of it only version {} is loaded", versions.join(", "))
         }
     }
-    positions
-}
 
-fn versions(positions: &Positions<'_>, urn: &str) -> Vec<String> {
-    let mut found: Vec<_> = positions
-        .keys()
-        .filter(|id| &*id.urn == urn)
-        .map(|id| id.version)
-        .collect();
-    found.sort_unstable();
-    found
-        .into_iter()
-        .map(|version| version.to_string())
-        .collect()
-}
-
-fn nearest(candidates: &[(usize, Span)], from: Span, sources: &Sources) -> Option<usize> {
-    if let [(only, _)] = candidates {
-        return Some(*only);
+    fn copies<'s>(&'s self, id: &'s Id) -> &'s [(usize, Span)] {
+        let copies = self.0.get(&(&*id.urn, id.version));
+        copies.map_or(&[], Vec::as_slice)
     }
-    let home = sources.path(from);
-    let distance = |span: Span| -> usize {
-        if span.same_file(from) {
-            return 0;
+
+    fn report_copies(&self, what: &str, sources: &Sources, report: &mut Report) {
+        for ((urn, version), copies) in &self.0 {
+            let mut homes = HashMap::new();
+            for (_, span) in copies {
+                let Some(first) = homes.insert(sources.path(*span).parent(), *span) else {
+                    continue;
+                };
+                let message = format!(
+                    "the {what} `{urn} {version}` is declared twice in this directory, and the first one counts: remove one, or give it another id or version"
+                );
+                report.warning(*span, message).note(first, "the other one");
+            }
         }
-        steps(home, sources.path(span))
-    };
-    // The first of those that are equally near.
-    candidates
-        .iter()
-        .min_by_key(|(_, span)| distance(*span))
-        .map(|(index, _)| *index)
+    }
 }
 
 /// Steps from one file to another through the tree of directories.

@@ -64,19 +64,16 @@ impl Resolver<'_> {
     /// Takes what a copy costs from what is left. `None` if that is too little, which is reported
     /// once, because everything that follows has the same cause.
     pub(super) fn spend(&mut self, items: usize, span: Span) -> Option<()> {
-        if let Some(left) = self.items_left.checked_sub(items) {
-            self.items_left = left;
-            return Some(());
-        }
-        if self.items_left > 0 {
-            self.items_left = 0;
+        let left = self.items_left?;
+        self.items_left = left.checked_sub(items);
+        if self.items_left.is_none() {
             let limit = super::MOST_ITEMS;
             self.report.error(
                 span,
                 format!("the references of these definitions add up to more than {limit} fields: load fewer of them at once"),
             );
         }
-        None
+        self.items_left.map(drop)
     }
 
     fn shape(&mut self, scope: TypeSetIndex, node: &Node, kind: &Kind) -> Option<Shape> {
@@ -134,7 +131,7 @@ impl Resolver<'_> {
         presence: Option<Spanned<Unsigned>>,
         nodes: &[Node],
     ) -> Option<Group> {
-        let unique = check::unique_names(self.report, "member", nodes);
+        let unique = check::unique_names(self.report, "members", nodes);
         let members = self.items(scope, nodes)?;
         let sound = check::group(self.report, node, kind, presence, nodes, &members);
         (unique && sound).then(|| Group {
@@ -167,7 +164,7 @@ impl Resolver<'_> {
         tag: &CountField,
         nodes: &[Node],
     ) -> Option<Variant> {
-        let mut sound = check::unique_names(self.report, "alternative", nodes);
+        let mut sound = check::unique_names(self.report, "alternatives", nodes);
         let range = self.count(scope, tag);
         let alternatives = self.items(scope, nodes)?;
         for (node, item) in nodes.iter().zip(&alternatives) {
@@ -188,7 +185,7 @@ impl Resolver<'_> {
         element: &Node,
     ) -> Option<Array> {
         let names = dimensions.iter().map(|d| (d.name.as_str(), d.span));
-        let unique = check::unique(self.report, "dimension", names);
+        let unique = check::unique(self.report, "dimensions", names);
         let sizes: Vec<_> = dimensions
             .iter()
             .map(|dimension| {

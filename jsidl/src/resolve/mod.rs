@@ -16,6 +16,7 @@ use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use std::sync::Arc;
 
+use crate::check;
 use crate::diagnostic::Report;
 use crate::expr::Value;
 use crate::library::Library;
@@ -25,12 +26,15 @@ use crate::syntax::{Program, TypeSetIndex};
 
 use index::Index;
 
-/// Composites within each other, references followed; published definitions need 8.
+/// Composites within each other, references followed; published definitions need 9.
 const DEEPEST: usize = 32;
 
+/// Services that inherit from each other in a row; published definitions need 7.
+const LONGEST_LINEAGE: usize = 32;
+
 /// How many items references may add to what is written: a few lines that double their size with
-/// each step must not fill the memory. All published definitions together need 60 000.
-const MOST_ITEMS: usize = 500_000;
+/// each step must not fill the memory. All published definitions together need 5 000.
+const MOST_ITEMS: usize = 200_000;
 
 /// Resolves everything that was read. What is sound comes back, what is not is in the report.
 pub(crate) fn resolve(program: &Program, sources: &Sources, report: &mut Report) -> Library {
@@ -47,8 +51,9 @@ pub(crate) fn resolve(program: &Program, sources: &Sources, report: &mut Report)
         constants: HashMap::new(),
         complained: HashSet::new(),
         nesting: 0,
-        items_left: MOST_ITEMS,
+        items_left: Some(MOST_ITEMS),
     };
+    resolver.index.report_copies(sources, resolver.report);
     resolver.sets();
     resolver.library()
 }
@@ -65,7 +70,8 @@ struct Resolver<'a> {
     /// Places about which something has been said that is to be said once.
     complained: HashSet<Span>,
     nesting: usize,
-    items_left: usize,
+    /// `None` once the limit has been exceeded and reported.
+    items_left: Option<usize>,
 }
 
 /// What is known of a declaration.
@@ -106,7 +112,8 @@ impl Resolver<'_> {
         self.complained.insert(span)
     }
 
-    /// Resolves every declaration, so that mistakes in unused ones are found too.
+    /// Resolves every declaration, so that mistakes in unused ones are found too, and before any
+    /// service uses them.
     fn sets(&mut self) {
         for set in 0..self.program.type_sets.len() {
             self.type_set(set);
@@ -118,6 +125,8 @@ impl Resolver<'_> {
 
     fn type_set(&mut self, index: TypeSetIndex) {
         let set = &self.program.type_sets[index];
+        let names = set.declarations.iter().map(|d| (d.name.as_str(), d.span));
+        check::unique(self.report, "declarations", names);
         for declaration in 0..set.declarations.len() {
             // A declaration that is wrong has been reported.
             let _ = self.declaration(index, declaration);

@@ -79,12 +79,14 @@ impl<'a> Resolver<'a> {
         for alias in aliases.split('.').filter(|_| !aliases.is_empty()) {
             set = self.aliased_type_set(set, alias, path, span)?;
         }
-        let declarations = &self.program.type_sets[set].declarations;
-        if let Some(position) = declarations.iter().position(|d| d.name == name) {
+        if let Some(position) = self.index.declaration(set, name) {
             return Some((set, position));
         }
+        let declarations = &self.program.type_sets[set].declarations;
+        // A hint is not worth much time.
         let similar = declarations
             .iter()
+            .take(1000)
             .find(|d| d.name.eq_ignore_ascii_case(name));
         let advice = match similar {
             Some(similar) => format!("did you mean `{}`?", similar.name),
@@ -120,8 +122,8 @@ impl<'a> Resolver<'a> {
         };
         let found = self.referenced(reference);
         if found.is_none() {
-            let versions = self.index.versions_of_type_set(&reference.id.urn);
-            self.missing_set(reference, "type set", &versions);
+            let advice = self.index.type_sets.advice(&reference.id);
+            self.missing_set(reference, "type set", &advice);
         }
         found
     }
@@ -147,24 +149,16 @@ impl<'a> Resolver<'a> {
 
     fn referenced(&self, reference: &SetRef) -> Option<TypeSetIndex> {
         self.index
-            .type_set(&reference.id, reference.span, self.sources)
+            .type_sets
+            .nearest(&reference.id, reference.span, self.sources)
     }
 
     /// Complains, once for each reference, about a set that is not loaded.
-    pub(super) fn missing_set(&mut self, reference: &SetRef, what: &str, versions: &[String]) {
-        if !self.first_complaint(reference.span) {
-            return;
+    pub(super) fn missing_set(&mut self, reference: &SetRef, what: &str, advice: &str) {
+        if self.first_complaint(reference.span) {
+            let message = format!("the {what} `{}` is not loaded: {advice}", reference.id);
+            self.report.error(reference.span, message);
         }
-        let advice = if versions.is_empty() {
-            "load the file that declares it as well".to_owned()
-        } else {
-            format!(
-                "of that {what} only version {} is loaded",
-                versions.join(", ")
-            )
-        };
-        let message = format!("the {what} `{}` is not loaded: {advice}", reference.id);
-        self.report.error(reference.span, message);
     }
 
     /// Says that definitions are nested too deeply.

@@ -3,53 +3,62 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use super::{Resolved, Resolver};
+use super::{LONGEST_LINEAGE, Resolved, Resolver};
 use crate::check;
 use crate::library::Library;
 use crate::model::{Message, Reference, Service};
-use crate::syntax::{Declaration, DeclarationKind, ServiceDef, SetRef, TypeSetIndex};
+use crate::source::Span;
+use crate::syntax::{Declaration, DeclarationKind, ServiceDef, SetRef, Target, TypeSetIndex};
+
+/// Messages of a set, each with the place where the service names it.
+type Vocabulary = Vec<(Arc<Message>, Span)>;
 
 impl Resolver<'_> {
     /// Resolves all services and keeps the sound ones.
     pub(super) fn library(&mut self) -> Library {
         let mut library = Library::default();
-        for (position, definition) in self.program.services.iter().enumerate() {
-            let service = self.service(definition);
-            if !self.lineage_is_sound(position) {
+        let mut kept = Vec::new();
+        for definition in &self.program.services {
+            let (service, places) = self.service(definition);
+            if !self.lineage_is_sound(definition) {
                 continue;
             }
-            if let Some(kept) = library.service(&service.id) {
-                check::same_service(self.report, definition, kept, &service);
+            if let Some(first) = library.service(&service.id) {
+                check::same_service(self.report, definition, first, &service);
             } else {
-                library.insert(Arc::new(service));
+                let service = Arc::new(service);
+                library.insert(Arc::clone(&service));
+                kept.push((service, places));
             }
         }
-        check::ambiguities(self.report, self.program, &library);
+        for (service, places) in &kept {
+            check::ambiguous_codes(self.report, &library, service, places);
+            check::ambiguous_names(self.report, service, places);
+        }
         library
     }
 
-    fn service(&mut self, definition: &ServiceDef) -> Service {
+    /// A service, and where it names each of its messages.
+    fn service(&mut self, definition: &ServiceDef) -> (Service, Vec<Span>) {
         let scope = definition.types;
-        let mut lost = Vec::new();
-        let inputs = self.vocabulary(scope, &definition.inputs, &mut lost);
-        let outputs = self.vocabulary(scope, &definition.outputs, &mut lost);
+        let inputs = self.vocabulary(scope, definition, &definition.inputs);
+        let outputs = self.vocabulary(scope, definition, &definition.outputs);
         self.events(scope, &definition.events);
-        check::incomplete(self.report, definition, &lost);
         self.clients(definition);
-        Service {
+        let (inputs, input_places): (Vec<_>, Vec<_>) = inputs.into_iter().unzip();
+        let (outputs, output_places): (Vec<_>, Vec<_>) = outputs.into_iter().unzip();
+        let clients = definition.client_of.iter();
+        let service = Service {
             name: definition.name.clone(),
             id: definition.id.clone(),
             description: definition.description.clone(),
             inherits_from: definition.inherits_from.as_ref().map(|r| self.reference(r)),
-            client_of: definition
-                .client_of
-                .iter()
-                .map(|r| self.reference(r))
-                .collect(),
+            client_of: clients.map(|r| self.reference(r)).collect(),
             inputs,
             outputs,
             location: self.location(definition.span),
-        }
+        };
+        (service, [input_places, output_places].concat())
     }
 
     fn reference(&self, reference: &SetRef) -> Reference {
@@ -60,43 +69,55 @@ impl Resolver<'_> {
         }
     }
 
-    /// The messages of an input or output set; the names of those that had to be left out because
-    /// something they refer to is wrong go to `lost`.
+    /// The messages of an input or output set that are sound.
     fn vocabulary(
         &mut self,
         scope: TypeSetIndex,
+        service: &ServiceDef,
         declarations: &[Declaration],
-        lost: &mut Vec<String>,
-    ) -> Vec<Arc<Message>> {
-        check::unique(
-            self.report,
-            "message",
-            declarations.iter().map(|d| (d.name.as_str(), d.span)),
-        );
+    ) -> Vocabulary {
+        let names = declarations.iter().map(|d| (d.name.as_str(), d.span));
+        check::unique(self.report, "messages", names);
         let mut names = HashSet::new();
         let mut messages = Vec::new();
         for declaration in declarations {
             let message = match &declaration.kind {
                 DeclarationKind::Message(message) => self.message(scope, declaration, message),
-                DeclarationKind::Reference(target) => match self.follow(scope, target) {
-                    Some(Resolved::Message(message)) => self.renamed(message, declaration),
-                    _ => None,
-                },
+                DeclarationKind::Reference(target) => {
+                    self.message_elsewhere(scope, service, declaration, target)
+                }
                 _ => None,
             };
-            match message {
-                Some(message) if names.insert(&declaration.name) => messages.push(message),
-                Some(_) => {}
-                None => lost.push(declaration.name.clone()),
-            }
+            let message = message.filter(|_| names.insert(&declaration.name));
+            messages.extend(message.map(|message| (message, declaration.span)));
         }
         messages
+    }
+
+    /// A message that a type set declares.
+    fn message_elsewhere(
+        &mut self,
+        scope: TypeSetIndex,
+        service: &ServiceDef,
+        declaration: &Declaration,
+        target: &Target,
+    ) -> Option<Arc<Message>> {
+        let before = self.report.errors();
+        match self.follow(scope, target) {
+            Some(Resolved::Message(message)) => self.renamed(message, declaration),
+            // What is wrong has been reported where it is, and that may be far away.
+            None if self.report.errors() == before => {
+                check::left_out(self.report, service, declaration);
+                None
+            }
+            _ => None,
+        }
     }
 
     fn events(&mut self, scope: TypeSetIndex, declarations: &[Declaration]) {
         check::unique(
             self.report,
-            "event",
+            "events",
             declarations.iter().map(|d| (d.name.as_str(), d.span)),
         );
         for declaration in declarations {
@@ -110,65 +131,65 @@ impl Resolver<'_> {
     }
 
     fn clients(&mut self, definition: &ServiceDef) {
-        check::unique(
-            self.report,
-            "reference",
-            definition
-                .client_of
-                .iter()
-                .chain(&definition.inherits_from)
-                .map(|r| (r.name.as_str(), r.span)),
-        );
+        let references = definition.client_of.iter().chain(&definition.inherits_from);
+        let names = references.map(|r| (r.name.as_str(), r.span));
+        check::unique(self.report, "references", names);
         for client in &definition.client_of {
             let lost = self.program.lost_services.contains(&client.id);
-            if !lost && self.index.service(&client.id).is_none() {
+            if !lost && self.index.services.first(&client.id).is_none() {
+                let id = &client.id;
                 self.report.warning(
                     client.span,
-                    format!(
-                        "the service `{}`, of which this one is a client, is not loaded",
-                        client.id
-                    ),
+                    format!("the service `{id}`, of which this one is a client, is not loaded"),
                 );
             }
         }
     }
 
     /// Whether every service that this one inherits from is there.
-    fn lineage_is_sound(&mut self, position: usize) -> bool {
-        let first = &self.program.services[position];
-        let mut visited = HashSet::from([&first.id]);
-        let mut service = first;
-        while let Some(base) = &service.inherits_from {
-            let Some(index) = self.index.service(&base.id) else {
-                self.missing_base(first, service, base);
-                return false;
+    fn lineage_is_sound(&mut self, heir: &ServiceDef) -> bool {
+        let program = self.program;
+        let Some(own) = &heir.inherits_from else {
+            return true;
+        };
+        let mut service = heir;
+        for _ in 0..LONGEST_LINEAGE {
+            let Some(base) = &service.inherits_from else {
+                return true;
             };
-            if !visited.insert(&base.id) {
-                self.report.error(
-                    base.span,
-                    format!("`{}` inherits from itself: break the circle", service.id),
-                );
+            if base.id == heir.id {
+                let message = format!("`{}` inherits from itself: break the circle", heir.id);
+                self.report.error(own.span, message);
                 return false;
             }
-            service = &self.program.services[index];
+            let Some(position) = self.index.services.first(&base.id) else {
+                self.missing_base(heir, own, service, base);
+                return false;
+            };
+            service = &program.services[position];
         }
-        true
+        self.report.error(
+            own.span,
+            format!("`{}` is left out: it inherits from more than {LONGEST_LINEAGE} services, or from a circle of them", heir.id),
+        );
+        false
     }
 
     /// Each service that is left out says why, at its own `inherits_from`.
-    fn missing_base(&mut self, heir: &ServiceDef, service: &ServiceDef, base: &SetRef) {
-        let own = heir.inherits_from.as_ref().map_or(heir.span, |r| r.span);
+    fn missing_base(
+        &mut self,
+        heir: &ServiceDef,
+        own: &SetRef,
+        service: &ServiceDef,
+        base: &SetRef,
+    ) {
         let message = if self.program.lost_services.contains(&base.id) {
             format!(
                 "`{}` is left out: it inherits from `{}`, which has errors",
                 heir.id, base.id
             )
         } else if heir.id == service.id {
-            let versions = self.index.versions_of_service(&base.id.urn);
-            let advice = match versions.as_slice() {
-                [] => "load the file that declares it as well".to_owned(),
-                some => format!("of that service only version {} is loaded", some.join(", ")),
-            };
+            let advice = self.index.services.advice(&base.id);
             format!(
                 "the service `{}` to inherit from is not loaded: {advice}",
                 base.id
@@ -179,6 +200,6 @@ impl Resolver<'_> {
                 heir.id, service.id, base.id
             )
         };
-        self.report.error(own, message);
+        self.report.error(own.span, message);
     }
 }

@@ -10,11 +10,18 @@ const DEEPEST: usize = 100;
 /// Attributes of one tag; the language knows at most seven.
 const MOST_ATTRIBUTES: usize = 50;
 
+/// Namespace declarations in a text: the parser copies those of an element to its children.
+const MOST_NAMESPACES: usize = 10_000;
+
 /// Says where a text exceeds what a definition can need, and what it exceeds.
 pub(super) fn excess(text: &str) -> Option<(usize, String)> {
     if text.len() as u64 > LARGEST {
         let message = format!("the text is larger than {} MiB", LARGEST >> 20);
         return Some((0, message));
+    }
+    if let Some((at, _)) = text.match_indices("xmlns").nth(MOST_NAMESPACES) {
+        let message = format!("there are more than {MOST_NAMESPACES} namespace declarations");
+        return Some((at, message));
     }
     let mut depth = 0_usize;
     let mut at = 0;

@@ -10,6 +10,8 @@ mod limits;
 mod message;
 mod root;
 
+use std::collections::HashSet;
+
 use crate::expr::Expression;
 use crate::model::{GroupKind, Id, Number, Rounding, Unsigned};
 use crate::source::{Span, Spanned};
@@ -24,7 +26,7 @@ pub(crate) struct Program {
     pub(crate) type_sets: Vec<TypeSet>,
     pub(crate) const_sets: Vec<ConstSet>,
     /// Services that could not be kept; the mistakes have been reported.
-    pub(crate) lost_services: Vec<Id>,
+    pub(crate) lost_services: HashSet<Id>,
 }
 
 /// Index of a type set in [`Program::type_sets`].

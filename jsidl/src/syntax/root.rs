@@ -9,6 +9,9 @@ use super::{ConstDef, ConstSet, Construct, Declaration, Program, ServiceDef, Set
 use crate::diagnostic::Report;
 use crate::source::{Source, Span};
 
+/// Sets that one set may refer to; published ones refer to at most 10.
+const MOST_REFERENCES: usize = 200;
+
 impl TypeSet {
     fn empty(span: Span) -> Self {
         Self {
@@ -92,6 +95,14 @@ fn malformed_at(source: &Source, error: &roxmltree::Error) -> Span {
     source.span(line + within)
 }
 
+/// What a file may declare.
+const ROOTS: [&str; 4] = [
+    "service_def",
+    "declared_type_set",
+    "declared_const_set",
+    "service_set",
+];
+
 const TYPE_SET: DeclarationPlace = DeclarationPlace {
     parent: "declared_type_set",
     admits: |_| true,
@@ -151,16 +162,20 @@ impl Reader<'_> {
     fn stranger(&mut self, xml: Xml<'_, '_>, strictness: Strictness) {
         let at = self.span(xml);
         let name = xml.tag_name().name();
-        match strictness {
-            Strictness::Found if belongs(xml) == Belongs::Foreign => {
-                let message = format!("passed over: `{name}` is not the root of a JSIDL file");
-                self.report.warning(at, message);
-            }
-            _ => {
-                self.report.error(at, format!(
-                    "`{name}` is not the root of a JSIDL file: expected `service_def`, `declared_type_set`, `declared_const_set` or `service_set` in the namespace `urn:jaus:jsidl:1.0` or `urn:jaus:jsidl:1.1`"
-                ));
-            }
+        let foreign = belongs(xml) == Belongs::Foreign;
+        if foreign && ROOTS.contains(&name) {
+            let message = format!(
+                "`{name}` is not in the namespace of JSIDL: add `xmlns=\"urn:jaus:jsidl:1.1\"`"
+            );
+            self.report.error(at, message);
+        } else if foreign && strictness == Strictness::Found {
+            let message = format!("passed over: `{name}` is not the root of a JSIDL file");
+            self.report.warning(at, message);
+        } else {
+            let roots = ROOTS.join("`, `");
+            let message =
+                format!("`{name}` is not the root of a JSIDL file: expected one of `{roots}`");
+            self.report.error(at, message);
         }
     }
 
@@ -299,14 +314,38 @@ impl Reader<'_> {
         })
     }
 
+    /// Adds a reference to another set, under an alias of its own.
+    fn another(&mut self, xml: Xml<'_, '_>, references: &mut Vec<SetRef>) {
+        let at = self.span(xml);
+        if references.len() >= MOST_REFERENCES {
+            let message = format!("a set may refer to {MOST_REFERENCES} other sets: split it");
+            self.report.error(at, message);
+            return;
+        }
+        let Some(reference) = self.set_ref(xml) else {
+            return;
+        };
+        if let Some(first) = references.iter().find(|r| r.name == reference.name) {
+            let message = format!(
+                "there are two sets with the alias `{}`: rename one",
+                first.name
+            );
+            self.report
+                .error(at, message)
+                .note(first.span, "the other one");
+        } else {
+            references.push(reference);
+        }
+    }
+
     fn type_set(&mut self, xml: Xml<'_, '_>) -> Option<TypeSet> {
         self.only(xml, &["name", "id", "version", "interpretation"]);
         let name = self.name(xml);
         let mut set = TypeSet::empty(self.span(xml));
         for child in self.children(xml) {
             match child.tag_name().name() {
-                "declared_type_set_ref" => set.type_sets.extend(self.set_ref(child)),
-                "declared_const_set_ref" => set.const_sets.extend(self.set_ref(child)),
+                "declared_type_set_ref" => self.another(child, &mut set.type_sets),
+                "declared_const_set_ref" => self.another(child, &mut set.const_sets),
                 _ => set.declarations.extend(self.declaration(child, &TYPE_SET)),
             }
         }
@@ -320,7 +359,7 @@ impl Reader<'_> {
         let mut definitions = Vec::new();
         for child in self.children(xml) {
             match child.tag_name().name() {
-                "declared_const_set_ref" => const_sets.extend(self.set_ref(child)),
+                "declared_const_set_ref" => self.another(child, &mut const_sets),
                 "const_def" => definitions.extend(self.const_def(child)),
                 _ => self.misplaced(child, "declared_const_set", "`const_def`s"),
             }
