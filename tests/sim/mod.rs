@@ -1,0 +1,415 @@
+//! A network in memory: endpoints, virtual time, and a seeded wire that delays, loses, repeats and reorders.
+//!
+//! Used by several test binaries (`mod sim;`). Each node is an [`Endpoint`] with an [`Owner`] that takes its events:
+//! [`Mailbox`] keeps them for the test to look at, and whoever builds on the endpoint (a service, a component) puts
+//! its own state machine there. Nothing waits for real time, and the same seed gives the same run.
+
+#![allow(
+    clippy::panic,
+    dead_code,
+    unreachable_pub,
+    reason = "each test binary uses its own part"
+)]
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashSet};
+use std::net::SocketAddr;
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use jaus::endpoint::{
+    Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, SendError, To,
+};
+use jaus::wire::judp;
+
+/// The only link of each node.
+pub const WIRE: LinkId = LinkId(0);
+
+/// What takes the events of a simulated node, and may wake up and send by itself.
+pub trait Owner {
+    /// Takes an event; may send through the endpoint at once.
+    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: Event);
+
+    /// Tells that the time that [`poll_timeout`](Self::poll_timeout) asked for has come.
+    fn handle_timeout(&mut self, _now: Instant, _endpoint: &mut Endpoint) {}
+
+    /// When to be woken.
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
+    }
+}
+
+/// An owner that keeps what it gets.
+#[derive(Debug, Default)]
+pub struct Mailbox {
+    /// The events, with their times, oldest first.
+    pub events: Vec<(Instant, Event)>,
+}
+
+impl Owner for Mailbox {
+    fn handle_event(&mut self, now: Instant, _endpoint: &mut Endpoint, event: Event) {
+        self.events.push((now, event));
+    }
+}
+
+impl Mailbox {
+    /// Takes out the messages, and leaves the news.
+    pub fn take_messages(&mut self) -> Vec<Received> {
+        let messages = self
+            .events
+            .extract_if(.., |(_, event)| matches!(event, Event::Received(_)));
+        let message = |(_, event)| match event {
+            Event::Received(received) => Some(received),
+            _ => None,
+        };
+        messages.filter_map(message).collect()
+    }
+
+    /// Takes out the news, and leaves the messages.
+    pub fn take_news(&mut self) -> Vec<Event> {
+        let news = self
+            .events
+            .extract_if(.., |(_, event)| !matches!(event, Event::Received(_)));
+        news.map(|(_, event)| event).collect()
+    }
+}
+
+/// How well the wire works.
+#[derive(Clone, Debug)]
+pub struct Conditions {
+    /// How long a datagram travels; the spread is what reorders them.
+    pub latency: Range<Duration>,
+    /// How many of 1000 copies are lost.
+    pub lost: u32,
+    /// How many of 1000 copies arrive twice.
+    pub repeated: u32,
+}
+
+impl Conditions {
+    /// A quiet switch: 100 µs, nothing lost.
+    pub fn good() -> Self {
+        let latency = Duration::from_micros(100)..Duration::from_micros(101);
+        Self {
+            latency,
+            lost: 0,
+            repeated: 0,
+        }
+    }
+
+    /// A poor radio: 1 to 30 ms, one copy of ten lost, one of twenty repeated.
+    pub fn poor() -> Self {
+        let latency = Duration::from_millis(1)..Duration::from_millis(30);
+        Self {
+            latency,
+            lost: 100,
+            repeated: 50,
+        }
+    }
+}
+
+/// Names a node of the network, in order of joining.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Host(pub usize);
+
+struct Node<O> {
+    endpoint: Endpoint,
+    owner: O,
+    address: SocketAddr,
+    up: bool,
+}
+
+/// A datagram on its way. Ordered by arrival, then by departure.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Flight {
+    arrival: Instant,
+    number: u64,
+    to: usize,
+    from: SocketAddr,
+    datagram: Bytes,
+}
+
+/// The network. See the [module](self).
+pub struct Network<O = Mailbox> {
+    now: Instant,
+    conditions: Conditions,
+    random: Random,
+    nodes: Vec<Node<O>>,
+    flights: BinaryHeap<Reverse<Flight>>,
+    cut: HashSet<(usize, usize)>,
+    launched: u64,
+    carried: u64,
+    multicast: u64,
+}
+
+impl<O: Owner> Network<O> {
+    /// A network without nodes. The seed decides about every loss and delay.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "an arbitrary beginning of virtual time"
+    )]
+    pub fn new(seed: u64, conditions: Conditions) -> Self {
+        Self {
+            now: Instant::now(),
+            conditions,
+            random: Random(seed),
+            nodes: Vec::new(),
+            flights: BinaryHeap::new(),
+            cut: HashSet::new(),
+            launched: 0,
+            carried: 0,
+            multicast: 0,
+        }
+    }
+
+    /// Puts a node on the wire, at 10.0.0.n:3794.
+    pub fn join(&mut self, mut endpoint: Endpoint, owner: O) -> Host {
+        let host = self.nodes.len();
+        let address = SocketAddr::from(([10, 0, 0, host as u8 + 1], judp::PORT));
+        endpoint.add_link(WIRE, [address]);
+        self.nodes.push(Node {
+            endpoint,
+            owner,
+            address,
+            up: true,
+        });
+        Host(host)
+    }
+
+    /// Replaces a node by a new one at the same address, as after a crash and a restart.
+    pub fn restart(&mut self, host: Host, mut endpoint: Endpoint, owner: O) {
+        let address = self.nodes[host.0].address;
+        endpoint.add_link(WIRE, [address]);
+        self.nodes[host.0] = Node {
+            endpoint,
+            owner,
+            address,
+            up: true,
+        };
+    }
+
+    /// Lets a node die: it neither hears nor says anything.
+    pub fn kill(&mut self, host: Host) {
+        self.nodes[host.0].up = false;
+    }
+
+    /// Cuts or joins the wire between two nodes.
+    pub fn set_cut(&mut self, one: Host, other: Host, cut: bool) {
+        for pair in [(one.0, other.0), (other.0, one.0)] {
+            if cut {
+                self.cut.insert(pair);
+            } else {
+                self.cut.remove(&pair);
+            }
+        }
+    }
+
+    /// Makes the wire better or worse from now on.
+    pub fn set_conditions(&mut self, conditions: Conditions) {
+        self.conditions = conditions;
+    }
+
+    /// The virtual time.
+    pub fn now(&self) -> Instant {
+        self.now
+    }
+
+    /// A node's endpoint.
+    pub fn endpoint(&mut self, host: Host) -> &mut Endpoint {
+        &mut self.nodes[host.0].endpoint
+    }
+
+    /// A node's owner.
+    pub fn owner(&mut self, host: Host) -> &mut O {
+        &mut self.nodes[host.0].owner
+    }
+
+    /// The address of a node.
+    pub fn address(&self, host: Host) -> SocketAddr {
+        self.nodes[host.0].address
+    }
+
+    /// How many datagrams were put on the wire; a multicast counts once.
+    pub fn carried(&self) -> u64 {
+        self.carried
+    }
+
+    /// How many of them went to the group.
+    pub fn multicast(&self) -> u64 {
+        self.multicast
+    }
+
+    /// Sends a message from a node, and puts it on the wire.
+    pub fn send(&mut self, host: Host, message: Outgoing) -> Result<MessageHandle, SendError> {
+        let handle = self.nodes[host.0].endpoint.send(self.now, message);
+        self.settle(host.0);
+        handle
+    }
+
+    /// Lets a node's owner do something with its endpoint, and puts the outcome on the wire.
+    pub fn act<T>(
+        &mut self,
+        host: Host,
+        act: impl FnOnce(Instant, &mut O, &mut Endpoint) -> T,
+    ) -> T {
+        let node = &mut self.nodes[host.0];
+        let result = act(self.now, &mut node.owner, &mut node.endpoint);
+        self.settle(host.0);
+        result
+    }
+
+    /// Lets `time` pass.
+    pub fn run_for(&mut self, time: Duration) {
+        let end = self.now + time;
+        while self.next_time().is_some_and(|next| next <= end) {
+            self.step();
+        }
+        self.now = end;
+    }
+
+    /// Goes on until nothing is left to happen.
+    ///
+    /// # Panics
+    /// After 100 000 steps: then nodes keep each other awake for ever.
+    pub fn run_until_idle(&mut self) {
+        for _step in 0..100_000 {
+            if !self.step() {
+                return;
+            }
+        }
+        panic!("the network does not come to rest");
+    }
+
+    /// Goes to the next time at which something happens, and lets it happen. False if nothing is left.
+    pub fn step(&mut self) -> bool {
+        let Some(next) = self.next_time() else {
+            return false;
+        };
+        self.now = self.now.max(next);
+        while self
+            .flights
+            .peek()
+            .is_some_and(|Reverse(flight)| flight.arrival <= self.now)
+        {
+            let Some(Reverse(flight)) = self.flights.pop() else {
+                break;
+            };
+            self.arrive(flight);
+        }
+        for host in 0..self.nodes.len() {
+            self.wake(host);
+        }
+        true
+    }
+
+    fn next_time(&self) -> Option<Instant> {
+        let arrival = self.flights.peek().map(|Reverse(flight)| flight.arrival);
+        let alarms = self.nodes.iter().filter(|node| node.up);
+        let alarms =
+            alarms.flat_map(|node| [node.endpoint.poll_timeout(), node.owner.poll_timeout()]);
+        alarms.chain([arrival]).flatten().min()
+    }
+
+    fn arrive(&mut self, flight: Flight) {
+        let node = &mut self.nodes[flight.to];
+        if node.up {
+            let path = Path {
+                link: WIRE,
+                peer: flight.from,
+            };
+            node.endpoint
+                .handle_datagram(self.now, path, flight.datagram);
+            self.settle(flight.to);
+        }
+    }
+
+    fn wake(&mut self, host: usize) {
+        let (now, node) = (self.now, &mut self.nodes[host]);
+        let due = |timeout: Option<Instant>| timeout.is_some_and(|timeout| timeout <= now);
+        if !node.up || !(due(node.endpoint.poll_timeout()) || due(node.owner.poll_timeout())) {
+            return;
+        }
+        node.endpoint.handle_timeout(now);
+        if due(node.owner.poll_timeout()) {
+            node.owner.handle_timeout(now, &mut node.endpoint);
+        }
+        self.settle(host);
+    }
+
+    /// Hands events to the owner and datagrams to the wire until the node wants no more.
+    fn settle(&mut self, host: usize) {
+        loop {
+            let node = &mut self.nodes[host];
+            if let Some(transmit) = node.endpoint.poll_transmit() {
+                self.carry(host, transmit.to, &transmit.payload);
+            } else if let Some(event) = node.endpoint.poll_event() {
+                node.owner.handle_event(self.now, &mut node.endpoint, event);
+            } else {
+                return;
+            }
+        }
+    }
+
+    /// Puts a datagram on the wire. The group is everybody, the sender included.
+    fn carry(&mut self, from: usize, to: To, datagram: &Bytes) {
+        if !self.nodes[from].up {
+            return;
+        }
+        self.carried += 1;
+        self.multicast += u64::from(to == To::Group);
+        for host in 0..self.nodes.len() {
+            let meant = match to {
+                To::Group => true,
+                To::Peer(address) => self.nodes[host].address == address,
+            };
+            if meant && !self.cut.contains(&(from, host)) {
+                self.launch(from, host, datagram);
+            }
+        }
+    }
+
+    fn launch(&mut self, from: usize, to: usize, datagram: &Bytes) {
+        if self.random.happens(self.conditions.lost) {
+            return;
+        }
+        let copies = if self.random.happens(self.conditions.repeated) {
+            2
+        } else {
+            1
+        };
+        for _copy in 0..copies {
+            let arrival = self.now + self.random.between(&self.conditions.latency);
+            self.launched += 1;
+            let (number, from, datagram) =
+                (self.launched, self.nodes[from].address, datagram.clone());
+            self.flights.push(Reverse(Flight {
+                arrival,
+                number,
+                to,
+                from,
+                datagram,
+            }));
+        }
+    }
+}
+
+/// A small generator of numbers that look random (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    fn happens(&mut self, of_1000: u32) -> bool {
+        self.next() % 1000 < u64::from(of_1000)
+    }
+
+    fn between(&mut self, range: &Range<Duration>) -> Duration {
+        let spread = (range.end - range.start).as_nanos().max(1) as u64;
+        range.start + Duration::from_nanos(self.next() % spread)
+    }
+}
