@@ -22,6 +22,7 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::Outgoing;
 use jaus::node::{Config, Node};
+use jaus::wire::Priority;
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(30);
@@ -130,9 +131,13 @@ fn on_two_hosts(test: &str, body: impl FnOnce(&TwoHosts)) {
         );
         return;
     }
-    // Past the test harness, which would keep the words of a test that passes.
+    say_skipped(test, &format!("no network namespaces here: {reason}"));
+}
+
+/// Says it past the test harness, which would keep the words of a test that passes.
+fn say_skipped(test: &str, reason: &str) {
     let words = format!(
-        "\n*** SKIPPED {test}: no network namespaces here ({reason}).\n\
+        "\n*** SKIPPED {test}: {reason}\n\
          *** To run it: as root, with iproute2 installed.\n\n"
     );
     std::io::stderr().write_all(words.as_bytes()).unwrap();
@@ -150,10 +155,12 @@ fn in_user_namespace(command: &[&str]) -> Command {
 }
 
 fn ip(arguments: &[&str]) -> Result<(), String> {
-    let output = Command::new("ip")
-        .args(arguments)
-        .output()
-        .map_err(|e| format!("ip: {e}"))?;
+    run("ip", arguments)
+}
+
+fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
+    let output = Command::new(program).args(arguments).output();
+    let output = output.map_err(|e| format!("{program}: {e}"))?;
     let said = String::from_utf8_lossy(&output.stderr);
     if output.status.success() {
         Ok(())
@@ -230,6 +237,37 @@ fn an_interface_that_comes_up_later_is_used_and_again_after_it_was_down() {
     );
 }
 
+#[test]
+fn an_urgent_message_overtakes_what_a_slow_network_holds_back() {
+    on_two_hosts(
+        "an_urgent_message_overtakes_what_a_slow_network_holds_back",
+        |hosts| {
+            let slow = ["qdisc", "add", "dev", "jaus0", "root", "tbf"];
+            let slow = [
+                &slow[..],
+                &["rate", "20mbit", "burst", "4kb", "latency", "10s"],
+            ]
+            .concat();
+            let network = &hosts.names[1];
+            if let Err(reason) = run(
+                "ip",
+                &[&["netns", "exec", network, "tc"], &slow[..]].concat(),
+            ) {
+                return say_skipped("an_urgent_message_overtakes_…", &reason);
+            }
+            let sink = hosts.start(0, "sink");
+            sink.says("listening on");
+            let _flood = hosts.start(1, "flood");
+            let before: usize = sink.says("urgent message after").parse().unwrap();
+            assert!(
+                before < FLOOD / 2,
+                "the urgent message came after {before} of {FLOOD}"
+            );
+            assert_eq!(sink.says("all").parse(), Ok(FLOOD));
+        },
+    );
+}
+
 /// Not a test of its own: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
@@ -245,6 +283,8 @@ fn a_process_that_plays_a_node() {
         match role.as_str() {
             "echo" => echo().await,
             "caller" => call().await,
+            "sink" => sink().await,
+            "flood" => flood().await,
             other => panic!("unknown role {other}"),
         }
     };
@@ -281,4 +321,45 @@ async fn call() {
         answer.path.unwrap().peer
     );
     node.shutdown().await;
+}
+
+/// Messages that the flood is made of.
+const FLOOD: usize = 2000;
+
+/// Counts what comes, and says when the urgent message came.
+async fn sink() {
+    let node = Node::start(Config::new(101, 1)).unwrap();
+    let mut port = node.attach(33).unwrap();
+    println!("\nlistening on {}", node.links()[0].local);
+    let mut usual = 0;
+    let mut urgent = false;
+    while usual < FLOOD || !urgent {
+        let message = port.recv().await.unwrap();
+        if message.priority == Priority::SafetyCritical {
+            urgent = true;
+            println!("urgent message after {usual}");
+        } else {
+            usual += 1;
+        }
+    }
+    println!("all {usual}");
+    std::future::pending::<()>().await;
+}
+
+/// Sends far more than the network takes, and then something urgent.
+async fn flood() {
+    let node = Node::start(Config::new(102, 1)).unwrap();
+    let port = node.attach(1).unwrap();
+    let picture = Bytes::from(vec![0; 1400]);
+    let usual = Outgoing::new(port.id(), JausId::EVERYONE, picture);
+    let set_emergency = Bytes::from_static(&[0x06, 0x00, 0x01]);
+    let urgent = Outgoing {
+        priority: Priority::SafetyCritical,
+        ..Outgoing::new(port.id(), JausId::EVERYONE, set_emergency)
+    };
+    for _ in 0..FLOOD {
+        port.send(usual.clone()).unwrap();
+    }
+    port.send(urgent).unwrap();
+    std::future::pending::<()>().await;
 }

@@ -15,6 +15,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use jaus::link::udp::{PortTaken, Settings, UdpLink};
 use jaus::link::{Error, Group, Interface, Interfaces, Slab};
+use jaus::wire::Priority;
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);
@@ -53,11 +54,11 @@ async fn links_of_one_host_hear_each_other_by_multicast_and_answer_by_unicast() 
     let mut b = UdpLink::open(&loopback(), &settings).unwrap();
     let mut c = UdpLink::open(&loopback(), &settings).unwrap();
 
-    a.send_to_group(&Bytes::from_static(b"who is there?"));
+    a.send_to_group(Priority::Standard, &Bytes::from_static(b"who is there?"));
     for other in [&mut b, &mut c] {
         let (from, datagram) = receive(other).await;
         assert_eq!((from, &datagram[..]), (a.local(), &b"who is there?"[..]));
-        other.send_to(from, &Bytes::from_static(b"me"));
+        other.send_to(from, Priority::Standard, &Bytes::from_static(b"me"));
     }
     let mut answers = [receive(&mut a).await.0, receive(&mut a).await.0];
     answers.sort();
@@ -72,8 +73,8 @@ async fn a_link_does_not_hear_itself() {
     let mut a = UdpLink::open(&loopback(), &settings).unwrap();
     let mut b = UdpLink::open(&loopback(), &settings).unwrap();
 
-    a.send_to_group(&Bytes::from_static(b"from a"));
-    b.send_to_group(&Bytes::from_static(b"from b"));
+    a.send_to_group(Priority::Standard, &Bytes::from_static(b"from a"));
+    b.send_to_group(Priority::Standard, &Bytes::from_static(b"from b"));
 
     assert_eq!(receive(&mut a).await.0, b.local());
     assert_eq!(receive(&mut b).await.0, a.local());
@@ -86,8 +87,8 @@ async fn a_link_does_not_hear_itself() {
 async fn groups_with_other_ports_are_not_heard() {
     let mut a = UdpLink::open(&loopback(), &settings()).unwrap();
     let mut stranger = UdpLink::open(&loopback(), &settings()).unwrap();
-    stranger.send_to_group(&Bytes::from_static(b"not for a"));
-    stranger.send_to(a.local(), &Bytes::from_static(b"for a"));
+    stranger.send_to_group(Priority::Standard, &Bytes::from_static(b"not for a"));
+    stranger.send_to(a.local(), Priority::Standard, &Bytes::from_static(b"for a"));
     assert_eq!(receive(&mut a).await.1, &b"for a"[..]);
 }
 
@@ -103,7 +104,7 @@ async fn configured_peers_get_a_copy_of_what_goes_to_the_group() {
     .unwrap();
     let mut a = UdpLink::open(&loopback(), &settings()).unwrap();
     a.set_peers(vec![deaf.local()]);
-    a.send_to_group(&Bytes::from_static(b"hello"));
+    a.send_to_group(Priority::Standard, &Bytes::from_static(b"hello"));
     assert_eq!(
         receive(&mut deaf).await,
         (a.local(), Bytes::from_static(b"hello"))
@@ -117,11 +118,15 @@ async fn a_peer_that_is_gone_does_not_end_the_link() {
     let nobody = SocketAddr::from((Ipv4Addr::LOCALHOST, free_port()));
     let too_long = Bytes::from(vec![0; 70_000]);
     for _ in 0..3 {
-        a.send_to(nobody, &Bytes::from_static(b"anyone?"));
-        a.send_to(b.local(), &too_long);
+        a.send_to(nobody, Priority::Standard, &Bytes::from_static(b"anyone?"));
+        a.send_to(b.local(), Priority::Standard, &too_long);
     }
     assert_eq!(a.counters().send_errors, 3);
-    b.send_to(a.local(), &Bytes::from_static(b"still there"));
+    b.send_to(
+        a.local(),
+        Priority::Standard,
+        &Bytes::from_static(b"still there"),
+    );
     assert_eq!(receive(&mut a).await.1, &b"still there"[..]);
 }
 
@@ -130,7 +135,7 @@ async fn the_longest_datagram_arrives_whole() {
     let mut a = UdpLink::open(&loopback(), &settings()).unwrap();
     let mut b = UdpLink::open(&loopback(), &settings()).unwrap();
     let longest = Bytes::from(vec![7; 65_507]);
-    a.send_to(b.local(), &longest);
+    a.send_to(b.local(), Priority::Standard, &longest);
     assert_eq!(receive(&mut b).await.1, longest);
 }
 
@@ -175,9 +180,9 @@ async fn a_taken_port_is_replaced_by_a_free_one_when_that_is_wanted() {
     let mut second = UdpLink::open(&loopback(), &flexible).unwrap();
     assert_ne!(first.local(), second.local());
 
-    first.send_to_group(&Bytes::from_static(b"who is there?"));
+    first.send_to_group(Priority::Standard, &Bytes::from_static(b"who is there?"));
     let (peer, _) = receive(&mut second).await;
-    second.send_to(peer, &Bytes::from_static(b"me"));
+    second.send_to(peer, Priority::Standard, &Bytes::from_static(b"me"));
     assert_eq!(receive(&mut first).await.0, second.local());
 }
 

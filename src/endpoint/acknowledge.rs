@@ -155,9 +155,10 @@ impl Endpoint {
         let transmit = Transmit {
             link: from.link,
             to: To::Peer(from.peer),
+            priority: request.flags.priority(),
             payload,
         };
-        self.transmit(request.flags.priority(), transmit);
+        self.transmit(transmit);
         self.counters.add(Counter::AcknowledgementsSent);
     }
 

@@ -94,6 +94,8 @@ pub struct Transmit {
     pub link: LinkId,
     /// Whereto.
     pub to: To,
+    /// How urgent it is, should the link be slower than the endpoint.
+    pub priority: Priority,
     /// The datagram.
     pub payload: Bytes,
 }
@@ -234,8 +236,8 @@ impl Endpoint {
     }
 
     /// Queues a datagram; a full queue is counted.
-    fn transmit(&mut self, priority: Priority, transmit: Transmit) {
-        if self.transmits.push(priority, transmit).is_err() {
+    fn transmit(&mut self, transmit: Transmit) {
+        if self.transmits.push(transmit.priority, transmit).is_err() {
             self.counters.add(Counter::TransmitQueueFull);
         }
     }

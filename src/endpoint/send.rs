@@ -10,7 +10,7 @@ use super::{
     fragment,
 };
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, EncodeError, Flags, Frame, Version, judp};
+use crate::wire::{Acknowledgement, Broadcast, EncodeError, Flags, Frame, Priority, Version, judp};
 
 /// Why a message cannot be sent. Nothing of it was.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -245,7 +245,7 @@ impl Endpoint {
                 .insert(now, self.sent_to_group.fingerprint(frame));
         }
         for transmit in transmits {
-            self.transmit(frame.flags.priority(), transmit);
+            self.transmit(transmit);
         }
     }
 
@@ -268,33 +268,37 @@ impl Endpoint {
                 ..frame.clone()
             });
         };
+        let priority = frame.flags.priority();
         let payload = judp::encode(&Frame {
             version,
             ..frame.clone()
         })?;
-        Ok(vec![to_path(path, payload)])
+        Ok(vec![to_path(path, priority, payload)])
     }
 
     /// A frame for the group of every link and for the static peers that multicast does not reach.
     fn to_group(&self, frame: &Frame) -> Result<Vec<Transmit>, SendError> {
+        let priority = frame.flags.priority();
         let payload = judp::encode(frame)?;
         let group = |&link: &LinkId| Transmit {
             link,
             to: To::Group,
+            priority,
             payload: payload.clone(),
         };
         let copies = self.peers.broadcast_copies(frame.destination);
         let copies = copies
             .into_iter()
-            .map(|path| to_path(path, payload.clone()));
+            .map(|path| to_path(path, priority, payload.clone()));
         Ok(self.links.keys().map(group).chain(copies).collect())
     }
 }
 
-fn to_path(path: Path, payload: Bytes) -> Transmit {
+fn to_path(path: Path, priority: Priority, payload: Bytes) -> Transmit {
     Transmit {
         link: path.link,
         to: To::Peer(path.peer),
+        priority,
         payload,
     }
 }

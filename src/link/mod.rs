@@ -23,6 +23,7 @@
 //! room for either socket: one of the two has to move.
 #![expect(clippy::disallowed_types, reason = "this is where sockets live")]
 
+pub(crate) mod backlog;
 mod error;
 mod group;
 mod holder;

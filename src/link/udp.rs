@@ -4,7 +4,6 @@
 //! answer, a full network queue, a route that is missing just now) are counted and traced and
 //! never end the link.
 
-use std::collections::VecDeque;
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::task::{Context, Poll, ready};
@@ -13,8 +12,10 @@ use bytes::Bytes;
 use socket2::{Domain, InterfaceIndexOrAddress, Protocol, SockRef, Socket, Type};
 use tokio::net::UdpSocket;
 
+use super::backlog::{Backlog, Bounds};
 use super::group::{Group, STANDARD_PORT};
 use super::{Error, Holder, Interface, Slab};
+use crate::wire::Priority;
 
 /// What to do when another socket has the unicast address and port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -78,8 +79,11 @@ pub struct Counters {
     pub send_overflows: u64,
 }
 
-/// How many datagrams wait in the link while the kernel's send buffer is full.
-const OUTBOX: usize = 256;
+/// What waits in a link while the kernel's send buffer is full.
+const OUTBOX: Bounds = Bounds {
+    items: 2048,
+    octets: 4 << 20,
+};
 
 /// The sockets of one interface. Must be opened within a tokio runtime.
 #[derive(Debug)]
@@ -89,7 +93,7 @@ pub struct UdpLink {
     unicast: UdpSocket,
     group: Option<GroupSocket>,
     peers: Vec<SocketAddr>,
-    outbox: VecDeque<(SocketAddr, Bytes)>,
+    outbox: Backlog<(SocketAddr, Bytes)>,
     group_first: bool,
     last_error: Option<io::ErrorKind>,
     counters: Counters,
@@ -126,7 +130,7 @@ impl UdpLink {
             unicast,
             group,
             peers: Vec::new(),
-            outbox: VecDeque::new(),
+            outbox: Backlog::new(OUTBOX),
             group_first: false,
             last_error: None,
             counters: Counters::default(),
@@ -163,34 +167,35 @@ impl UdpLink {
         self.peers = peers;
     }
 
-    /// Sends a datagram to one peer.
-    pub fn send_to(&mut self, peer: SocketAddr, datagram: &Bytes) {
+    /// Sends a datagram to one peer. If the network takes nothing just now, the urgent go first
+    /// when it does again.
+    pub fn send_to(&mut self, peer: SocketAddr, priority: Priority, datagram: &Bytes) {
         // Straight to the socket: the runtime learns that a new socket can send only later.
         let straight = |socket: &UdpSocket| SockRef::from(socket).send_to(datagram, &peer.into());
         if !self.outbox.is_empty() || !self.try_send(peer, straight) {
-            self.enqueue(peer, datagram);
+            let waiting = (peer, datagram.clone());
+            self.counters.send_overflows += self.outbox.push(priority, datagram.len(), waiting);
         }
     }
 
-    /// Sends a datagram to the group, and a copy to each configured peer.
-    pub fn send_to_group(&mut self, datagram: &Bytes) {
+    /// Sends a datagram to the group, and a copy to each peer of [`set_peers`](Self::set_peers).
+    pub fn send_to_group(&mut self, priority: Priority, datagram: &Bytes) {
         if let Some(group) = self.group() {
-            self.send_to(group, datagram);
+            self.send_to(group, priority, datagram);
         }
         for i in 0..self.peers.len() {
-            self.send_to(self.peers[i], datagram);
+            self.send_to(self.peers[i], priority, datagram);
         }
     }
 
-    /// Sends what waits for the kernel; ready when nothing waits.
+    /// Sends what waits for the network; ready when nothing waits.
     pub fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<()> {
-        while let Some((peer, datagram)) = self.outbox.pop_front() {
+        while let Some((peer, datagram)) = self.outbox.first().cloned() {
             if self.try_send(peer, |socket| socket.try_send_to(&datagram, peer)) {
-                continue;
-            }
-            self.outbox.push_front((peer, datagram));
-            if ready!(self.unicast.poll_send_ready(cx)).is_err() {
-                self.outbox.clear();
+                self.outbox.pop();
+            } else if ready!(self.unicast.poll_send_ready(cx)).is_err() {
+                // The runtime is shutting down.
+                return Poll::Ready(());
             }
         }
         Poll::Ready(())
@@ -240,6 +245,9 @@ impl UdpLink {
                 Err(e) => {
                     self.counters.receive_errors += 1;
                     self.report("receiving", None, &e);
+                    // Again soon, but not at the cost of everybody else.
+                    cx.waker().wake_by_ref();
+                    return Poll::Pending;
                 }
             }
         }
@@ -266,14 +274,6 @@ impl UdpLink {
                     return true;
                 }
             }
-        }
-    }
-
-    fn enqueue(&mut self, peer: SocketAddr, datagram: &Bytes) {
-        if self.outbox.len() < OUTBOX {
-            self.outbox.push_back((peer, datagram.clone()));
-        } else {
-            self.counters.send_overflows += 1;
         }
     }
 

@@ -214,8 +214,8 @@ impl Core {
             return;
         };
         match transmit.to {
-            To::Peer(peer) => link.send_to(peer, &transmit.payload),
-            To::Group => link.send_to_group(&transmit.payload),
+            To::Peer(peer) => link.send_to(peer, transmit.priority, &transmit.payload),
+            To::Group => link.send_to_group(transmit.priority, &transmit.payload),
         }
     }
 

@@ -4,12 +4,11 @@
 //! the oldest message of the least urgent priority present**, and if all that wait are more
 //! urgent than the new message, the new one. Every drop is counted.
 
-use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
 use crate::endpoint::Received;
-use crate::wire::Priority;
+use crate::link::backlog::{Backlog, Bounds};
 
 /// How much a mailbox holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,16 +46,12 @@ pub struct MailboxCounters {
 /// One writer (the node), one reader (the component's port).
 #[derive(Debug)]
 pub(super) struct Mailbox {
-    limits: MailboxLimits,
     inner: Mutex<Inner>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Inner {
-    /// By priority, low first.
-    queues: [VecDeque<Received>; Priority::ALL.len()],
-    waiting: usize,
-    octets: usize,
+    messages: Backlog<Received>,
     delivered: u64,
     dropped: u64,
     closed: bool,
@@ -65,28 +60,34 @@ struct Inner {
 
 impl Mailbox {
     pub(super) fn new(limits: MailboxLimits) -> Self {
+        let bounds = Bounds {
+            items: limits.messages,
+            octets: limits.octets,
+        };
         Self {
-            limits,
-            inner: Mutex::default(),
+            inner: Mutex::new(Inner {
+                messages: Backlog::new(bounds),
+                delivered: 0,
+                dropped: 0,
+                closed: false,
+                reader: None,
+            }),
         }
     }
 
     pub(super) fn push(&self, message: Received) {
         let mut inner = self.lock();
         inner.delivered += 1;
-        inner.put(message);
-        while inner.waiting > self.limits.messages.max(1)
-            || (inner.octets > self.limits.octets && inner.waiting > 1)
-        {
-            inner.drop_least();
-        }
+        inner.dropped += inner
+            .messages
+            .push(message.priority, message.payload.len(), message);
         inner.wake();
     }
 
     /// The most urgent message, the oldest of these; `None` when the mailbox is closed and empty.
     pub(super) fn poll_pop(&self, cx: &mut Context<'_>) -> Poll<Option<Received>> {
         let mut inner = self.lock();
-        if let Some(message) = inner.pop() {
+        if let Some(message) = inner.messages.pop() {
             return Poll::Ready(Some(message));
         }
         if inner.closed {
@@ -97,7 +98,7 @@ impl Mailbox {
     }
 
     pub(super) fn pop(&self) -> Option<Received> {
-        self.lock().pop()
+        self.lock().messages.pop()
     }
 
     /// Nothing more will come; what waits can still be read.
@@ -112,7 +113,7 @@ impl Mailbox {
         MailboxCounters {
             delivered: inner.delivered,
             dropped: inner.dropped,
-            waiting: inner.waiting,
+            waiting: inner.messages.len(),
         }
     }
 
@@ -122,31 +123,6 @@ impl Mailbox {
 }
 
 impl Inner {
-    fn put(&mut self, message: Received) {
-        self.waiting += 1;
-        self.octets += message.payload.len();
-        self.queues[usize::from(message.priority.bits())].push_back(message);
-    }
-
-    fn pop(&mut self) -> Option<Received> {
-        let message = self.queues.iter_mut().rev().find_map(VecDeque::pop_front);
-        self.taken(message)
-    }
-
-    fn drop_least(&mut self) {
-        let message = self.queues.iter_mut().find_map(VecDeque::pop_front);
-        if self.taken(message).is_some() {
-            self.dropped += 1;
-        }
-    }
-
-    fn taken(&mut self, message: Option<Received>) -> Option<Received> {
-        let message = message?;
-        self.waiting -= 1;
-        self.octets -= message.payload.len();
-        Some(message)
-    }
-
     fn wake(&mut self) {
         if let Some(reader) = self.reader.take() {
             reader.wake();
@@ -160,76 +136,50 @@ mod tests {
 
     use super::*;
     use crate::address::JausId;
-    use crate::wire::Broadcast;
+    use crate::wire::{Broadcast, Priority};
 
-    fn message(priority: Priority, payload: &'static str) -> Received {
+    fn message(priority: Priority) -> Received {
         Received {
             source: JausId::new(1, 1, 1),
             destination: JausId::new(2, 1, 1),
             to: JausId::new(2, 1, 1),
             priority,
             broadcast: Broadcast::None,
-            payload: Bytes::from_static(payload.as_bytes()),
+            payload: Bytes::from_static(b"12345678"),
             path: None,
         }
     }
 
-    fn read(mailbox: &Mailbox) -> Vec<String> {
-        std::iter::from_fn(|| mailbox.pop())
-            .map(|m| String::from_utf8(m.payload.to_vec()).unwrap())
-            .collect()
-    }
-
-    fn mailbox(messages: usize, octets: usize) -> Mailbox {
-        Mailbox::new(MailboxLimits { messages, octets })
-    }
-
     #[test]
-    fn urgent_messages_are_read_first_and_equals_in_order() {
-        let mailbox = mailbox(10, 1000);
-        mailbox.push(message(Priority::Standard, "one"));
-        mailbox.push(message(Priority::Low, "later"));
-        mailbox.push(message(Priority::SafetyCritical, "stop"));
-        mailbox.push(message(Priority::Standard, "two"));
-        assert_eq!(read(&mailbox), ["stop", "one", "two", "later"]);
-    }
-
-    #[test]
-    fn a_full_mailbox_drops_the_oldest_of_the_least_urgent() {
-        let mailbox = mailbox(2, 1000);
-        mailbox.push(message(Priority::Standard, "one"));
-        mailbox.push(message(Priority::Standard, "two"));
-        mailbox.push(message(Priority::Standard, "three"));
-        mailbox.push(message(Priority::High, "four"));
-        mailbox.push(message(Priority::Low, "five"));
-        assert_eq!(
-            mailbox.counters(),
-            MailboxCounters {
-                delivered: 5,
-                dropped: 3,
-                waiting: 2
-            }
-        );
-        assert_eq!(read(&mailbox), ["four", "three"]);
-    }
-
-    #[test]
-    fn payloads_are_bounded_too_but_a_single_large_message_passes() {
-        let mailbox = mailbox(10, 8);
-        mailbox.push(message(Priority::Standard, "1234"));
-        mailbox.push(message(Priority::Standard, "5678"));
-        mailbox.push(message(Priority::Standard, "9"));
-        assert_eq!(read(&mailbox), ["5678", "9"]);
-        mailbox.push(message(Priority::Standard, "longer than eight"));
-        assert_eq!(read(&mailbox), ["longer than eight"]);
+    fn what_is_dropped_is_counted() {
+        let mailbox = Mailbox::new(MailboxLimits {
+            messages: 2,
+            octets: 1000,
+        });
+        for priority in [
+            Priority::Standard,
+            Priority::High,
+            Priority::Low,
+            Priority::High,
+        ] {
+            mailbox.push(message(priority));
+        }
+        let expected = MailboxCounters {
+            delivered: 4,
+            dropped: 2,
+            waiting: 2,
+        };
+        assert_eq!(mailbox.counters(), expected);
+        assert_eq!(mailbox.pop().map(|m| m.priority), Some(Priority::High));
+        assert_eq!(mailbox.pop().map(|m| m.priority), Some(Priority::High));
     }
 
     #[test]
     fn a_closed_mailbox_can_be_read_to_its_end() {
-        let mailbox = mailbox(10, 1000);
+        let mailbox = Mailbox::new(MailboxLimits::default());
         let mut cx = Context::from_waker(Waker::noop());
         assert!(mailbox.poll_pop(&mut cx).is_pending());
-        mailbox.push(message(Priority::Standard, "last"));
+        mailbox.push(message(Priority::Standard));
         mailbox.close();
         assert!(matches!(mailbox.poll_pop(&mut cx), Poll::Ready(Some(_))));
         assert!(matches!(mailbox.poll_pop(&mut cx), Poll::Ready(None)));
