@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::model::{Id, Message, Service};
+use crate::model::{Id, Message, Service, Version};
 
 /// Services by identity. Everything in it is resolved and checked.
 #[derive(Debug, Clone, Default)]
@@ -27,12 +27,34 @@ impl Library {
         self.services.values()
     }
 
+    /// All versions of a service, the oldest first.
+    pub fn versions(&self, urn: &str) -> impl Iterator<Item = &Arc<Service>> {
+        let first = Id {
+            urn: urn.into(),
+            version: Version { major: 0, minor: 0 },
+        };
+        let from_there = self.services.range(first..).map(|(_, service)| service);
+        from_there.take_while(move |service| &*service.id.urn == urn)
+    }
+
     /// A service and those it inherits from, the most derived first.
     pub fn lineage<'a>(&'a self, service: &'a Service) -> impl Iterator<Item = &'a Service> {
-        std::iter::successors(Some(service), |s| {
+        let chain = std::iter::successors(Some(service), |s| {
             let base = s.inherits_from.as_ref()?;
             self.services.get(&base.id).map(AsRef::as_ref)
-        })
+        });
+        // The loader lets no circle pass, but `insert` does not look.
+        chain.take(self.services.len() + 1)
+    }
+
+    /// All messages that a service takes part in, each with the service that declares it: its own,
+    /// then the inherited ones. A message in both sets of a service comes twice.
+    pub fn vocabulary<'a>(
+        &'a self,
+        service: &'a Service,
+    ) -> impl Iterator<Item = (&'a Service, &'a Arc<Message>)> {
+        self.lineage(service)
+            .flat_map(|declaring| declaring.messages().map(move |m| (declaring, m)))
     }
 
     /// Every declaration of a message code, with the service that declares it.

@@ -153,7 +153,7 @@ impl Resolver<'_> {
             return true;
         };
         let mut service = heir;
-        for _ in 0..LONGEST_LINEAGE {
+        for _ in 0..=LONGEST_LINEAGE {
             let Some(base) = &service.inherits_from else {
                 return true;
             };
