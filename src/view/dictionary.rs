@@ -9,17 +9,28 @@ use std::sync::Arc;
 use bytes::Bytes;
 use jsidl::model::{Message, Version};
 use jsidl::{Library, dynamic};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
 use super::{Line, Request};
+use crate::codec::view::Value;
+use crate::codec::{MessageInfo, ServiceId};
+use crate::messages;
 
 /// Message definitions by code and by name.
 ///
 /// Where several definitions share a code, they are tried in a stated order: those loaded at run
 /// time, then the generated ones; within each, newer versions first. The first that fits exactly
 /// is taken. [`prefer`](Self::prefer) settles the matter by naming a service.
-#[derive(Debug, Default)]
+///
+/// ```
+/// use jaus::view::Dictionary;
+///
+/// let dictionary = Dictionary::new();
+/// let reading = dictionary.read(&vec![0x00, 0x2B, 0x02].into());
+/// assert_eq!(reading.message, Some("QueryIdentification"));
+/// ```
+#[derive(Debug)]
 pub struct Dictionary {
     by_code: BTreeMap<u16, Vec<Definition>>,
     preferred: Vec<ServiceName>,
@@ -40,6 +51,7 @@ struct Service {
 
 #[derive(Debug)]
 enum Codec {
+    Generated(&'static MessageInfo),
     Dynamic(Arc<Message>),
 }
 
@@ -63,6 +75,8 @@ pub struct Reading<'d> {
 #[serde(untagged)]
 #[non_exhaustive]
 pub enum Body {
+    /// Read by a generated type.
+    Generated(Value),
     /// Read by a definition loaded at run time.
     Dynamic(Json),
 }
@@ -148,10 +162,39 @@ pub(super) fn parse_version(text: &str) -> Result<Version, Unreadable> {
     })
 }
 
+impl Default for Dictionary {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl From<&ServiceId> for Service {
+    fn from(id: &ServiceId) -> Self {
+        Self {
+            urn: id.urn.into(),
+            version: Version {
+                major: id.major,
+                minor: id.minor,
+            },
+        }
+    }
+}
+
 impl Dictionary {
     /// Everything that this crate was generated with.
     pub fn new() -> Self {
-        Self::default()
+        let mut by_code: BTreeMap<u16, Vec<Definition>> = BTreeMap::new();
+        // The registry has the newest of the types with one code first.
+        for info in messages::registry().iter() {
+            by_code.entry(info.code).or_default().push(Definition {
+                services: info.services.iter().map(Service::from).collect(),
+                codec: Codec::Generated(info),
+            });
+        }
+        Self {
+            by_code,
+            preferred: Vec::new(),
+        }
     }
 
     /// Adds definitions loaded at run time. A service with the URN and version of one that is
@@ -335,7 +378,7 @@ impl Dictionary {
                 .map(|s| format!("{}@{}", s.urn, s.version))
                 .collect();
             let problem = format!(
-                "{service} does not define {request}; {} does",
+                "{service} does not define {request}; it is in {}",
                 services.join(", ")
             );
             return Err(Unreadable::new(problem, 0));
@@ -383,18 +426,25 @@ impl Definition {
 
     fn name(&self) -> &str {
         match &self.codec {
+            Codec::Generated(info) => info.name,
             Codec::Dynamic(message) => &message.name,
         }
     }
 
     fn code(&self) -> u16 {
         match &self.codec {
+            Codec::Generated(info) => info.code,
             Codec::Dynamic(message) => message.code,
         }
     }
 
     fn decode(&self, octets: &Bytes) -> Result<Body, Unreadable> {
         match &self.codec {
+            Codec::Generated(info) => {
+                let message = (info.decode)(octets)
+                    .map_err(|error| Unreadable::new(error.to_string(), error.offset()))?;
+                Ok(Body::Generated(message.view()))
+            }
             Codec::Dynamic(message) => {
                 let value = dynamic::decode(message, octets)
                     .map_err(|error| Unreadable::new(error.to_string(), error.offset))?;
@@ -407,6 +457,12 @@ impl Definition {
 
     fn encode(&self, body: &Json) -> Result<Bytes, String> {
         match &self.codec {
+            Codec::Generated(info) => {
+                let named = |problem: String| format!("{}: {problem}", info.name);
+                let body = Value::deserialize(body).map_err(|error| named(error.to_string()))?;
+                let message = (info.from_view)(&body).map_err(|error| named(error.to_string()))?;
+                message.encode().map_err(|error| error.to_string())
+            }
             Codec::Dynamic(message) => {
                 let value = dynamic::from_json(message, body).map_err(|error| error.to_string())?;
                 let octets = dynamic::encode(message, &value).map_err(|error| error.to_string())?;

@@ -40,6 +40,17 @@ impl Failure {
         Self::Message(message.into())
     }
 
+    /// An error of the library, with its causes: its sentences are made for people.
+    pub(crate) fn of(error: impl Error) -> Self {
+        let mut message = error.to_string();
+        let mut source = error.source();
+        while let Some(cause) = source {
+            message = format!("{message}: {cause}");
+            source = cause.source();
+        }
+        Self::Message(message)
+    }
+
     /// A file that cannot be opened or read.
     pub(crate) fn file(path: &Path, error: &io::Error) -> Self {
         Self::Message(format!("{}: {error}", path.display()))

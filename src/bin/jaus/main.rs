@@ -4,7 +4,10 @@ mod decode;
 mod definitions;
 mod encode;
 mod failure;
+mod network;
 mod output;
+mod query;
+mod runtime;
 
 use std::process::ExitCode;
 
@@ -31,13 +34,14 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Query(query::Query),
     Decode(decode::Decode),
     Encode(encode::Encode),
 }
 
 #[derive(Args)]
 struct Logging {
-    /// Say more about what happens inside, on standard error; -vv for every packet
+    /// Say more about what happens inside, on standard error; -vv and -vvv for details
     ///
     /// The environment variable JAUS_LOG chooses by module, for example JAUS_LOG=jaus::endpoint=trace.
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
@@ -48,7 +52,7 @@ impl Logging {
     /// Sends the library's tracing to standard error.
     fn start(&self) {
         let level = match self.verbose {
-            0 => "warn",
+            0 => "error",
             1 => "info",
             2 => "debug",
             _ => "trace",
@@ -57,6 +61,7 @@ impl Logging {
         tracing_subscriber::fmt()
             .with_env_filter(filter)
             .with_writer(std::io::stderr)
+            .with_ansi(output::colours_wanted(&std::io::stderr()))
             .with_target(self.verbose > 1)
             .init();
     }
@@ -68,6 +73,7 @@ fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Decode(decode) => decode.run(),
         Command::Encode(encode) => encode.run(),
+        Command::Query(query) => query.run(),
     };
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

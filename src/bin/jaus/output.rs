@@ -1,7 +1,7 @@
 //! Standard output, line by line.
 
 use std::fmt::Display;
-use std::io::{self, StdoutLock, Write};
+use std::io::{self, IsTerminal, StdoutLock, Write};
 
 use crate::failure::Failure;
 
@@ -26,4 +26,9 @@ impl Output {
                 _ => Failure::new(format!("cannot write to standard output: {error}")),
             })
     }
+}
+
+/// Whether to write in colours: to a terminal, unless NO_COLOR (<https://no-color.org>) is set.
+pub(crate) fn colours_wanted(stream: &impl IsTerminal) -> bool {
+    stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
