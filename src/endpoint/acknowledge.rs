@@ -164,9 +164,6 @@ impl Endpoint {
 
     /// Takes the answer to a message of ours.
     pub(super) fn receive_answer(&mut self, frame: &Frame) -> Result<(), Counter> {
-        if !frame.is_acknowledgement() {
-            return Err(Counter::AcknowledgementWithPayload);
-        }
         let key = Key {
             source: frame.destination,
             destination: frame.source,

@@ -8,7 +8,7 @@ use tracing::{debug, trace};
 use super::peers::Learned;
 use super::{Counter, Endpoint, Event, Path, Peer, Received};
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Problem, Version, judp};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version, judp};
 
 impl Endpoint {
     /// Takes a datagram that came from `from`.
@@ -32,10 +32,7 @@ impl Endpoint {
                 Ok(frame) => self.receive(now, from, &frame),
                 Err(error) => {
                     debug!(?from, %error, "malformed");
-                    return self.counters.add(match error.problem {
-                        Problem::Compressed => Counter::CompressedHeader,
-                        _ => Counter::Malformed,
-                    });
+                    return self.counters.add(Counter::Malformed);
                 }
             }
         }
@@ -66,18 +63,17 @@ impl Endpoint {
             return Err(Counter::IdConflict);
         }
         let receivers = self.receivers(frame, broadcast)?;
-        if frame.flags.acknowledgement().is_answer() && !frame.is_acknowledgement() {
-            return Err(Counter::AcknowledgementWithPayload);
-        }
-        self.learn(now, from, frame);
         match frame.flags.acknowledgement() {
             Acknowledgement::Positive | Acknowledgement::Negative => {
+                self.learn(now, from, frame);
                 return self.receive_answer(frame);
             }
             Acknowledgement::Request => self.acknowledge(from, frame),
             Acknowledgement::None => {}
         }
+        // Before learning: a copy that came another way must not move the peer there and back.
         self.filter_duplicate(now, frame)?;
+        self.learn(now, from, frame);
         let payload = match frame.flags.data() {
             DataControl::Single => frame.payload.clone(),
             _ => match self.reassembly.insert(now, frame, &mut self.counters)? {
@@ -85,7 +81,8 @@ impl Endpoint {
                 None => return Ok(()),
             },
         };
-        self.deliver(from, frame, broadcast, &payload, &receivers)
+        self.deliver(from, frame, broadcast, &payload, &receivers);
+        Ok(())
     }
 
     /// The local components that a message is for, or why there are none.
@@ -190,10 +187,7 @@ impl Endpoint {
         broadcast: Broadcast,
         payload: &Bytes,
         receivers: &[JausId],
-    ) -> Result<(), Counter> {
-        if payload.len() < 2 {
-            return Err(Counter::NoMessageCode);
-        }
+    ) {
         for &to in receivers {
             self.enqueue(Received {
                 source: frame.source,
@@ -205,7 +199,6 @@ impl Endpoint {
                 to,
             });
         }
-        Ok(())
     }
 
     /// Queues a message for one component; a full queue is counted.
@@ -229,5 +222,17 @@ fn check_header(frame: &Frame) -> Result<Broadcast, Counter> {
     if !frame.source.is_unicast() {
         return Err(Counter::InvalidSource);
     }
-    frame.flags.broadcast().ok_or(Counter::ReservedBroadcast)
+    let broadcast = frame.flags.broadcast().ok_or(Counter::ReservedBroadcast)?;
+    if frame.flags.acknowledgement().is_answer() {
+        let sound = frame.is_acknowledgement();
+        return if sound {
+            Ok(broadcast)
+        } else {
+            Err(Counter::AcknowledgementWithPayload)
+        };
+    }
+    match (frame.flags.data(), frame.code()) {
+        (DataControl::Single | DataControl::First, None) => Err(Counter::NoMessageCode),
+        _ => Ok(broadcast),
+    }
 }

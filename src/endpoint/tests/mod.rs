@@ -1,6 +1,7 @@
 //! What an endpoint must and must not do, one rule a test. Time is virtual; peers are frames written by hand.
 
 mod acknowledgements;
+mod anything;
 mod bounds;
 mod fragments;
 mod identity;

@@ -327,3 +327,27 @@ fn the_most_urgent_message_is_delivered_first() {
         ]
     );
 }
+
+/// Hosts with two interfaces send their multicast through both.
+#[test]
+fn a_copy_that_comes_another_way_does_not_move_the_peer() {
+    let mut rig = Rig::new();
+    for sequence in 0..5 {
+        let message = Frame {
+            sequence,
+            ..from_peer(QUERY_HEARTBEAT)
+        };
+        rig.hear_from(PEER_HOST, &message);
+        rig.hear_from(9, &message);
+    }
+    let moved = |event: &Event| matches!(event, Event::PeerMoved { .. });
+    assert!(!rig.events().iter().any(moved));
+    assert_eq!(rig.endpoint.peers().next().unwrap().path, path(PEER_HOST));
+}
+
+#[test]
+fn a_message_without_code_teaches_nothing() {
+    let mut rig = Rig::new();
+    rig.hear(&from_peer(b""));
+    assert_eq!((rig.events(), rig.endpoint.peers().count()), (vec![], 0));
+}
