@@ -1,0 +1,173 @@
+//! How a component comes to be.
+
+use std::sync::Arc;
+
+use tokio::sync::{broadcast, mpsc, watch};
+
+use super::Component;
+use super::driver::{Driver, Publisher};
+use super::handle::Shared;
+use crate::address::JausId;
+use crate::node::{self, Node};
+use crate::service::{
+    Discovery, Kind, Liveness, Patience, Profile, Scope, Service, Stack, Timing, Transport,
+};
+
+/// A component that is not attached yet. Transport, Discovery and Liveness are always offered.
+#[must_use = "a component exists once it is attached to a node"]
+pub struct Builder {
+    profile: Profile,
+    scope: Scope,
+    timing: Timing,
+    patience: Patience,
+    seed: Option<u64>,
+    liveness: Liveness,
+    services: Vec<Box<dyn Service>>,
+}
+
+/// Why a component could not be attached.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AttachError {
+    /// The node would not take it.
+    #[error(transparent)]
+    Node(#[from] node::AttachError),
+    /// Report Identification has one octet for the length of a name.
+    #[error("the name \"{name}\" has {length} octets, and at most 255 can be told to others")]
+    NameTooLong {
+        /// Its beginning.
+        name: String,
+        /// Its length in octets.
+        length: usize,
+    },
+}
+
+impl Builder {
+    pub(super) fn new(kind: Kind, name: impl Into<String>) -> Self {
+        Self {
+            profile: Profile::new(kind, name),
+            scope: Scope::default(),
+            timing: Timing::default(),
+            patience: Patience::default(),
+            seed: None,
+            liveness: Liveness::new(),
+            services: Vec::new(),
+        }
+    }
+
+    /// Offers a service.
+    pub fn offer(mut self, service: impl Service + 'static) -> Self {
+        self.services.push(Box::new(service));
+        self
+    }
+
+    /// Names the component itself; without this it has the subsystem's name.
+    pub fn component_name(mut self, name: impl Into<String>) -> Self {
+        self.profile.component = name.into();
+        self
+    }
+
+    /// Names the node; without this it has the subsystem's name.
+    pub fn node_name(mut self, name: impl Into<String>) -> Self {
+        self.profile.node = name.into();
+        self
+    }
+
+    /// Names the system that the subsystem belongs to; without this it has the subsystem's name.
+    pub fn system_name(mut self, name: impl Into<String>) -> Self {
+        self.profile.system = name.into();
+        self
+    }
+
+    /// Whom to look for; everybody without this.
+    pub const fn scope(mut self, scope: Scope) -> Self {
+        self.scope = scope;
+        self
+    }
+
+    /// How often discovery speaks, and when it gives a peer up.
+    pub const fn timing(mut self, timing: Timing) -> Self {
+        self.timing = timing;
+        self
+    }
+
+    /// How long [`Component::query`] waits.
+    pub const fn patience(mut self, patience: Patience) -> Self {
+        self.patience = patience;
+        self
+    }
+
+    /// A Liveness service other than the standard one, for instance with a heartbeat.
+    pub fn liveness(mut self, liveness: Liveness) -> Self {
+        self.liveness = liveness;
+        self
+    }
+
+    /// Where the jitter of discovery's times comes from; the id without this.
+    pub const fn seed(mut self, seed: u64) -> Self {
+        self.seed = Some(seed);
+        self
+    }
+
+    /// Brings the component to life on a node, under a number from 1 to 254.
+    ///
+    /// # Errors
+    /// If the number or a name is unusable, or the number is taken.
+    ///
+    /// # Panics
+    /// Outside of a tokio runtime, which a running node has.
+    pub fn attach(self, node: &Node, component: u8) -> Result<Component, AttachError> {
+        self.check_names()?;
+        let port = node.attach(component)?;
+        let id = port.id();
+        let patience = self.patience;
+        let stack = self.stack(id);
+        let (commands, inbox) = mpsc::channel(Shared::COMMANDS);
+        let (directory, directories) = watch::channel(Arc::new(stack.directory().clone()));
+        let changes = broadcast::Sender::new(Shared::CHANGES);
+        let messages = broadcast::Sender::new(Shared::MESSAGES);
+        let publisher = Publisher {
+            directory,
+            changes: changes.clone(),
+            messages: messages.clone(),
+        };
+        let shared = Shared {
+            sender: port.sender(),
+            commands,
+            directories,
+            changes: changes.downgrade(),
+            messages: messages.downgrade(),
+        };
+        tokio::spawn(Driver::new(stack, port, inbox, publisher, patience).run());
+        Ok(Component::new(shared))
+    }
+
+    fn stack(mut self, id: JausId) -> Stack {
+        let seed = self.seed.unwrap_or_else(|| id.to_u32().into());
+        let discovery = Discovery::new(id, self.profile, self.scope, self.timing, seed);
+        let mut services: Vec<Box<dyn Service>> =
+            vec![Box::new(Transport), Box::new(self.liveness)];
+        services.append(&mut self.services);
+        Stack::new(discovery, services)
+    }
+
+    fn check_names(&self) -> Result<(), AttachError> {
+        let Profile {
+            system,
+            subsystem,
+            node,
+            component,
+            ..
+        } = &self.profile;
+        for name in [system, subsystem, node, component] {
+            if name.len() > usize::from(u8::MAX) {
+                let beginning = name.chars().take(40).collect();
+                return Err(AttachError::NameTooLong {
+                    name: beginning,
+                    length: name.len(),
+                });
+            }
+        }
+        Ok(())
+    }
+}

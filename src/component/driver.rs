@@ -1,0 +1,185 @@
+//! The task of a component: it gives the services messages and the time, and carries out what
+//! they want.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use bytes::Bytes;
+use tokio::sync::{broadcast, mpsc, oneshot, watch};
+
+use crate::address::JausId;
+use crate::endpoint::Received;
+use crate::node::{self, Port};
+use crate::service::{Change, Directory, Event, Inquiry, NoAnswer, Patience, Service, Stack};
+
+/// What the application wants of its component.
+pub(super) enum Command {
+    /// To have a question answered.
+    Ask {
+        peer: JausId,
+        query: Bytes,
+        report: u16,
+        reply: oneshot::Sender<Answer>,
+    },
+    /// To offer one more service.
+    Offer(Box<dyn Service>),
+    /// To offer one less.
+    Withdraw(&'static str),
+}
+
+/// What has become of a question.
+#[derive(Debug)]
+pub(super) enum Answer {
+    Report(Bytes),
+    None(NoAnswer),
+    NotSent(node::SendError),
+}
+
+/// What the application may read and listen to.
+pub(super) struct Publisher {
+    pub(super) directory: watch::Sender<Arc<Directory>>,
+    pub(super) changes: broadcast::Sender<Change>,
+    pub(super) messages: broadcast::Sender<Received>,
+}
+
+pub(super) struct Driver {
+    stack: Stack,
+    port: Port,
+    inbox: mpsc::Receiver<Command>,
+    publisher: Publisher,
+    patience: Patience,
+    waiting: HashMap<Inquiry, oneshot::Sender<Answer>>,
+}
+
+impl Driver {
+    pub(super) fn new(
+        stack: Stack,
+        port: Port,
+        inbox: mpsc::Receiver<Command>,
+        publisher: Publisher,
+        patience: Patience,
+    ) -> Self {
+        Self {
+            stack,
+            port,
+            inbox,
+            publisher,
+            patience,
+            waiting: HashMap::new(),
+        }
+    }
+
+    /// Runs until the node has stopped or nobody holds the component any more.
+    pub(super) async fn run(mut self) {
+        self.stack.start(Instant::now());
+        self.settle();
+        loop {
+            let wake = self.stack.poll_timeout();
+            tokio::select! {
+                received = self.port.recv() => match received {
+                    Some(message) => self.stack.handle_message(Instant::now(), &message),
+                    None => return,
+                },
+                command = self.inbox.recv() => match command {
+                    Some(command) => self.obey(command),
+                    None => return,
+                },
+                () = sleep_until(wake) => self.stack.handle_timeout(Instant::now()),
+            }
+            self.settle();
+        }
+    }
+
+    fn obey(&mut self, command: Command) {
+        match command {
+            Command::Ask {
+                peer,
+                query,
+                report,
+                reply,
+            } => {
+                let now = Instant::now();
+                let inquiry = self.stack.ask(now, peer, query, report, self.patience);
+                match self.transmit() {
+                    Ok(()) => {
+                        self.waiting.insert(inquiry, reply);
+                    }
+                    Err(error) => {
+                        self.stack.cancel(now, inquiry);
+                        // Whoever asked may have gone away.
+                        let _ = reply.send(Answer::NotSent(error));
+                    }
+                }
+            }
+            Command::Offer(service) => self.stack.offer(service),
+            Command::Withdraw(urn) => {
+                self.stack.withdraw(urn);
+            }
+        }
+    }
+
+    /// Carries out whatever the services want.
+    fn settle(&mut self) {
+        if let Err(error) = self.transmit() {
+            tracing::debug!(id = %self.stack.id(), %error, "message not sent");
+        }
+        let mut changed = false;
+        while let Some(event) = self.stack.poll_event() {
+            match event {
+                Event::Change(change) => {
+                    if !changed {
+                        changed = true;
+                        self.publisher.directory.send_replace(self.snapshot());
+                    }
+                    // An error means that nobody listens.
+                    let _ = self.publisher.changes.send(change);
+                }
+                Event::Answer(inquiry, answer) => {
+                    let answer = answer.map_or_else(Answer::None, Answer::Report);
+                    if let Some(reply) = self.waiting.remove(&inquiry) {
+                        // Whoever asked may have gone away.
+                        let _ = reply.send(answer);
+                    }
+                }
+                Event::Message(message) => {
+                    // As above.
+                    let _ = self.publisher.messages.send(message);
+                }
+            }
+        }
+        self.forget_the_impatient();
+    }
+
+    fn snapshot(&self) -> Arc<Directory> {
+        Arc::new(self.stack.directory().clone())
+    }
+
+    /// Sends everything; tells the first error.
+    fn transmit(&mut self) -> Result<(), node::SendError> {
+        let mut result = Ok(());
+        while let Some(message) = self.stack.poll_transmit() {
+            let sent = self.port.send(message).map(|_| ());
+            result = result.and(sent);
+        }
+        result
+    }
+
+    /// Gives up the questions whose askers have gone away.
+    fn forget_the_impatient(&mut self) {
+        let stack = &mut self.stack;
+        self.waiting.retain(|&inquiry, reply| {
+            if reply.is_closed() {
+                stack.cancel(Instant::now(), inquiry);
+            }
+            !reply.is_closed()
+        });
+    }
+}
+
+async fn sleep_until(wake: Option<Instant>) {
+    match wake {
+        Some(wake) => tokio::time::sleep_until(wake.into()).await,
+        None => std::future::pending().await,
+    }
+}

@@ -1,0 +1,187 @@
+//! The application's end of a component.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use tokio::sync::{broadcast, mpsc, oneshot, watch};
+
+use super::driver::{Answer, Command};
+use super::watch::Listener;
+use super::{Builder, FindError, Messages, QueryError, SendError, Watch};
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::node;
+use crate::service::{Change, Directory, Kind, Service};
+
+/// A component that lives on a node. Cheap to clone; it stops when the last clone is dropped.
+#[derive(Debug, Clone)]
+pub struct Component {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub(super) sender: node::Sender,
+    pub(super) commands: mpsc::Sender<Command>,
+    pub(super) directories: watch::Receiver<Arc<Directory>>,
+    pub(super) changes: broadcast::WeakSender<Change>,
+    pub(super) messages: broadcast::WeakSender<Received>,
+}
+
+impl Shared {
+    /// Commands that may wait for the component's task.
+    pub(super) const COMMANDS: usize = 64;
+    /// Changes that a [`Watch`] may lag behind.
+    pub(super) const CHANGES: usize = 1024;
+    /// Messages that a [`Messages`] may lag behind.
+    pub(super) const MESSAGES: usize = 256;
+}
+
+impl Component {
+    /// How long [`find`](Self::find) looks before it gives up.
+    pub const FIND_LIMIT: Duration = Duration::from_secs(10);
+
+    /// A new component: what the subsystem is, and what it is called.
+    pub fn builder(kind: Kind, name: impl Into<String>) -> Builder {
+        Builder::new(kind, name)
+    }
+
+    pub(super) fn new(shared: Shared) -> Self {
+        Self {
+            shared: Arc::new(shared),
+        }
+    }
+
+    /// The component's id.
+    #[must_use]
+    pub fn id(&self) -> JausId {
+        self.shared.sender.id()
+    }
+
+    /// Everybody who is known now, this component included.
+    #[must_use]
+    pub fn directory(&self) -> Arc<Directory> {
+        self.shared.directories.borrow().clone()
+    }
+
+    /// The changes of the directory from now on.
+    #[must_use]
+    pub fn watch(&self) -> Watch {
+        let changes = self.shared.changes.upgrade();
+        Watch::new(Listener::new(changes.map(|changes| changes.subscribe())))
+    }
+
+    /// The messages from now on that no service handles.
+    #[must_use]
+    pub fn messages(&self) -> Messages {
+        let messages = self.shared.messages.upgrade();
+        Messages::new(Listener::new(messages.map(|messages| messages.subscribe())))
+    }
+
+    /// Sends a message and forgets it.
+    ///
+    /// # Errors
+    /// If the wire cannot carry it or the node would not take it. That it was sent does not mean
+    /// that it arrives.
+    pub fn send<M: Message>(&self, destination: JausId, message: &M) -> Result<(), SendError> {
+        let payload = message.encode()?;
+        let outgoing = crate::endpoint::Outgoing::new(self.id(), destination, payload);
+        self.shared.sender.send(outgoing)?;
+        Ok(())
+    }
+
+    /// Asks a component, and waits for its answer; asks again if none comes.
+    ///
+    /// A `peer` with wildcards stands for whoever answers first.
+    ///
+    /// # Errors
+    /// [`QueryError`] says who did not answer what, and how long it was waited for.
+    pub async fn query<R: Message, Q: Message>(
+        &self,
+        peer: JausId,
+        query: &Q,
+    ) -> Result<R, QueryError> {
+        let not_sent = |source| QueryError::NotSent {
+            peer,
+            query: Q::NAME,
+            source,
+        };
+        let payload = query.encode().map_err(|error| not_sent(error.into()))?;
+        let (reply, answer) = oneshot::channel();
+        let command = Command::Ask {
+            peer,
+            query: payload,
+            report: R::CODE,
+            reply,
+        };
+        let sent = self.shared.commands.send(command).await;
+        sent.map_err(|_| QueryError::Stopped)?;
+        match answer.await.map_err(|_| QueryError::Stopped)? {
+            Answer::Report(octets) => R::decode(&octets).map_err(|source| QueryError::Unreadable {
+                peer,
+                query: Q::NAME,
+                source,
+            }),
+            Answer::None(failure) => Err(QueryError::no_answer(Q::NAME, R::NAME, &failure)),
+            Answer::NotSent(error) => Err(not_sent(error.into())),
+        }
+    }
+
+    /// Waits until another component is known that offers a service, in whatever version, for at
+    /// most [`FIND_LIMIT`](Self::FIND_LIMIT). Which version it is stands in the
+    /// [`directory`](Self::directory).
+    ///
+    /// # Errors
+    /// [`FindError`] says how long it was looked for.
+    pub async fn find(&self, urn: &str) -> Result<JausId, FindError> {
+        self.find_within(urn, Self::FIND_LIMIT).await
+    }
+
+    /// The same as [`find`](Self::find), with another limit.
+    ///
+    /// # Errors
+    /// [`FindError`] says how long it was looked for.
+    pub async fn find_within(&self, urn: &str, limit: Duration) -> Result<JausId, FindError> {
+        let start = Instant::now();
+        let own = self.id();
+        let found = |directory: &Directory| {
+            directory
+                .offering(urn)
+                .map(|component| component.id)
+                .find(|id| *id != own)
+        };
+        let mut directories = self.shared.directories.clone();
+        let known = directories.wait_for(|directory| found(directory).is_some());
+        match tokio::time::timeout(limit, known).await {
+            Ok(Ok(directory)) => found(&directory).ok_or(FindError::Stopped),
+            Ok(Err(_)) => Err(FindError::Stopped),
+            Err(_) => {
+                let others = self.directory().len().saturating_sub(1);
+                let service = urn.to_owned();
+                Err(FindError::NotFound {
+                    service,
+                    waited: start.elapsed(),
+                    others,
+                })
+            }
+        }
+    }
+
+    /// Offers one more service; whoever asks from now on sees it. Without effect if the
+    /// component has stopped.
+    pub async fn offer(&self, service: impl Service + 'static) {
+        // An error means that there is nobody left to offer anything to.
+        let _ = self
+            .shared
+            .commands
+            .send(Command::Offer(Box::new(service)))
+            .await;
+    }
+
+    /// Takes a service back, in all its versions.
+    pub async fn withdraw(&self, urn: &'static str) {
+        // As in `offer`.
+        let _ = self.shared.commands.send(Command::Withdraw(urn)).await;
+    }
+}

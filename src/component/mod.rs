@@ -1,0 +1,53 @@
+//! What an application builds: components that offer services, and that find and ask others.
+//!
+//! A vehicle that tells its speed, and an operator that asks for it:
+//!
+//! ```no_run
+//! use jaus::component::{Component, Handlers, Kind};
+//! use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+//! use jaus::node::{Config, Node};
+//!
+//! # #[tokio::main(flavor = "current_thread")]
+//! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // On the vehicle: subsystem 101, node 1, component 33.
+//! let node = Node::start(Config::loopback(101, 1))?;
+//! let mut speed = ReportVelocityState::default();
+//! speed.set_velocity_x_m_per_s(1.5)?;
+//! let rover = Component::builder(Kind::Vehicle, "Rover")
+//!     .offer(Handlers::new(velocity_state_sensor::LATEST).answer(move |_: QueryVelocityState| speed.clone()))
+//!     .attach(&node, 33)?;
+//!
+//! // At the operator's desk: subsystem 42.
+//! let desk = Node::start(Config::loopback(42, 1))?;
+//! let operator = Component::builder(Kind::OperatorControlUnit, "Operator").attach(&desk, 1)?;
+//! let sensor = operator.find(velocity_state_sensor::URN).await?;
+//! let query = QueryVelocityState { presence_vector: 0xFFFF };
+//! let report: ReportVelocityState = operator.query(sensor, &query).await?;
+//! assert_eq!(sensor, rover.id());
+//! assert!((report.velocity_x_m_per_s().unwrap_or_default() - 1.5).abs() < 0.01);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A component lives in a task of its own on the current tokio runtime until the last clone of
+//! its [`Component`] is dropped. The protocol is in [`service`](crate::service); here are only
+//! the clock, the channels and the names.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here the services get their time and their task"
+)]
+
+mod builder;
+mod driver;
+mod error;
+mod handle;
+mod watch;
+
+pub use crate::service::{
+    Change, Directory, Handlers, Identification, Kind, Level, Liveness, Loss, Offer, Patience,
+    Scope, Service, Timing,
+};
+pub use builder::{AttachError, Builder};
+pub use error::{FindError, QueryError, SendError};
+pub use handle::Component;
+pub use watch::{Messages, Watch};

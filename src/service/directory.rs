@@ -1,0 +1,429 @@
+//! What is known about the others: subsystems, their nodes, their components, and what those
+//! offer. [`Discovery`](super::Discovery) keeps it; applications read it.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use crate::address::JausId;
+use crate::codec::ServiceId;
+
+/// The tree of everything that discovery has found, the own component included.
+///
+/// What it holds is small, and it is cheap to clone, so that applications can keep a copy.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Directory {
+    subsystems: BTreeMap<u16, Subsystem>,
+}
+
+/// A vehicle, an operator station, or another thing with a number of its own.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Subsystem {
+    identification: Option<Identification>,
+    nodes: BTreeMap<u8, Node>,
+}
+
+/// A computer of a subsystem.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Node {
+    identification: Option<Identification>,
+    components: BTreeMap<u8, Component>,
+}
+
+/// A program on a node.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Component {
+    /// Its id.
+    pub id: JausId,
+    /// Kind and name, once it told.
+    pub identification: Option<Identification>,
+    /// What it offers, once it or its subsystem told.
+    pub services: Option<Vec<Offer>>,
+}
+
+/// Kind and name, as Report Identification (4B00h) tells them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Identification {
+    /// What kind of thing it is.
+    pub kind: Kind,
+    /// Its name for people; may be empty.
+    pub name: String,
+}
+
+/// The kinds of subsystems, nodes and components in Report Identification (AS5710).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// A subsystem that moves or acts: 10001.
+    Vehicle,
+    /// An operator control unit: 20001.
+    OperatorControlUnit,
+    /// A subsystem of another kind: 30001.
+    OtherSubsystem,
+    /// A node: 40001.
+    Node,
+    /// A payload: 50001.
+    Payload,
+    /// A component: 60001.
+    Component,
+    /// A number without a meaning in the standard.
+    Unknown(u16),
+}
+
+/// A service that a component says it offers.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Offer {
+    /// For example `urn:jaus:jss:core:Discovery`.
+    pub urn: String,
+    /// Raised by incompatible changes.
+    pub major: u8,
+    /// Raised by additions.
+    pub minor: u8,
+}
+
+/// The three levels that have a name of their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Level {
+    /// The subsystem.
+    Subsystem,
+    /// The node.
+    Node,
+    /// The component.
+    Component,
+}
+
+impl Directory {
+    /// All subsystems with their numbers, in order.
+    pub fn subsystems(&self) -> impl Iterator<Item = (u16, &Subsystem)> {
+        self.subsystems
+            .iter()
+            .map(|(&id, subsystem)| (id, subsystem))
+    }
+
+    /// One subsystem.
+    #[must_use]
+    pub fn subsystem(&self, id: u16) -> Option<&Subsystem> {
+        self.subsystems.get(&id)
+    }
+
+    /// All components of all subsystems, in order of their ids.
+    pub fn components(&self) -> impl Iterator<Item = &Component> {
+        self.subsystems.values().flat_map(Subsystem::components)
+    }
+
+    /// One component.
+    #[must_use]
+    pub fn component(&self, id: JausId) -> Option<&Component> {
+        self.subsystem(id.subsystem())?
+            .node(id.node())?
+            .component(id.component())
+    }
+
+    /// The components that offer a service, whatever its version.
+    pub fn offering<'d>(&'d self, urn: &'d str) -> impl Iterator<Item = &'d Component> {
+        self.components()
+            .filter(move |component| component.offers(urn))
+    }
+
+    /// What a subsystem, a node or a component is called; `id` may be any component in it.
+    #[must_use]
+    pub fn identification(&self, level: Level, id: JausId) -> Option<&Identification> {
+        let subsystem = self.subsystem(id.subsystem())?;
+        match level {
+            Level::Subsystem => subsystem.identification(),
+            Level::Node => subsystem.node(id.node())?.identification(),
+            Level::Component => self.component(id)?.identification.as_ref(),
+        }
+    }
+
+    /// How many components there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.components().count()
+    }
+
+    /// Whether there is no component at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.subsystems.is_empty()
+    }
+
+    /// Adds a component of which nothing but the id is known. Says whether it is new.
+    pub(super) fn insert(&mut self, id: JausId) -> bool {
+        let node = self
+            .subsystems
+            .entry(id.subsystem())
+            .or_default()
+            .nodes
+            .entry(id.node());
+        let components = &mut node.or_default().components;
+        let before = components.len();
+        components.entry(id.component()).or_insert(Component {
+            id,
+            identification: None,
+            services: None,
+        });
+        components.len() > before
+    }
+
+    /// Removes a component, and its node and subsystem if they are empty then.
+    pub(super) fn remove(&mut self, id: JausId) {
+        let Some(subsystem) = self.subsystems.get_mut(&id.subsystem()) else {
+            return;
+        };
+        if let Some(node) = subsystem.nodes.get_mut(&id.node()) {
+            node.components.remove(&id.component());
+            if node.components.is_empty() {
+                subsystem.nodes.remove(&id.node());
+            }
+        }
+        if subsystem.nodes.is_empty() {
+            self.subsystems.remove(&id.subsystem());
+        }
+    }
+
+    /// Names a level of a component that is in the tree. Says whether that is news.
+    pub(super) fn identify(&mut self, level: Level, id: JausId, told: Identification) -> bool {
+        let Some(subsystem) = self.subsystems.get_mut(&id.subsystem()) else {
+            return false;
+        };
+        let slot = if level == Level::Subsystem {
+            &mut subsystem.identification
+        } else {
+            let Some(node) = subsystem.nodes.get_mut(&id.node()) else {
+                return false;
+            };
+            if level == Level::Node {
+                &mut node.identification
+            } else {
+                let Some(component) = node.components.get_mut(&id.component()) else {
+                    return false;
+                };
+                &mut component.identification
+            }
+        };
+        let told = Some(told);
+        let news = *slot != told;
+        *slot = told;
+        news
+    }
+
+    /// Sets the services of a component that is in the tree. Says whether that is news.
+    pub(super) fn set_services(&mut self, id: JausId, mut services: Vec<Offer>) -> bool {
+        services.sort_unstable();
+        services.dedup();
+        let nodes = self
+            .subsystems
+            .get_mut(&id.subsystem())
+            .map(|subsystem| &mut subsystem.nodes);
+        let node = nodes.and_then(|nodes| nodes.get_mut(&id.node()));
+        let Some(component) = node.and_then(|node| node.components.get_mut(&id.component())) else {
+            return false;
+        };
+        let services = Some(services);
+        let news = component.services != services;
+        component.services = services;
+        news
+    }
+}
+
+impl Subsystem {
+    /// Kind and name, once told.
+    #[must_use]
+    pub fn identification(&self) -> Option<&Identification> {
+        self.identification.as_ref()
+    }
+
+    /// Its nodes with their numbers, in order.
+    pub fn nodes(&self) -> impl Iterator<Item = (u8, &Node)> {
+        self.nodes.iter().map(|(&id, node)| (id, node))
+    }
+
+    /// One of its nodes.
+    #[must_use]
+    pub fn node(&self, id: u8) -> Option<&Node> {
+        self.nodes.get(&id)
+    }
+
+    /// All components of all its nodes.
+    pub fn components(&self) -> impl Iterator<Item = &Component> {
+        self.nodes.values().flat_map(Node::components)
+    }
+}
+
+impl Node {
+    /// Kind and name, once told.
+    #[must_use]
+    pub fn identification(&self) -> Option<&Identification> {
+        self.identification.as_ref()
+    }
+
+    /// Its components, in order.
+    pub fn components(&self) -> impl Iterator<Item = &Component> {
+        self.components.values()
+    }
+
+    /// One of its components.
+    #[must_use]
+    pub fn component(&self, id: u8) -> Option<&Component> {
+        self.components.get(&id)
+    }
+}
+
+impl Component {
+    /// Whether it says that it offers a service, whatever the version.
+    #[must_use]
+    pub fn offers(&self, urn: &str) -> bool {
+        self.services.iter().flatten().any(|offer| offer.urn == urn)
+    }
+}
+
+impl Offer {
+    /// Whether a client made for `wanted` can use it: the same service and major version, and no
+    /// older minor version.
+    #[must_use]
+    pub fn serves(&self, wanted: ServiceId) -> bool {
+        self.urn == wanted.urn && self.major == wanted.major && self.minor >= wanted.minor
+    }
+}
+
+impl From<ServiceId> for Offer {
+    fn from(id: ServiceId) -> Self {
+        Self {
+            urn: id.urn.to_owned(),
+            major: id.major,
+            minor: id.minor,
+        }
+    }
+}
+
+impl fmt::Display for Offer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}.{}", self.urn, self.major, self.minor)
+    }
+}
+
+impl Kind {
+    /// The number on the wire.
+    #[must_use]
+    pub const fn code(self) -> u16 {
+        match self {
+            Self::Vehicle => 10001,
+            Self::OperatorControlUnit => 20001,
+            Self::OtherSubsystem => 30001,
+            Self::Node => 40001,
+            Self::Payload => 50001,
+            Self::Component => 60001,
+            Self::Unknown(code) => code,
+        }
+    }
+
+    /// The kind with this number on the wire.
+    #[must_use]
+    pub const fn from_code(code: u16) -> Self {
+        match code {
+            10001 => Self::Vehicle,
+            20001 => Self::OperatorControlUnit,
+            30001 => Self::OtherSubsystem,
+            40001 => Self::Node,
+            50001 => Self::Payload,
+            60001 => Self::Component,
+            code => Self::Unknown(code),
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Vehicle => f.pad("vehicle"),
+            Self::OperatorControlUnit => f.pad("operator control unit"),
+            Self::OtherSubsystem => f.pad("other subsystem"),
+            Self::Node => f.pad("node"),
+            Self::Payload => f.pad("payload"),
+            Self::Component => f.pad("component"),
+            Self::Unknown(code) => write!(f, "kind {code}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const A: JausId = JausId::new(101, 1, 1);
+    const B: JausId = JausId::new(101, 1, 2);
+
+    #[test]
+    fn a_component_brings_its_node_and_subsystem_and_the_last_one_takes_them_along() {
+        let mut directory = Directory::default();
+        assert!(directory.insert(A));
+        assert!(directory.insert(B));
+        assert!(!directory.insert(A));
+        assert_eq!(
+            directory.components().map(|c| c.id).collect::<Vec<_>>(),
+            [A, B]
+        );
+        directory.remove(A);
+        assert!(directory.subsystem(101).is_some());
+        directory.remove(B);
+        assert!(directory.is_empty());
+    }
+
+    #[test]
+    fn the_order_in_which_services_are_listed_is_no_news() {
+        let offer = |urn: &str| Offer {
+            urn: urn.into(),
+            major: 1,
+            minor: 0,
+        };
+        let mut directory = Directory::default();
+        directory.insert(A);
+        assert!(directory.set_services(A, vec![offer("a"), offer("b")]));
+        assert!(!directory.set_services(A, vec![offer("b"), offer("a"), offer("a")]));
+        assert!(directory.set_services(A, vec![offer("b")]));
+        assert!(
+            !directory.set_services(B, vec![offer("b")]),
+            "B is not in the tree"
+        );
+    }
+
+    #[test]
+    fn a_name_that_is_told_again_is_no_news() {
+        let named = |name: &str| Identification {
+            kind: Kind::Vehicle,
+            name: name.into(),
+        };
+        let mut directory = Directory::default();
+        directory.insert(A);
+        for level in [Level::Subsystem, Level::Node, Level::Component] {
+            assert!(directory.identify(level, A, named("rover")));
+            assert!(!directory.identify(level, A, named("rover")));
+            assert_eq!(directory.identification(level, A), Some(&named("rover")));
+        }
+        assert!(!directory.identify(Level::Component, B, named("rover")));
+    }
+
+    #[test]
+    fn a_newer_minor_version_serves_a_client_of_an_older_one_but_not_the_other_way_round() {
+        let wanted = |minor| ServiceId {
+            urn: "urn:a",
+            major: 1,
+            minor,
+        };
+        let offer = Offer::from(wanted(1));
+        assert!(offer.serves(wanted(0)));
+        assert!(offer.serves(wanted(1)));
+        assert!(!offer.serves(wanted(2)));
+        assert!(!offer.serves(ServiceId {
+            urn: "urn:a",
+            major: 2,
+            minor: 0
+        }));
+    }
+
+    #[test]
+    fn every_kind_keeps_its_number() {
+        for code in 0..=u16::MAX {
+            assert_eq!(Kind::from_code(code).code(), code);
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! How often discovery speaks: a seeded jitter, so that components that start together do not
+//! speak together, and a budget that no mistake and no peer can exceed.
+
+use std::time::{Duration, Instant};
+
+/// Random numbers from a seed (SplitMix64): for spreading packets in time, not for secrets.
+#[derive(Debug, Clone)]
+pub(super) struct Jitter(u64);
+
+impl Jitter {
+    pub(super) const fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    /// A duration from 0 up to `most`.
+    pub(super) fn up_to(&mut self, most: Duration) -> Duration {
+        most.mul_f64((self.next() >> 11) as f64 / (1_u64 << 53) as f64)
+    }
+
+    /// A duration from 90 % to 110 % of `middle`.
+    pub(super) fn around(&mut self, middle: Duration) -> Duration {
+        middle.mul_f64(0.9) + self.up_to(middle.mul_f64(0.2))
+    }
+}
+
+/// A token bucket: a burst now and then, and a rate in the long run.
+#[derive(Debug, Clone)]
+pub(super) struct Budget {
+    burst: u32,
+    /// The time in which one token comes back.
+    refill: Duration,
+    tokens: u32,
+    /// When the newest token came.
+    since: Option<Instant>,
+}
+
+impl Budget {
+    /// A full bucket.
+    pub(super) const fn new(burst: u32, refill: Duration) -> Self {
+        Self {
+            burst,
+            refill,
+            tokens: burst,
+            since: None,
+        }
+    }
+
+    /// Takes a token if there is one.
+    pub(super) fn take(&mut self, now: Instant) -> bool {
+        self.fill(now);
+        if self.tokens == 0 {
+            return false;
+        }
+        self.tokens -= 1;
+        true
+    }
+
+    /// When there is a token again; `None` if there is one.
+    pub(super) fn next(&self) -> Option<Instant> {
+        if self.tokens > 0 {
+            None
+        } else {
+            self.since.map(|since| since + self.refill)
+        }
+    }
+
+    fn fill(&mut self, now: Instant) {
+        let since = *self.since.get_or_insert(now);
+        let passed = now.saturating_duration_since(since);
+        let tokens = (passed.as_nanos() / self.refill.as_nanos().max(1)).min(self.burst.into());
+        let tokens = u32::try_from(tokens).unwrap_or(self.burst);
+        self.tokens = self.tokens.saturating_add(tokens).min(self.burst);
+        if self.tokens == self.burst {
+            self.since = Some(now);
+        } else {
+            self.since = Some(since + self.refill * tokens);
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "a test needs some instant to begin with"
+)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_seed_gives_the_same_times() {
+        let times = |seed| {
+            let mut jitter = Jitter::new(seed);
+            std::array::from_fn::<_, 8, _>(|_| jitter.around(Duration::from_secs(10)))
+        };
+        assert_eq!(times(1), times(1));
+        assert_ne!(times(1), times(2));
+    }
+
+    #[test]
+    fn jitter_stays_within_a_tenth() {
+        let mut jitter = Jitter::new(7);
+        for _ in 0..1000 {
+            let drawn = jitter.around(Duration::from_secs(10));
+            assert!((9.0..=11.0).contains(&drawn.as_secs_f64()), "{drawn:?}");
+        }
+    }
+
+    #[test]
+    fn a_budget_allows_a_burst_and_then_its_rate() {
+        let start = Instant::now();
+        let mut budget = Budget::new(3, Duration::from_secs(1));
+        let taken = (0..100_u32)
+            .filter(|tick| budget.take(start + Duration::from_millis(100) * *tick))
+            .count();
+        assert_eq!(taken, 3 + 9, "three at once, then one a second for 9.9 s");
+        assert_eq!(budget.next(), Some(start + Duration::from_secs(10)));
+    }
+}

@@ -1,0 +1,98 @@
+//! A service made of functions, one per message: what an application offers.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::time::Instant;
+
+use super::{Handled, Outbox, Service, code_of, read};
+use crate::codec::{Message, ServiceId};
+use crate::endpoint::Received;
+
+type Handler = Box<dyn FnMut(&Received, &mut Outbox) + Send>;
+
+/// A service whose messages are answered by functions of the application.
+///
+/// ```
+/// use jaus::messages::mobility::{self, QueryVelocityState, ReportVelocityState};
+/// use jaus::service::Handlers;
+///
+/// let speedometer = Handlers::new(mobility::velocity_state_sensor::LATEST)
+///     .answer(|_query: QueryVelocityState| ReportVelocityState::default());
+/// ```
+pub struct Handlers {
+    offers: Vec<ServiceId>,
+    by_code: BTreeMap<u16, Handler>,
+}
+
+impl Handlers {
+    /// A service that handles nothing yet.
+    #[must_use]
+    pub fn new(id: ServiceId) -> Self {
+        Self {
+            offers: vec![id],
+            by_code: BTreeMap::new(),
+        }
+    }
+
+    /// Also offers an older version, whose clients it understands as well.
+    #[must_use]
+    pub fn and_version(mut self, id: ServiceId) -> Self {
+        self.offers.push(id);
+        self
+    }
+
+    /// Answers every query of type `Q`; the answer goes to whoever asked.
+    #[must_use]
+    pub fn answer<Q: Message, R: Message>(
+        mut self,
+        mut function: impl FnMut(Q) -> R + Send + 'static,
+    ) -> Self {
+        let handler = move |received: &Received, out: &mut Outbox| {
+            if let Some(query) = read(received) {
+                out.reply(received, &function(query));
+            }
+        };
+        self.by_code.insert(Q::CODE, Box::new(handler));
+        self
+    }
+
+    /// Takes every message of type `M` with its sender's header; the outbox is for whatever is
+    /// to be said to it.
+    #[must_use]
+    pub fn receive<M: Message>(
+        mut self,
+        mut function: impl FnMut(M, &Received, &mut Outbox) + Send + 'static,
+    ) -> Self {
+        let handler = move |received: &Received, out: &mut Outbox| {
+            if let Some(message) = read(received) {
+                function(message, received, out);
+            }
+        };
+        self.by_code.insert(M::CODE, Box::new(handler));
+        self
+    }
+}
+
+impl fmt::Debug for Handlers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Handlers")
+            .field("offers", &self.offers)
+            .field("codes", &self.by_code.keys())
+            .finish()
+    }
+}
+
+impl Service for Handlers {
+    fn offers(&self) -> Vec<ServiceId> {
+        self.offers.clone()
+    }
+
+    fn handle_message(&mut self, _: Instant, message: &Received, out: &mut Outbox) -> Handled {
+        let handler = code_of(&message.payload).and_then(|code| self.by_code.get_mut(&code));
+        let Some(handler) = handler else {
+            return Handled::No;
+        };
+        handler(message, out);
+        Handled::Yes
+    }
+}

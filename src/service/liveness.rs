@@ -1,0 +1,77 @@
+//! The Liveness service: a sign of life when asked, and if wanted without being asked.
+
+use std::time::{Duration, Instant};
+
+use super::{Handled, Outbox, Service, code_of};
+use crate::address::JausId;
+use crate::codec::{Message, ServiceId};
+use crate::endpoint::Received;
+use crate::messages::core::{self, QueryHeartbeatPulse, ReportHeartbeatPulse};
+
+/// Answers Query Heartbeat Pulse (2202h) by Report Heartbeat Pulse (4202h).
+#[derive(Debug, Clone, Default)]
+pub struct Liveness {
+    heartbeat: Option<Heartbeat>,
+}
+
+#[derive(Debug, Clone)]
+struct Heartbeat {
+    to: JausId,
+    every: Duration,
+    /// `None` until the first wake-up has told the time.
+    next: Option<Instant>,
+}
+
+impl Liveness {
+    /// The shortest interval between two heartbeats that nobody asked for.
+    pub const SHORTEST_INTERVAL: Duration = Duration::from_millis(10);
+
+    /// Answers and sends nothing else.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { heartbeat: None }
+    }
+
+    /// Sends a Report Heartbeat Pulse to `to` again and again, beginning with the
+    /// first [`Stack::start`](super::Stack::start). An interval below
+    /// [`SHORTEST_INTERVAL`](Self::SHORTEST_INTERVAL) is raised to it.
+    #[must_use]
+    pub fn with_heartbeat(to: JausId, every: Duration) -> Self {
+        let every = every.max(Self::SHORTEST_INTERVAL);
+        Self {
+            heartbeat: Some(Heartbeat {
+                to,
+                every,
+                next: None,
+            }),
+        }
+    }
+}
+
+impl Service for Liveness {
+    fn offers(&self) -> Vec<ServiceId> {
+        vec![core::liveness::V1_1, core::liveness::V1_0]
+    }
+
+    fn handle_message(&mut self, _: Instant, message: &Received, out: &mut Outbox) -> Handled {
+        if code_of(&message.payload) != Some(QueryHeartbeatPulse::CODE) {
+            return Handled::No;
+        }
+        out.reply(message, &ReportHeartbeatPulse {});
+        Handled::Yes
+    }
+
+    fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
+        let Some(heartbeat) = &mut self.heartbeat else {
+            return;
+        };
+        if heartbeat.next.is_none_or(|next| next <= now) {
+            out.send(heartbeat.to, &ReportHeartbeatPulse {});
+            heartbeat.next = Some(now + heartbeat.every);
+        }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.heartbeat.as_ref()?.next
+    }
+}

@@ -1,0 +1,79 @@
+//! Services as state machines that do no I/O and read no clock.
+//!
+//! A component is a [`Stack`] of services. The stack is fed with what arrives and with the time;
+//! it says what to send, what the application should know, and when to wake it. So the same code
+//! runs on a node, in a simulation of a hundred nodes, and in a test of one message.
+//!
+//! | service | what it does here |
+//! |---|---|
+//! | [`Transport`] | is listed; the endpoint does its work |
+//! | [`Liveness`] | answers Query Heartbeat Pulse, sends a heartbeat if asked to |
+//! | [`Discovery`] | says who we are, finds out who the others are, keeps the [`Directory`] |
+//! | [`Handlers`] | whatever an application offers, one function per message |
+
+mod directory;
+mod discovery;
+mod handlers;
+mod inquiries;
+mod liveness;
+mod outbox;
+mod stack;
+mod transport;
+
+use std::time::Instant;
+
+use crate::codec::ServiceId;
+use crate::endpoint::Received;
+
+pub use directory::{Component, Directory, Identification, Kind, Level, Node, Offer, Subsystem};
+pub use discovery::{Change, Discovery, Loss, Profile, Scope, Timing};
+pub use handlers::Handlers;
+pub use inquiries::{Inquiry, NoAnswer, Patience};
+pub use liveness::Liveness;
+pub use outbox::Outbox;
+pub use stack::{Event, Stack};
+pub use transport::Transport;
+
+/// One service of a component.
+pub trait Service: Send {
+    /// What the component says that it offers, the newest version first.
+    fn offers(&self) -> Vec<ServiceId>;
+
+    /// A message for this component has arrived. The first service that says
+    /// [`Handled::Yes`] gets it; the others do not see it.
+    fn handle_message(&mut self, now: Instant, message: &Received, out: &mut Outbox) -> Handled;
+
+    /// The time of [`poll_timeout`](Self::poll_timeout) has come.
+    fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
+        let _ = (now, out);
+    }
+
+    /// When this service wants to be woken.
+    fn poll_timeout(&self) -> Option<Instant> {
+        None
+    }
+}
+
+/// Whether a message was a service's business.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Handled {
+    /// It was, be it well-formed or not.
+    Yes,
+    /// It was not.
+    No,
+}
+
+/// The message code at the head of a payload.
+pub(crate) fn code_of(payload: &[u8]) -> Option<u16> {
+    payload.first_chunk().map(|&code| u16::from_le_bytes(code))
+}
+
+/// Reads a message that has the right code, and traces what cannot be read: a peer's mistake is
+/// no error of ours.
+fn read<M: crate::codec::Message>(received: &Received) -> Option<M> {
+    M::decode(&received.payload)
+        .inspect_err(|error| {
+            tracing::debug!(source = %received.source, %error, "message cannot be read");
+        })
+        .ok()
+}

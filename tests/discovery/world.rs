@@ -1,0 +1,271 @@
+//! A network in virtual time: endpoints with components, datagrams with a delay, and no sockets.
+
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::endpoint::{Config, Endpoint, Event, LinkId, Outgoing, Path, Received, To};
+use jaus::service::{
+    Change, Discovery, Kind, Liveness, Profile, Scope, Service, Stack, Timing, Transport,
+};
+
+const LINK: LinkId = LinkId(0);
+const DELAY: Duration = Duration::from_millis(1);
+
+/// Everything there is.
+pub(crate) struct World {
+    pub(crate) now: Instant,
+    nodes: Vec<Node>,
+    /// Datagrams on their way, by arrival and number.
+    flights: BTreeMap<(Instant, u64), Flight>,
+    flown: u64,
+}
+
+/// A computer with one component: a stack, or a puppet whose strings the test holds.
+struct Node {
+    address: SocketAddr,
+    id: JausId,
+    endpoint: Endpoint,
+    stack: Option<Stack>,
+    up: bool,
+    datagrams: u64,
+    received: Vec<Received>,
+    changes: Vec<(Instant, Change)>,
+}
+
+struct Flight {
+    from: Path,
+    to: SocketAddr,
+    payload: Bytes,
+}
+
+/// A node of a [`World`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Place(usize);
+
+/// A component as the tests like it.
+pub(crate) fn stack(id: JausId, name: &str, services: Vec<Box<dyn Service>>) -> Stack {
+    let profile = Profile::new(Kind::Vehicle, name);
+    let timing = Timing::default();
+    let discovery = Discovery::new(id, profile, Scope::System, timing, id.to_u32().into());
+    let mut all: Vec<Box<dyn Service>> = vec![Box::new(Transport), Box::new(Liveness::new())];
+    all.extend(services);
+    Stack::new(discovery, all)
+}
+
+impl World {
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "virtual time begins at some instant"
+    )]
+    pub(crate) fn new() -> Self {
+        Self {
+            now: Instant::now(),
+            nodes: Vec::new(),
+            flights: BTreeMap::new(),
+            flown: 0,
+        }
+    }
+
+    /// Starts a component on a node of its own.
+    pub(crate) fn start(&mut self, mut stack: Stack) -> Place {
+        stack.start(self.now);
+        self.add(stack.id(), Some(stack))
+    }
+
+    /// Adds a component that only does what the test makes it do.
+    pub(crate) fn puppet(&mut self, id: JausId) -> Place {
+        self.add(id, None)
+    }
+
+    fn add(&mut self, id: JausId, stack: Option<Stack>) -> Place {
+        let place = self.nodes.len();
+        let port = 10_000 + u16::try_from(place).unwrap();
+        let address = SocketAddr::from(([10, 0, 0, 1], port));
+        let mut endpoint = Endpoint::new(Config::default());
+        endpoint.add_link(LINK, [address]);
+        endpoint.attach(id).unwrap();
+        self.nodes.push(Node {
+            address,
+            id,
+            endpoint,
+            stack,
+            up: true,
+            datagrams: 0,
+            received: Vec::new(),
+            changes: Vec::new(),
+        });
+        Place(place)
+    }
+
+    /// Takes a node off the network, without a word to anyone.
+    pub(crate) fn kill(&mut self, place: Place) {
+        self.nodes[place.0].up = false;
+    }
+
+    /// Puts a node back on the network, as if nothing had happened.
+    pub(crate) fn revive(&mut self, place: Place) {
+        self.nodes[place.0].up = true;
+    }
+
+    pub(crate) fn stack(&mut self, place: Place) -> &mut Stack {
+        self.nodes[place.0].stack.as_mut().unwrap()
+    }
+
+    /// What a component has noticed since the last call, with the time.
+    pub(crate) fn changes(&mut self, place: Place) -> Vec<(Instant, Change)> {
+        std::mem::take(&mut self.nodes[place.0].changes)
+    }
+
+    /// What a puppet has received since the last call.
+    pub(crate) fn received(&mut self, place: Place) -> Vec<Received> {
+        std::mem::take(&mut self.nodes[place.0].received)
+    }
+
+    /// The messages of one type that a puppet has received since the last call; all others are
+    /// thrown away.
+    pub(crate) fn received_as<M: Message>(&mut self, place: Place) -> Vec<M> {
+        let received = self.received(place);
+        received
+            .iter()
+            .filter_map(|message| M::decode(&message.payload).ok())
+            .collect()
+    }
+
+    /// The datagrams that a node has sent so far; one to the group counts once.
+    pub(crate) fn datagrams(&self, place: Place) -> u64 {
+        self.nodes[place.0].datagrams
+    }
+
+    /// Has a puppet send a message.
+    pub(crate) fn say<M: Message>(&mut self, place: Place, to: JausId, message: &M) {
+        self.say_octets(place, to, message.encode().unwrap());
+    }
+
+    /// Has a puppet send octets.
+    pub(crate) fn say_octets(&mut self, place: Place, to: JausId, payload: Bytes) {
+        let node = &mut self.nodes[place.0];
+        node.endpoint
+            .send(self.now, Outgoing::new(node.id, to, payload))
+            .unwrap();
+    }
+
+    /// Lets time pass.
+    pub(crate) fn run(&mut self, duration: Duration) {
+        let end = self.now + duration;
+        loop {
+            for place in 0..self.nodes.len() {
+                self.pump(place);
+            }
+            let Some(next) = self.next_wakeup().filter(|next| *next <= end) else {
+                break;
+            };
+            assert!(next >= self.now, "time does not run backwards");
+            self.now = next;
+            self.land();
+            self.wake();
+        }
+        self.now = end;
+    }
+
+    fn next_wakeup(&self) -> Option<Instant> {
+        let flights = self.flights.keys().next().map(|(arrival, _)| *arrival);
+        let nodes = self.nodes.iter().filter(|node| node.up).flat_map(|node| {
+            let stack = node.stack.as_ref().and_then(Stack::poll_timeout);
+            [node.endpoint.poll_timeout(), stack].into_iter().flatten()
+        });
+        flights
+            .into_iter()
+            .chain(nodes)
+            .min()
+            .map(|next| next.max(self.now))
+    }
+
+    fn land(&mut self) {
+        while let Some(entry) = self.flights.first_entry() {
+            if entry.key().0 > self.now {
+                return;
+            }
+            let flight = entry.remove();
+            let receiver = self.nodes.iter_mut().find(|node| node.address == flight.to);
+            if let Some(node) = receiver.filter(|node| node.up) {
+                node.endpoint
+                    .handle_datagram(self.now, flight.from, flight.payload);
+            }
+        }
+    }
+
+    fn wake(&mut self) {
+        let due = |wake: Option<Instant>| wake.is_some_and(|wake| wake <= self.now);
+        for node in self.nodes.iter_mut().filter(|node| node.up) {
+            if due(node.endpoint.poll_timeout()) {
+                node.endpoint.handle_timeout(self.now);
+            }
+            if let Some(stack) = node
+                .stack
+                .as_mut()
+                .filter(|stack| due(stack.poll_timeout()))
+            {
+                stack.handle_timeout(self.now);
+            }
+        }
+    }
+
+    /// Carries messages between a node's component, its endpoint and the network.
+    fn pump(&mut self, place: usize) {
+        let now = self.now;
+        let node = &mut self.nodes[place];
+        if !node.up {
+            return;
+        }
+        loop {
+            while let Some(event) = node.endpoint.poll_event() {
+                let Event::Received(message) = event else {
+                    continue;
+                };
+                match &mut node.stack {
+                    Some(stack) => stack.handle_message(now, &message),
+                    None => node.received.push(message),
+                }
+            }
+            let Some(stack) = &mut node.stack else { break };
+            while let Some(event) = stack.poll_event() {
+                if let jaus::service::Event::Change(change) = event {
+                    node.changes.push((now, change));
+                }
+            }
+            let Some(message) = stack.poll_transmit() else {
+                break;
+            };
+            node.endpoint.send(now, message).unwrap();
+        }
+        let mut departures = Vec::new();
+        while let Some(transmit) = node.endpoint.poll_transmit() {
+            node.datagrams += 1;
+            departures.push((node.address, transmit));
+        }
+        for (from, transmit) in departures {
+            let everybody = self.nodes.iter().map(|node| node.address);
+            let receivers: Vec<_> = match transmit.to {
+                To::Peer(address) => vec![address],
+                To::Group => everybody.filter(|address| *address != from).collect(),
+            };
+            for to in receivers {
+                self.flown += 1;
+                let from = Path {
+                    link: LINK,
+                    peer: from,
+                };
+                let flight = Flight {
+                    from,
+                    to,
+                    payload: transmit.payload.clone(),
+                };
+                self.flights.insert((now + DELAY, self.flown), flight);
+            }
+        }
+    }
+}
