@@ -6,11 +6,11 @@ cd "$(dirname "$0")"
 
 seconds=${1:-15}
 [ $# -eq 0 ] || shift
-[ $# -gt 0 ] || set -- judp dynamic jsidl_text
+[ $# -gt 0 ] || set -- judp generated dynamic jsidl_text
 
 cargo +nightly run --quiet --bin seeds
 for target in "$@"; do
-    options="-max_total_time=$seconds -print_final_stats=1 -verbosity=0"
+    options="-max_total_time=$seconds -print_final_stats=1 -verbosity=0 -print_funcs=0"
     [ ! -f "dictionaries/$target.dict" ] || options="$options -dict=dictionaries/$target.dict"
     echo "== $target for $seconds s"
     # shellcheck disable=SC2086 # several options

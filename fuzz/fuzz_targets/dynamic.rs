@@ -1,22 +1,25 @@
 //! The dynamic codec on the embedded definitions: two octets choose the message, one the way in
-//! (octets, a random value, JSON text), and the rest goes in.
+//! (JSON text, a random value, octets), and the rest goes in. The generated codec must agree.
 #![no_main]
 
-use jaus_fuzz::{choose, octets_come_back, with_code};
+use bytes::Bytes;
+use jaus_fuzz::{Declared, choose, generated, octets_come_back, with_code};
 use jsidl::dynamic::{Value, arbitrary, decode, encode, from_json, to_json};
 use jsidl::model::Message;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|octets: &[u8]| {
-    let Some(((_, message), rest)) = choose(octets) else {
+    let Some((declared, rest)) = choose(octets) else {
         return;
     };
+    let message = &declared.1;
     match rest.split_first() {
         Some((0, text)) => json_comes_back(message, text),
-        Some((1, entropy)) => value_comes_back(message, arbitrary(message, entropy)),
+        Some((1, entropy)) => value_comes_back(declared, arbitrary(message, entropy)),
         Some((_, body)) => {
             let octets = with_code(message.code, body);
             octets_come_back(message, &octets);
+            both_agree(declared, &octets);
             if let Ok(value) = decode(message, &octets) {
                 view_comes_back(message, &value);
             }
@@ -25,9 +28,11 @@ fuzz_target!(|octets: &[u8]| {
     }
 });
 
-fn value_comes_back(message: &Message, value: Value) {
+fn value_comes_back(declared: &Declared, value: Value) {
+    let message = &declared.1;
     let octets = encode(message, &value).expect("made for the definition");
     assert_eq!(decode(message, &octets), Ok(value.clone()));
+    both_agree(declared, &octets);
     view_comes_back(message, &value);
 }
 
@@ -59,5 +64,29 @@ fn json_comes_back(message: &Message, text: &[u8]) {
     view_comes_back(message, &value);
     if let Ok(octets) = encode(message, &value) {
         assert_eq!(decode(message, &octets), Ok(value));
+    }
+}
+
+/// The generated codec accepts the same octets and shows the same text.
+fn both_agree(declared: &Declared, octets: &[u8]) {
+    let Some(info) = generated(declared) else {
+        return;
+    };
+    let message = &declared.1;
+    match (
+        (info.decode)(&Bytes::copy_from_slice(octets)),
+        decode(message, octets),
+    ) {
+        (Ok(generated), Ok(value)) => {
+            let text = serde_json::to_string(&*generated).expect("a tree of plain values");
+            assert_eq!(
+                text,
+                to_json(message, &value)
+                    .expect("names are unique")
+                    .to_string()
+            );
+        }
+        (Err(_), Err(_)) => {}
+        (generated, value) => panic!("{generated:?}, but {value:?}"),
     }
 }

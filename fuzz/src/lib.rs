@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
+use jaus::codec::MessageInfo;
 use jsidl::dynamic::{Limits, decode_with, encode_with};
 use jsidl::model::{Id, Message};
 
@@ -35,6 +36,16 @@ pub fn choose(octets: &[u8]) -> Option<(&'static Declared, &[u8])> {
     messages
         .get(usize::from(u16::from_le_bytes(*choice)) % messages.len())
         .map(|m| (m, rest))
+}
+
+/// The type that was generated for a declared message, if its set is switched on.
+pub fn generated((id, message): &Declared) -> Option<&'static MessageInfo> {
+    let same = |service: &jaus::codec::ServiceId| {
+        *service.urn == *id.urn
+            && (service.major, service.minor) == (id.version.major, id.version.minor)
+    };
+    let mut types = jaus::messages::registry().by_code(message.code);
+    types.find(|info| info.name == message.name && info.services.iter().any(same))
 }
 
 /// Octets of a message: its code and these.
