@@ -269,6 +269,32 @@ async fn a_component_that_does_not_read_stops_nobody_and_keeps_the_urgent() {
 }
 
 #[tokio::test]
+async fn large_messages_arrive_whole_whatever_the_size_of_packets() {
+    for payload_limit in [1425, 65_492] {
+        let group = own_group();
+        let mut config = Config::loopback(101, 1).group(group);
+        config.payload_limit = payload_limit;
+        config.max_message = 1 << 20;
+        let a = Node::start(config.clone()).unwrap();
+        config.subsystem = 102;
+        let b = Node::start(config).unwrap();
+        let (mut receiver, sender) = (a.attach(1).unwrap(), b.attach(1).unwrap());
+
+        // No longer than what a receive buffer of the usual size holds at once.
+        for length in [2, 1425, 1426, 100_000] {
+            let image: Bytes = (0..length).map(|i| (i * 7 % 251) as u8).collect();
+            sender
+                .send(to(&sender, receiver.id(), image.clone()))
+                .unwrap();
+            assert!(
+                receive(&mut receiver).await.payload == image,
+                "{length} octets"
+            );
+        }
+    }
+}
+
+#[tokio::test]
 async fn what_is_sent_before_the_end_still_arrives_and_then_every_port_ends() {
     let group = own_group();
     let (a, b) = (start(101, 1, group), start(102, 1, group));

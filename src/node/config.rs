@@ -17,12 +17,18 @@
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr, SocketAddrV4};
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use super::mailbox::MailboxLimits;
 use crate::address::{JausId, ParseIdError};
+use crate::endpoint;
 use crate::link::udp::{self, PortTaken};
 use crate::link::{Group, Interfaces, InvalidGroup, STANDARD_PORT};
+
+/// A UDP datagram holds 65507 octets, of which one and fourteen are headers.
+const PAYLOAD_LIMITS: RangeInclusive<usize> = 64..=65_492;
+const LONGEST_MESSAGE: usize = 16 << 20;
 
 /// Everything that can be set about a node. All but the id has a default.
 ///
@@ -56,6 +62,12 @@ pub struct Config {
     pub receive_buffer: usize,
     /// Peers to whom everything for the group is sent by unicast too.
     pub peers: Vec<Peer>,
+    /// The most octets of payload in one packet, 64 to 65492. The default, 1425, keeps a packet
+    /// within one Ethernet frame.
+    pub payload_limit: usize,
+    /// The longest message, in octets, that is sent or received, up to 16 MiB. Above
+    /// `payload_limit` it travels in fragments.
+    pub max_message: usize,
     /// How much may wait for each component.
     pub mailbox: MailboxLimits,
 }
@@ -71,6 +83,7 @@ impl Config {
     #[must_use]
     pub fn new(subsystem: u16, node: u8) -> Self {
         let udp = udp::Settings::default();
+        let endpoint = endpoint::Config::default();
         Self {
             subsystem,
             node,
@@ -81,6 +94,8 @@ impl Config {
             ttl: udp.ttl,
             receive_buffer: udp.receive_buffer,
             peers: Vec::new(),
+            payload_limit: endpoint.payload_limit,
+            max_message: endpoint.max_message,
             mailbox: MailboxLimits::default(),
         }
     }
@@ -142,10 +157,32 @@ impl Config {
         if !(1..JausId::ANY_NODE).contains(&self.node) {
             return Err(ConfigError::Node(self.node));
         }
+        if !PAYLOAD_LIMITS.contains(&self.payload_limit) {
+            return Err(ConfigError::PayloadLimit(self.payload_limit));
+        }
+        if !(self.payload_limit..=LONGEST_MESSAGE).contains(&self.max_message) {
+            let (message, payload) = (self.max_message, self.payload_limit);
+            return Err(ConfigError::MaxMessage { message, payload });
+        }
         if self.mailbox.messages == 0 {
             return Err(ConfigError::Mailbox);
         }
         self.group.validate().map_err(ConfigError::Group)
+    }
+
+    /// The endpoint's settings; its bounds leave room for two of the longest messages.
+    pub(super) fn endpoint(&self, first_sequence: u16) -> endpoint::Config {
+        let usual = endpoint::Config::default();
+        let fragments = 2 * (self.max_message / self.payload_limit + 1);
+        endpoint::Config {
+            payload_limit: self.payload_limit,
+            max_message: self.max_message,
+            max_reassembly: usual.max_reassembly.max(2 * self.max_message),
+            queue_limit: usual.queue_limit.max(fragments),
+            max_unacknowledged: usual.max_unacknowledged.max(fragments),
+            first_sequence,
+            ..usual
+        }
     }
 
     pub(super) fn udp(&self) -> udp::Settings {
@@ -233,6 +270,17 @@ pub enum ConfigError {
     /// 0 names nobody, 255 everybody.
     #[error("node {0} cannot be: choose a number from 1 to 254")]
     Node(u8),
+    /// Too little for a packet, or more than one holds.
+    #[error("payload_limit {0} cannot be: a packet holds 64 to 65492 octets of payload")]
+    PayloadLimit(usize),
+    /// Less than a packet, or more than a small board should be asked to keep.
+    #[error("max_message {message} cannot be: choose from {payload} (payload_limit) to 16777216")]
+    MaxMessage {
+        /// The length that was chosen, in octets.
+        message: usize,
+        /// [`Config::payload_limit`].
+        payload: usize,
+    },
     /// A mailbox without room.
     #[error("a mailbox must hold at least 1 message")]
     Mailbox,
@@ -279,6 +327,23 @@ mod tests {
             );
         }
         assert_eq!(Config::new(65534, 254).validate(), Ok(()));
+    }
+
+    #[test]
+    fn sizes_that_no_packet_has_are_refused() {
+        let with = |payload_limit, max_message| {
+            let config = Config {
+                payload_limit,
+                max_message,
+                ..Config::new(1, 1)
+            };
+            config.validate().map_err(|error| error.to_string())
+        };
+        assert!(with(63, 1000).unwrap_err().contains("64 to 65492"));
+        assert!(with(65_493, 70_000).unwrap_err().contains("64 to 65492"));
+        assert!(with(1000, 999).unwrap_err().contains("from 1000"));
+        assert!(with(1000, 16_777_217).unwrap_err().contains("16777216"));
+        assert_eq!(with(65_492, 16_777_216), Ok(()));
     }
 
     #[test]

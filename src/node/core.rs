@@ -11,12 +11,12 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::{broadcast, watch};
 
+use super::Config;
 use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
 use crate::address::JausId;
 use crate::endpoint::{
-    self, AttachError, Endpoint, Event, MessageHandle, Outgoing, Path, Received, SendError, To,
-    Transmit,
+    AttachError, Endpoint, Event, MessageHandle, Outgoing, Path, Received, SendError, To, Transmit,
 };
 use crate::link::Slab;
 
@@ -44,12 +44,9 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    pub(super) fn new(links: Links, mailbox: MailboxLimits) -> Self {
-        let config = endpoint::Config {
-            first_sequence: random(),
-            ..endpoint::Config::default()
-        };
-        let core = Core::new(Endpoint::new(config), links, mailbox);
+    pub(super) fn new(config: &Config, links: Links) -> Self {
+        let endpoint = Endpoint::new(config.endpoint(random()));
+        let core = Core::new(endpoint, links, config.mailbox);
         Self {
             core: Mutex::new(core),
             stopped: watch::Sender::new(false),

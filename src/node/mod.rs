@@ -87,7 +87,7 @@ impl Node {
         config.validate()?;
         let runtime = tokio::runtime::Handle::try_current().map_err(|_| StartError::NoRuntime)?;
         let links = Links::open(&config)?;
-        let shared = Arc::new(Shared::new(links, config.mailbox));
+        let shared = Arc::new(Shared::new(&config, links));
         runtime.spawn(Driver::new(shared.clone()));
         Ok(Self {
             config: Arc::new(config),
