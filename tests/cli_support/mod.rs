@@ -12,9 +12,9 @@
     reason = "these helpers are tests as well"
 )]
 
-use std::io::Write;
+use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 
 use etherparse::PacketBuilder;
 use serde_json::Value as Json;
@@ -71,6 +71,55 @@ pub fn run(arguments: &[&str], input: &[u8]) -> Run {
         status: output.status.code().expect("ended by itself"),
         stdout: String::from_utf8(output.stdout).unwrap(),
         stderr: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+/// A `jaus node` that runs until it is told to end.
+pub struct Running {
+    child: Child,
+    stdout: BufReader<ChildStdout>,
+}
+
+impl Running {
+    pub fn node(flags: &[&str]) -> Self {
+        let mut child = jaus()
+            .arg("node")
+            .args(flags)
+            .args(["--seconds", "60"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let stdout = BufReader::new(child.stdout.take().unwrap());
+        Self { child, stdout }
+    }
+
+    /// Reads up to the line that contains `text`, and gives all of it.
+    #[track_caller]
+    pub fn read_until(&mut self, text: &str) -> String {
+        let mut read = String::new();
+        while !read.contains(text) {
+            assert_ne!(
+                self.stdout.read_line(&mut read).unwrap(),
+                0,
+                "no `{text}` in {read}"
+            );
+        }
+        read
+    }
+
+    /// Asks it politely to end, and gives the exit status.
+    pub fn terminate(mut self) -> Option<i32> {
+        let pid = self.child.id().to_string();
+        assert!(Command::new("kill").arg(pid).status().unwrap().success());
+        self.child.wait().unwrap().code()
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 

@@ -2,12 +2,16 @@
 
 mod decode;
 mod definitions;
+mod demo;
+mod discover;
 mod encode;
 mod failure;
 mod network;
+mod node;
 mod output;
 mod query;
 mod runtime;
+mod tree;
 
 use std::process::ExitCode;
 
@@ -34,6 +38,9 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Demo(demo::Demo),
+    Node(node::NodeCommand),
+    Discover(discover::Discover),
     Query(query::Query),
     Decode(decode::Decode),
     Encode(encode::Encode),
@@ -71,6 +78,9 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     cli.logging.start();
     let outcome = match cli.command {
+        Command::Demo(demo) => demo.run(),
+        Command::Node(node) => node.run(),
+        Command::Discover(discover) => discover.run(),
         Command::Decode(decode) => decode.run(),
         Command::Encode(encode) => encode.run(),
         Command::Query(query) => query.run(),

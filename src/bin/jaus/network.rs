@@ -5,8 +5,9 @@ use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use jaus::address::JausId;
+use jaus::component::{Builder, Component, Kind};
 use jaus::link::{Group, Interfaces};
 use jaus::node::{Config, Peer};
 use serde::Deserialize;
@@ -19,6 +20,14 @@ pub(crate) struct Network {
     /// Our id, SUBSYSTEM.NODE.COMPONENT or SUBSYSTEM.NODE (then component 1)
     #[arg(long, value_name = "ID")]
     id: Option<OwnId>,
+
+    /// What our subsystem is called
+    #[arg(long)]
+    name: Option<String>,
+
+    /// What our subsystem is
+    #[arg(long, value_enum)]
+    kind: Option<SubsystemKind>,
 
     /// Use only this interface, by name or IPv4 address (repeatable) [default: all that are up]
     #[arg(long, value_name = "INTERFACE", conflicts_with = "loopback")]
@@ -63,8 +72,30 @@ pub(crate) struct Network {
 pub(crate) struct Settings {
     /// Our component's id.
     pub(crate) id: JausId,
+    /// What our subsystem is, if somebody said.
+    pub(crate) kind: Option<SubsystemKind>,
+    /// What it is called, if somebody said.
+    pub(crate) name: Option<String>,
     /// The node to run.
     pub(crate) node: Config,
+}
+
+impl Settings {
+    /// A component with this kind and name, where neither flags nor file say otherwise.
+    pub(crate) fn component(&self, kind: Kind, name: &str) -> Builder {
+        let kind = self.kind.map_or(kind, Kind::from);
+        Component::builder(kind, self.name.as_deref().unwrap_or(name))
+    }
+}
+
+impl From<SubsystemKind> for Kind {
+    fn from(kind: SubsystemKind) -> Self {
+        match kind {
+            SubsystemKind::Vehicle => Self::Vehicle,
+            SubsystemKind::Ocu => Self::OperatorControlUnit,
+            SubsystemKind::Other => Self::OtherSubsystem,
+        }
+    }
 }
 
 /// Our own id: one component, so no wildcards.
@@ -98,10 +129,23 @@ impl TryFrom<String> for OwnId {
     }
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum SubsystemKind {
+    /// Something that moves or acts
+    Vehicle,
+    /// An operator control unit
+    Ocu,
+    /// Anything else
+    Other,
+}
+
 /// The keys of a settings file that are not a node's own.
 #[derive(Debug, Default, Deserialize)]
 struct Presentation {
     id: Option<OwnId>,
+    name: Option<String>,
+    kind: Option<SubsystemKind>,
 }
 
 impl Network {
@@ -122,7 +166,12 @@ impl Network {
         self.apply_to(&mut node);
         node.validate()
             .map_err(|error| Failure::new(error.to_string()))?;
-        Ok(Settings { id, node })
+        Ok(Settings {
+            id,
+            kind: self.kind.or(presentation.kind),
+            name: self.name.clone().or(presentation.name),
+            node,
+        })
     }
 
     /// Lays the flags over what the file says.
@@ -152,7 +201,9 @@ fn read(path: &Path) -> Result<(Presentation, Config), Failure> {
     let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
     let wrong = |error: toml::de::Error| Failure::new(format!("{}: {error}", path.display()));
     let mut table: toml::Table = toml::from_str(&text).map_err(wrong)?;
-    let own = ["id"].into_iter().filter_map(|key| table.remove_entry(key));
+    let own = ["id", "name", "kind"]
+        .into_iter()
+        .filter_map(|key| table.remove_entry(key));
     let own: toml::Table = own.collect();
     let presentation = own.try_into().map_err(wrong)?;
     let node = table.try_into().map_err(wrong)?;

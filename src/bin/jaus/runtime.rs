@@ -1,7 +1,12 @@
-//! One thread with tokio on it.
+//! One thread with tokio on it, and the ways in which a command comes to its end.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "commands run in real time and own their tasks"
+)]
 
+use std::fmt;
 use std::future::Future;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::runtime::Builder;
 
@@ -16,6 +21,44 @@ pub(crate) fn run<T>(work: impl Future<Output = Result<T, Failure>>) -> Result<T
     runtime.block_on(work)
 }
 
+/// Waits for Ctrl-C or a request to terminate; with a time limit for that at most.
+pub(crate) async fn end(limit: Option<Duration>) {
+    let limit = async {
+        match limit {
+            Some(limit) => tokio::time::sleep(limit).await,
+            None => std::future::pending().await,
+        }
+    };
+    tokio::select! {
+        () = limit => {}
+        () = interrupt() => {}
+        () = termination() => {}
+    }
+}
+
+async fn interrupt() {
+    // Without a handler Ctrl-C still ends the process, only less politely.
+    if tokio::signal::ctrl_c().await.is_err() {
+        std::future::pending::<()>().await;
+    }
+}
+
+#[cfg(unix)]
+async fn termination() {
+    use tokio::signal::unix::{SignalKind, signal};
+    match signal(SignalKind::terminate()) {
+        Ok(mut terminate) => {
+            terminate.recv().await;
+        }
+        Err(_) => std::future::pending().await,
+    }
+}
+
+#[cfg(not(unix))]
+async fn termination() {
+    std::future::pending::<()>().await;
+}
+
 /// A flag's number of seconds: `2`, `0.5`.
 pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text
@@ -28,3 +71,23 @@ pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 const MOST: Duration = Duration::from_secs(365 * 86_400);
+
+/// The time since a command began, printed as `  12.34 s`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Clock(Instant);
+
+impl Clock {
+    pub(crate) fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    pub(crate) fn elapsed(self) -> Duration {
+        self.0.elapsed()
+    }
+}
+
+impl fmt::Display for Clock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:7.2} s", self.elapsed().as_secs_f64())
+    }
+}

@@ -1,0 +1,129 @@
+//! `jaus node`: a node that is there, and tells what it sees.
+
+use std::time::Duration;
+
+use clap::Args;
+use jaus::address::JausId;
+use jaus::component::{Component, Kind};
+use jaus::endpoint::Event;
+use jaus::node::{Events, Node};
+
+use crate::failure::{Failure, Outcome};
+use crate::network::Network;
+use crate::output::Output;
+use crate::runtime::{self, Clock};
+use crate::tree;
+
+/// Run a node with one component that others can find
+///
+/// It offers the core services Transport, Discovery and Liveness, and prints who comes, changes
+/// and goes.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus node --id 101.1.1 --name Rover --kind vehicle\n  \
+    jaus node --id 102.1 --interface eth0 --port 3795\n  \
+    jaus node --config node.toml --stats\n  \
+    jaus node --loopback                  for trying things out on one computer")]
+pub(crate) struct NodeCommand {
+    /// When it ends, print how much was received, sent and dropped, and why
+    #[arg(long)]
+    stats: bool,
+
+    /// End after this time [default: at Ctrl-C]
+    #[arg(long, value_parser = runtime::seconds)]
+    seconds: Option<Duration>,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+/// The id of whoever does not choose one.
+const ID: JausId = JausId::new(101, 1, 1);
+
+impl NodeCommand {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let settings = self.network.settings(ID)?;
+        runtime::run(async {
+            let node = Node::start(settings.node.clone()).map_err(Failure::of)?;
+            let events = node.events();
+            let component = settings
+                .component(Kind::OtherSubsystem, "jaus node")
+                .attach(&node, settings.id.component())
+                .map_err(Failure::of)?;
+            let mut output = Output::new();
+            introduce(&node, &component, &mut output)?;
+            let outcome = self.watch(&component, events, &mut output).await;
+            if self.stats {
+                statistics(&node, &mut output)?;
+            }
+            drop(component);
+            node.shutdown().await;
+            outcome
+        })
+    }
+
+    /// Prints what happens, until the end.
+    async fn watch(
+        &self,
+        component: &Component,
+        mut events: Events,
+        output: &mut Output,
+    ) -> Result<Outcome, Failure> {
+        let mut changes = component.watch();
+        let end = runtime::end(self.seconds);
+        tokio::pin!(end);
+        let clock = Clock::start();
+        loop {
+            let words = tokio::select! {
+                () = &mut end => return Ok(Outcome::Done),
+                Some(change) = changes.next() => tree::in_words(change, &component.directory()),
+                Some(event) = events.recv() => in_words(&event),
+                else => return Err(Failure::new("the node has stopped")),
+            };
+            if let Some(words) = words {
+                output.line(format_args!("{clock}  {words}"))?;
+            }
+        }
+    }
+}
+
+/// Prints what the node is and where.
+fn introduce(node: &Node, component: &Component, output: &mut Output) -> Result<(), Failure> {
+    let directory = component.directory();
+    for line in tree::lines(&directory, None) {
+        output.line(line)?;
+    }
+    for link in node.links() {
+        let group = link.group.map_or("no multicast".to_owned(), |group| {
+            format!("multicast group {group}")
+        });
+        output.line(format_args!(
+            "on {}: UDP {}, {group}",
+            link.interface.name, link.local
+        ))?;
+    }
+    output.line("Ctrl-C ends it.\n")
+}
+
+/// News of the endpoint that discovery does not tell.
+fn in_words(event: &Event) -> Option<String> {
+    match event {
+        Event::PeerMoved { id, from, to } => {
+            Some(format!("{id} has moved from {} to {}", from.peer, to.peer))
+        }
+        Event::IdConflict { id, path } => Some(format!(
+            "somebody at {} has our id {id} too: one of us must choose another (--id)",
+            path.peer
+        )),
+        _ => None,
+    }
+}
+
+/// Prints every counter that is not zero.
+fn statistics(node: &Node, output: &mut Output) -> Result<(), Failure> {
+    output.line("")?;
+    for (counter, count) in node.counters().iter().filter(|&(_, count)| count > 0) {
+        output.line(format_args!("{count:>9}  {}", counter.name()))?;
+    }
+    Ok(())
+}
