@@ -67,7 +67,7 @@ impl Build {
         self
     }
 
-    /// Generates `<name>.rs` with the services whose URN begins with `urn`, for example
+    /// Generates `<name>.rs`, with the services whose URN begins with `urn`, for example
     /// `urn:jaus:jss:core:`.
     #[must_use]
     pub fn module(mut self, name: &str, urn: &str) -> Self {
@@ -117,18 +117,15 @@ impl Build {
     }
 
     /// The modules as files, name and text, and everything that is to be said about the
-    /// definitions; a module is left out if it would be empty.
+    /// definitions. A module without services has empty tables.
     pub fn generate(self) -> (Vec<(String, String)>, crate::Diagnostics) {
         let loaded = self.loader.load();
         let module = |(name, urn): &(String, String)| {
-            let services = || loaded.library.services().map(AsRef::<Service>::as_ref);
-            let chosen: Vec<_> = services()
-                .filter(|service| service.id.urn.starts_with(urn))
-                .collect();
-            (!chosen.is_empty())
-                .then(|| (format!("{name}.rs"), rust::module(chosen, &self.runtime)))
+            let services = loaded.library.services().map(AsRef::<Service>::as_ref);
+            let chosen = services.filter(|service| service.id.urn.starts_with(urn));
+            (format!("{name}.rs"), rust::module(chosen, &self.runtime))
         };
-        let files: Vec<_> = self.modules.iter().filter_map(module).collect();
+        let files = self.modules.iter().map(module).collect();
         (files, loaded.diagnostics)
     }
 }

@@ -298,7 +298,7 @@ macro_rules! __codec_scaled {
             impl $crate::codec::view::View for $name {
                 fn view(&self) -> $crate::codec::view::Value {
                     let scale = <Self as $crate::codec::Scaled>::SCALE;
-                    $crate::codec::view::Value::F64(scale.shortest(u64::from(self.0)))
+                    $crate::codec::view::Value::Real(scale.shortest(u64::from(self.0)))
                 }
 
                 fn from_view(

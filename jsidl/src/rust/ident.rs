@@ -99,6 +99,7 @@ impl Names {
         let mut candidate = base.clone();
         let mut number = 2;
         while !self.taken.insert(candidate.clone()) {
+            let separator = if base.ends_with('_') { "" } else { separator };
             candidate = format!("{base}{separator}{number}");
             number += 1;
         }

@@ -42,8 +42,8 @@ pub fn module<'m>(services: impl IntoIterator<Item = &'m Service>, runtime: &str
     };
     out.push(format!("use {runtime}{rename};"));
     let mut names = Names::reserving(&["codec"]);
-    let plans = plan(&services, &mut names);
     let paths = registry::services(&mut out, &services, &mut names);
+    let plans = plan(&services, &mut names);
     registry::tables(&mut out, &services, &paths, &plans);
     write(&mut out, &plans);
     out.finish()

@@ -29,39 +29,46 @@ integer!(
     i8 => Signed, i16 => Signed, i32 => Signed, i64 => Signed
 );
 
-macro_rules! float {
-    ($($float:ident => $kind:ident),*) => {$(
-        impl View for $float {
-            fn view(&self) -> Value {
-                match *self {
-                    value if value.is_nan() => Value::Text("NaN".into()),
-                    Self::INFINITY => Value::Text("Infinity".into()),
-                    Self::NEG_INFINITY => Value::Text("-Infinity".into()),
-                    value => Value::$kind(value),
-                }
-            }
-
-            fn from_view(value: &Value) -> Result<Self, Error> {
-                let number = match value {
-                    Value::Text(text) => match &**text {
-                        "NaN" => return Ok(Self::NAN),
-                        "Infinity" => return Ok(Self::INFINITY),
-                        "-Infinity" => return Ok(Self::NEG_INFINITY),
-                        _ => return Err(value.unexpected("a number")),
-                    },
-                    _ => value.number()?,
-                };
-                let narrow = number as Self;
-                if narrow.is_infinite() {
-                    return Err(value.unexpected("a number that its type can hold"));
-                }
-                Ok(narrow)
-            }
+impl View for f64 {
+    fn view(&self) -> Value {
+        match *self {
+            value if value.is_nan() => Value::Text("NaN".into()),
+            Self::INFINITY => Value::Text("Infinity".into()),
+            Self::NEG_INFINITY => Value::Text("-Infinity".into()),
+            value => Value::Real(value),
         }
-    )*};
+    }
+
+    fn from_view(value: &Value) -> Result<Self, Error> {
+        match value {
+            Value::Text(text) if text == "NaN" => Ok(Self::NAN),
+            Value::Text(text) if text == "Infinity" => Ok(Self::INFINITY),
+            Value::Text(text) if text == "-Infinity" => Ok(Self::NEG_INFINITY),
+            _ => value.number(),
+        }
+    }
 }
 
-float!(f32 => F32, f64 => F64);
+impl View for f32 {
+    /// The `f64` with the same shortest decimal: 0.1, not 0.10000000149011612.
+    fn view(&self) -> Value {
+        let decimal = self.to_string().parse().unwrap_or(f64::from(*self));
+        if decimal as Self == *self {
+            decimal.view()
+        } else {
+            f64::from(*self).view()
+        }
+    }
+
+    fn from_view(value: &Value) -> Result<Self, Error> {
+        let wide = f64::from_view(value)?;
+        let narrow = wide as Self;
+        if narrow.is_infinite() && wide.is_finite() {
+            return Err(value.unexpected("a number in the range of a float"));
+        }
+        Ok(narrow)
+    }
+}
 
 impl<T: View> View for Option<T> {
     fn view(&self) -> Value {

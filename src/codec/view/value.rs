@@ -19,10 +19,8 @@ pub enum Value {
     Unsigned(u64),
     /// A negative integer, when it is read; any signed field, when it is shown.
     Signed(i64),
-    /// A number of single precision.
-    F32(f32),
-    /// A number of double precision.
-    F64(f64),
+    /// A real number.
+    Real(f64),
     /// Text.
     Text(Cow<'static, str>),
     /// An array.
@@ -85,8 +83,7 @@ impl Value {
         match self {
             Self::Unsigned(value) => Ok(*value as f64),
             Self::Signed(value) => Ok(*value as f64),
-            Self::F32(value) => Ok(f64::from(*value)),
-            Self::F64(value) => Ok(*value),
+            Self::Real(value) => Ok(*value),
             _ => Err(self.unexpected("a number")),
         }
     }
@@ -139,8 +136,7 @@ impl fmt::Display for Value {
             Self::Bool(value) => value.fmt(f),
             Self::Unsigned(value) => value.fmt(f),
             Self::Signed(value) => value.fmt(f),
-            Self::F32(value) => value.fmt(f),
-            Self::F64(value) => value.fmt(f),
+            Self::Real(value) => value.fmt(f),
             Self::Text(text) if text.chars().count() <= 40 => write!(f, "{text:?}"),
             Self::Text(_) => f.write_str("a long text"),
             Self::List(_) => f.write_str("an array"),
@@ -198,8 +194,7 @@ impl Serialize for Value {
             Self::Bool(value) => serializer.serialize_bool(*value),
             Self::Unsigned(value) => serializer.serialize_u64(*value),
             Self::Signed(value) => serializer.serialize_i64(*value),
-            Self::F32(value) => serializer.serialize_f32(*value),
-            Self::F64(value) => serializer.serialize_f64(*value),
+            Self::Real(value) => serializer.serialize_f64(*value),
             Self::Text(text) => serializer.serialize_str(text),
             Self::List(elements) => serializer.collect_seq(elements),
             Self::Object(members) => {
@@ -242,7 +237,7 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
-        Ok(Value::F64(value))
+        Ok(Value::Real(value))
     }
 
     fn visit_str<E>(self, text: &str) -> Result<Value, E> {

@@ -1,0 +1,279 @@
+use ::jaus::codec;
+
+/// The service `Sections`.
+///
+/// Headers and footers.
+pub mod sections {
+    use super::codec;
+
+    /// What the service is called, whatever its version.
+    pub const URN: &str = "urn:example:Sections";
+
+    /// Version 1.0.
+    pub const V1_0: codec::ServiceId = codec::ServiceId {
+        urn: URN,
+        major: 1,
+        minor: 0,
+    };
+
+    /// The newest version.
+    pub const LATEST: codec::ServiceId = V1_0;
+}
+
+/// The services of the set, by URN and version.
+pub static SERVICES: &[codec::ServiceInfo] = &[
+    codec::ServiceInfo {
+        name: "Sections",
+        id: sections::V1_0,
+        inherits_from: None,
+        inputs: &[0xF071],
+        outputs: &[],
+    },
+];
+
+/// The message types of the set, by code; of several with one code the newest first.
+pub static MESSAGES: &[codec::MessageInfo] = &[
+    codec::MessageInfo::of::<ReportSections>(&[
+        sections::V1_0,
+    ]),
+];
+
+/// `ReportSections` (F071h).
+///
+/// A message with a header and a footer of its own.
+///
+/// Declared by `urn:example:Sections 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReportSections {
+    /// `header`.
+    pub header: report_sections::Header,
+    /// `body`: up to 255 elements.
+    pub body: Vec<report_sections::ItemRec>,
+    /// `footer`.
+    pub footer: report_sections::Footer,
+}
+
+impl codec::Message for ReportSections {
+    const CODE: u16 = 0xF071;
+    const NAME: &'static str = "ReportSections";
+    const IS_COMMAND: bool = false;
+}
+
+impl codec::Composite for ReportSections {
+    const MIN_LEN: usize = 4;
+
+    fn encoded_len(&self) -> usize {
+        3
+        + 1 + self.body.len()
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(self.header);
+        output.member("body", |output| output.list::<u8, _>(&self.body, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
+        output.fixed(self.footer);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        let header = input.member("header", codec::Reader::fixed)?;
+        let body = input.member("body", |input| input.list::<u8, _>(0, 255, 1, codec::Reader::fixed))?;
+        let footer = input.member("footer", codec::Reader::fixed)?;
+        Ok(Self {
+            header,
+            body,
+            footer,
+        })
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for ReportSections {
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object([
+                ("header", codec::view::View::view(&self.header)),
+                ("body", codec::view::View::view(&self.body)),
+                ("footer", codec::view::View::view(&self.footer)),
+            ])
+        }
+
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            let object = codec::view::Object::new(value, &["header", "body", "footer"])?;
+            Ok(Self {
+                header: object.member("header")?,
+                body: object.member("body")?,
+                footer: object.member("footer")?,
+            })
+        }
+    }
+    codec::view::serde_by_view!(ReportSections);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportSections {
+        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self {
+                header: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                body: codec::arbitrary::list(random, 0, 255, codec::arbitrary::Arbitrary::arbitrary)?,
+                footer: codec::arbitrary::Arbitrary::arbitrary(random)?,
+            })
+        }
+    }
+}
+
+/// The types inside [`ReportSections`](super::ReportSections).
+pub mod report_sections {
+    use super::codec;
+
+    /// `header`.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub struct Header {
+        /// `Priority`.
+        pub priority: u8,
+    }
+
+    impl codec::Fixed for Header {
+        const SIZE: usize = 1;
+
+        #[inline]
+        fn get(run: &[u8], at: usize) -> Self {
+            Self {
+                priority: codec::Fixed::get(run, at),
+            }
+        }
+
+        #[inline]
+        fn put(self, run: &mut [u8], at: usize) {
+            codec::Fixed::put(self.priority, run, at);
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for Header {
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object([
+                    ("Priority", codec::view::View::view(&self.priority)),
+                ])
+            }
+
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let object = codec::view::Object::new(value, &["Priority"])?;
+                Ok(Self {
+                    priority: object.member("Priority")?,
+                })
+            }
+        }
+        codec::view::serde_by_view!(Header);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for Header {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self {
+                    priority: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                })
+            }
+        }
+    }
+
+    /// `ItemRec`.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub struct ItemRec {
+        /// `Item`.
+        pub item: u8,
+    }
+
+    impl codec::Fixed for ItemRec {
+        const SIZE: usize = 1;
+
+        #[inline]
+        fn get(run: &[u8], at: usize) -> Self {
+            Self {
+                item: codec::Fixed::get(run, at),
+            }
+        }
+
+        #[inline]
+        fn put(self, run: &mut [u8], at: usize) {
+            codec::Fixed::put(self.item, run, at);
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for ItemRec {
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object([
+                    ("Item", codec::view::View::view(&self.item)),
+                ])
+            }
+
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let object = codec::view::Object::new(value, &["Item"])?;
+                Ok(Self {
+                    item: object.member("Item")?,
+                })
+            }
+        }
+        codec::view::serde_by_view!(ItemRec);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for ItemRec {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self {
+                    item: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                })
+            }
+        }
+    }
+
+    /// `footer`.
+    #[derive(Debug, Clone, Copy, Default, PartialEq)]
+    pub struct Footer {
+        /// `Checksum`.
+        pub checksum: u16,
+    }
+
+    impl codec::Fixed for Footer {
+        const SIZE: usize = 2;
+
+        #[inline]
+        fn get(run: &[u8], at: usize) -> Self {
+            Self {
+                checksum: codec::Fixed::get(run, at),
+            }
+        }
+
+        #[inline]
+        fn put(self, run: &mut [u8], at: usize) {
+            codec::Fixed::put(self.checksum, run, at);
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for Footer {
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object([
+                    ("Checksum", codec::view::View::view(&self.checksum)),
+                ])
+            }
+
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let object = codec::view::Object::new(value, &["Checksum"])?;
+                Ok(Self {
+                    checksum: object.member("Checksum")?,
+                })
+            }
+        }
+        codec::view::serde_by_view!(Footer);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for Footer {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self {
+                    checksum: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                })
+            }
+        }
+    }
+}

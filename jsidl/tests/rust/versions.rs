@@ -1,0 +1,377 @@
+use ::jaus::codec;
+
+/// The service `Versions`.
+///
+/// Version 1.1 of the service.
+pub mod versions {
+    use super::codec;
+
+    /// What the service is called, whatever its version.
+    pub const URN: &str = "urn:example:Versions";
+
+    /// Version 1.1.
+    pub const V1_1: codec::ServiceId = codec::ServiceId {
+        urn: URN,
+        major: 1,
+        minor: 1,
+    };
+
+    /// Version 1.0.
+    pub const V1_0: codec::ServiceId = codec::ServiceId {
+        urn: URN,
+        major: 1,
+        minor: 0,
+    };
+
+    /// The newest version.
+    pub const LATEST: codec::ServiceId = V1_1;
+}
+
+/// The services of the set, by URN and version.
+pub static SERVICES: &[codec::ServiceInfo] = &[
+    codec::ServiceInfo {
+        name: "Versions",
+        id: versions::V1_0,
+        inherits_from: None,
+        inputs: &[0xF081, 0xF082],
+        outputs: &[],
+    },
+    codec::ServiceInfo {
+        name: "Versions",
+        id: versions::V1_1,
+        inherits_from: None,
+        inputs: &[0xF081, 0xF082],
+        outputs: &[],
+    },
+];
+
+/// The message types of the set, by code; of several with one code the newest first.
+pub static MESSAGES: &[codec::MessageInfo] = &[
+    codec::MessageInfo::of::<ReportState>(&[
+        versions::V1_1,
+    ]),
+    codec::MessageInfo::of::<v1_0::ReportState>(&[
+        versions::V1_0,
+    ]),
+    codec::MessageInfo::of::<ReportMode>(&[
+        versions::V1_1,
+        versions::V1_0,
+    ]),
+];
+
+/// `ReportState` (F081h).
+///
+/// The state, finer.
+///
+/// Declared by `urn:example:Versions 1.1`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReportState {
+    /// `Speed`: meter per second, 0 to 327.67.
+    pub speed: report_state::Speed,
+    /// `Mode`.
+    pub mode: report_state::Mode,
+}
+
+impl ReportState {
+    /// `Speed` in meter per second.
+    pub fn speed_m_per_s(&self) -> f64 {
+        self.speed.value()
+    }
+
+    /// Sets `Speed` in meter per second to the nearest value that the field can hold.
+    ///
+    /// # Errors
+    /// If the value is not in 0 to 327.67.
+    pub fn set_speed_m_per_s(&mut self, value: f64) -> Result<(), codec::OutOfRange> {
+        self.speed = report_state::Speed::new(value)?;
+        Ok(())
+    }
+}
+
+impl codec::Message for ReportState {
+    const CODE: u16 = 0xF081;
+    const NAME: &'static str = "ReportState";
+    const IS_COMMAND: bool = false;
+}
+
+impl codec::Composite for ReportState {
+    const MIN_LEN: usize = 5;
+
+    fn encoded_len(&self) -> usize {
+        5
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        let mut run = [0; 5];
+        codec::Fixed::put(self.speed, &mut run, 0);
+        codec::Fixed::put(self.mode, &mut run, 4);
+        output.run(&run);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        let run = input.run::<5>(&[
+            ("Speed", 4),
+            ("Mode", 1),
+        ])?;
+        let speed = codec::Fixed::get(run, 0);
+        let mode = codec::Fixed::get(run, 4);
+        Ok(Self {
+            speed,
+            mode,
+        })
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for ReportState {
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object([
+                ("Speed", codec::view::View::view(&self.speed)),
+                ("Mode", codec::view::View::view(&self.mode)),
+            ])
+        }
+
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            let object = codec::view::Object::new(value, &["Speed", "Mode"])?;
+            Ok(Self {
+                speed: object.member("Speed")?,
+                mode: object.member("Mode")?,
+            })
+        }
+    }
+    codec::view::serde_by_view!(ReportState);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportState {
+        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self {
+                speed: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                mode: codec::arbitrary::Arbitrary::arbitrary(random)?,
+            })
+        }
+    }
+}
+
+/// The types inside [`ReportState`](super::ReportState).
+pub mod report_state {
+    use super::codec;
+
+    /// `Speed` in meter per second: 0 to 327.67 in steps of 7.629e-8, carried as `u32`.
+    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    pub struct Speed(u32);
+
+    codec::scaled!(Speed(u32), "Speed", 0.0_f64 to 327.67_f64 "meter per second", Round);
+
+    /// `Mode`: a number with named values. Others are kept as they come.
+    #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+    pub struct Mode(pub u8);
+
+    impl Mode {
+        /// `Off` = 0.
+        pub const OFF: Self = Self(0);
+        /// `On` = 1.
+        pub const ON: Self = Self(1);
+    }
+
+    codec::enumeration!(Mode(u8), [
+        (0, "Off"),
+        (1, "On"),
+    ]);
+}
+
+/// `ReportMode` (F082h).
+///
+/// The mode; only names were added.
+///
+/// Declared by `urn:example:Versions 1.1`, `urn:example:Versions 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReportMode {
+    /// `Mode`.
+    pub mode: report_mode::Mode,
+}
+
+impl codec::Message for ReportMode {
+    const CODE: u16 = 0xF082;
+    const NAME: &'static str = "ReportMode";
+    const IS_COMMAND: bool = false;
+}
+
+impl codec::Composite for ReportMode {
+    const MIN_LEN: usize = 1;
+
+    fn encoded_len(&self) -> usize {
+        1
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(self.mode);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        let mode = input.member("Mode", codec::Reader::fixed)?;
+        Ok(Self {
+            mode,
+        })
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for ReportMode {
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object([
+                ("Mode", codec::view::View::view(&self.mode)),
+            ])
+        }
+
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            let object = codec::view::Object::new(value, &["Mode"])?;
+            Ok(Self {
+                mode: object.member("Mode")?,
+            })
+        }
+    }
+    codec::view::serde_by_view!(ReportMode);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportMode {
+        fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self {
+                mode: codec::arbitrary::Arbitrary::arbitrary(random)?,
+            })
+        }
+    }
+}
+
+/// The types inside [`ReportMode`](super::ReportMode).
+pub mod report_mode {
+    #[doc(inline)]
+    pub use super::report_state::Mode;
+}
+
+/// Messages as services of version 1.0 had them, where newer ones differ.
+pub mod v1_0 {
+    use super::codec;
+
+    /// `ReportState` (F081h).
+    ///
+    /// The state.
+    ///
+    /// Declared by `urn:example:Versions 1.0`.
+    #[derive(Debug, Clone, Default, PartialEq)]
+    pub struct ReportState {
+        /// `Speed`: meter per second, 0 to 327.67.
+        pub speed: report_state::Speed,
+        /// `Mode`.
+        pub mode: report_state::Mode,
+    }
+
+    impl ReportState {
+        /// `Speed` in meter per second.
+        pub fn speed_m_per_s(&self) -> f64 {
+            self.speed.value()
+        }
+
+        /// Sets `Speed` in meter per second to the nearest value that the field can hold.
+        ///
+        /// # Errors
+        /// If the value is not in 0 to 327.67.
+        pub fn set_speed_m_per_s(&mut self, value: f64) -> Result<(), codec::OutOfRange> {
+            self.speed = report_state::Speed::new(value)?;
+            Ok(())
+        }
+    }
+
+    impl codec::Message for ReportState {
+        const CODE: u16 = 0xF081;
+        const NAME: &'static str = "ReportState";
+        const IS_COMMAND: bool = false;
+    }
+
+    impl codec::Composite for ReportState {
+        const MIN_LEN: usize = 3;
+
+        fn encoded_len(&self) -> usize {
+            3
+        }
+
+        fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+            let mut run = [0; 3];
+            codec::Fixed::put(self.speed, &mut run, 0);
+            codec::Fixed::put(self.mode, &mut run, 2);
+            output.run(&run);
+            Ok(())
+        }
+
+        fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            let run = input.run::<3>(&[
+                ("Speed", 2),
+                ("Mode", 1),
+            ])?;
+            let speed = codec::Fixed::get(run, 0);
+            let mode = codec::Fixed::get(run, 2);
+            Ok(Self {
+                speed,
+                mode,
+            })
+        }
+    }
+
+    codec::if_serde! {
+        impl codec::view::View for ReportState {
+            fn view(&self) -> codec::view::Value {
+                codec::view::Value::object([
+                    ("Speed", codec::view::View::view(&self.speed)),
+                    ("Mode", codec::view::View::view(&self.mode)),
+                ])
+            }
+
+            fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+                let object = codec::view::Object::new(value, &["Speed", "Mode"])?;
+                Ok(Self {
+                    speed: object.member("Speed")?,
+                    mode: object.member("Mode")?,
+                })
+            }
+        }
+        codec::view::serde_by_view!(ReportState);
+    }
+
+    codec::if_arbitrary! {
+        impl<'a> codec::arbitrary::Arbitrary<'a> for ReportState {
+            fn arbitrary(random: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+                Ok(Self {
+                    speed: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                    mode: codec::arbitrary::Arbitrary::arbitrary(random)?,
+                })
+            }
+        }
+    }
+
+    /// The types inside [`ReportState`](super::ReportState).
+    pub mod report_state {
+        use super::codec;
+
+        /// `Speed` in meter per second: 0 to 327.67 in steps of 5.000e-3, carried as `u16`.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct Speed(u16);
+
+        codec::scaled!(Speed(u16), "Speed", 0.0_f64 to 327.67_f64 "meter per second", Round);
+
+        /// `Mode`: a number with named values. Others are kept as they come.
+        #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct Mode(pub u8);
+
+        impl Mode {
+            /// `Off` = 0.
+            pub const OFF: Self = Self(0);
+        }
+
+        codec::enumeration!(Mode(u8), [
+            (0, "Off"),
+        ]);
+    }
+}

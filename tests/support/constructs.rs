@@ -1,0 +1,25 @@
+//! Messages generated from small definitions, one module for each part of the language. The texts
+//! are those that the emitter's own tests keep.
+
+macro_rules! constructs {
+    ($($name:ident),* $(,)?) => {
+        $(
+            #[allow(missing_docs, unreachable_pub, dead_code, clippy::all, reason = "generated")]
+            pub(crate) mod $name {
+                include!(concat!(
+                    env!("CARGO_MANIFEST_DIR"),
+                    "/jsidl/tests/rust/",
+                    stringify!($name),
+                    ".rs"
+                ));
+            }
+        )*
+
+        /// All of them.
+        pub(crate) static MESSAGES: &[&[jaus::codec::MessageInfo]] = &[$($name::MESSAGES),*];
+    };
+}
+
+constructs!(
+    arrays, bits, composites, measures, names, numbers, octets, sections, versions
+);
