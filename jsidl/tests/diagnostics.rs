@@ -621,7 +621,22 @@ t.xml:3:33: error: `format_field` lacks the element `format_enum`: add it
 }
 
 #[test]
-fn a_message_id_is_two_octets() {
+fn a_message_has_an_id_of_two_octets_and_says_whether_it_is_a_command() {
+    check(
+        &messages(
+            r#"<message_def name="A" is_command="perhaps">
+<header name="H"><record name="R"><fixed_field name="Code" field_type="unsigned short integer" field_units="one"/></record></header><body name="B"/><footer name="F"/>
+</message_def>
+<message_def name="B" message_id="2B00">
+<header name="H"><record name="R"><fixed_field name="Code" field_type="unsigned short integer" field_units="one"/></record></header><body name="B"/><footer name="F"/>
+</message_def>"#,
+        ),
+        "
+t.xml:3:1: error: `message_def` lacks the attribute `message_id`: add it
+t.xml:3:35: error: `perhaps` is not a value of `is_command`: use `true`, `false`, `1`, `0`
+t.xml:6:1: error: `message_def` lacks the attribute `is_command`: add it
+",
+    );
     check(
         &messages(
             r#"<message_def name="A" message_id="2B0" is_command="false">
@@ -660,21 +675,21 @@ fn a_message_id_is_two_octets() {
 fn a_message_begins_with_its_code() {
     check(
         &messages(
-            r#"<message_def name="A" message_id="2B00">
+            r#"<message_def name="A" message_id="2B00" is_command="false">
 <header name="H"/><body name="B"/><footer name="F"/></message_def>"#,
         ),
         "t.xml:4:1: error: the header is empty: a message begins with its code, so the header must be a `record` whose first field is an `unsigned short integer`",
     );
     check(
         &messages(
-            r#"<message_def name="A" message_id="2B00">
+            r#"<message_def name="A" message_id="2B00" is_command="false">
 <header name="H"><record name="R"><fixed_field name="A" field_type="unsigned byte" field_units="one"/></record></header><body name="B"/><footer name="F"/></message_def>"#,
         ),
         "t.xml:4:1: error: the header does not begin with the message code: a message begins with its code, so the header must be a `record` whose first field is an `unsigned short integer`",
     );
     check(
         &messages(
-            r#"<message_def name="A" message_id="2B00">
+            r#"<message_def name="A" message_id="2B00" is_command="false">
 <header name="H"><list name="R"><count_field field_type_unsigned="unsigned byte"/><record name="R"><fixed_field name="A" field_type="unsigned byte" field_units="one"/></record></list></header>
 <body name="B"/></message_def>"#,
         ),

@@ -41,7 +41,7 @@ fn service(name: &str, base: &str, types: &str, inputs: &str) -> String {
 
 fn message(name: &str, code: &str, body: &str) -> String {
     format!(
-        r#"<message_def name="{name}" message_id="{code}">{HEADER}<body name="B">{body}</body><footer name="F"/></message_def>"#
+        r#"<message_def name="{name}" message_id="{code}" is_command="false">{HEADER}<body name="B">{body}</body><footer name="F"/></message_def>"#
     )
 }
 
@@ -113,6 +113,24 @@ fn a_wrong_message_costs_neither_its_service_nor_others() {
         .map(|(declaring, message)| format!("{} {}", declaring.name, message.name))
         .collect();
     assert_eq!(vocabulary, ["B More", "A Good", "A Better"]);
+}
+
+#[test]
+fn what_is_misspelt_is_left_out_and_not_guessed() {
+    let misspelt = FIELD.replace("name=", "optinal=\"true\" name=");
+    let body = |field: &str| format!(r#"<record name="R">{field}</record>"#);
+    let inputs = [
+        message("Good", "0001", &body(FIELD)),
+        message("Bad", "0002", &body(&misspelt)),
+    ];
+    let loaded = load(&[("s.xml", &service("S", "", "", &inputs.concat()))]);
+    assert_eq!(
+        loaded.diagnostics.errors().count(),
+        1,
+        "{}",
+        loaded.diagnostics
+    );
+    assert_eq!(names(&loaded.library), ["S Good"]);
 }
 
 #[test]

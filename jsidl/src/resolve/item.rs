@@ -38,7 +38,7 @@ impl Resolver<'_> {
             }),
         };
         self.nesting -= 1;
-        item
+        item.filter(|_| node.sound)
     }
 
     /// A copy of the target in which what the reference says itself prevails.

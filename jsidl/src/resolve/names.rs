@@ -68,6 +68,7 @@ impl<'a> Resolver<'a> {
             DeclarationKind::Reference(target) => self.follow(set, target),
             DeclarationKind::Faulty => None,
         };
+        let resolved = resolved.filter(|_| declaration.sound);
         self.declarations[set][position] = resolved.clone().map_or(Memo::Faulty, Memo::Done);
         resolved
     }

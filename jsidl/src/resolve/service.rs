@@ -88,7 +88,8 @@ impl Resolver<'_> {
                 }
                 _ => None,
             };
-            let message = message.filter(|_| names.insert(&declaration.name));
+            // Of two messages with one name the first counts.
+            let message = message.filter(|_| declaration.sound && names.insert(&declaration.name));
             messages.extend(message.map(|message| (message, declaration.span)));
         }
         messages

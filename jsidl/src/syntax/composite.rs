@@ -56,6 +56,7 @@ impl Reader<'_> {
             self.misplaced(xml, &parent, place.allowed());
             return None;
         };
+        let before = self.report.errors();
         let name = self.name(xml);
         let optional = self.flag(xml, "optional");
         let kind = if declared {
@@ -63,13 +64,13 @@ impl Reader<'_> {
         } else {
             self.construct(xml, construct)
         };
-        let sound = name.is_some() && optional.is_ok();
         Some(Node {
             span: self.span(xml),
             name: name.unwrap_or_default(),
             optional: optional.unwrap_or_default(),
             interpretation: self.attribute(xml, "interpretation").map(|a| a.value),
-            kind: kind.filter(|_| sound).unwrap_or(Kind::Faulty),
+            kind: kind.unwrap_or(Kind::Faulty),
+            sound: self.report.errors() == before,
         })
     }
 
@@ -163,6 +164,7 @@ impl Reader<'_> {
             optional: None,
             interpretation: None,
             kind: Kind::Faulty,
+            sound: false,
         }
     }
 

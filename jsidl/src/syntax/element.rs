@@ -219,11 +219,9 @@ impl Reader<'_> {
 
     /// An attribute that is `true` or `false`. `Ok(None)` if there is none.
     pub(super) fn flag(&mut self, xml: Xml<'_, '_>, name: &str) -> Result<Option<bool>, Faulty> {
-        const WORDS: [(&str, bool); 4] =
-            [("true", true), ("false", false), ("1", true), ("0", false)];
         match self.attribute(xml, name) {
             None => Ok(None),
-            Some(text) => self.word(&text, name, &WORDS).map(Some).ok_or(Faulty),
+            Some(text) => self.word(&text, name, &FLAGS).map(Some).ok_or(Faulty),
         }
     }
 
@@ -345,6 +343,10 @@ impl Reader<'_> {
 /// Something was wrong and has been reported.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Faulty;
+
+/// The words of a flag.
+pub(super) const FLAGS: [(&str, bool); 4] =
+    [("true", true), ("false", false), ("1", true), ("0", false)];
 
 const UNSIGNED: [(&str, Unsigned); 4] = [
     ("unsigned byte", Unsigned::U8),

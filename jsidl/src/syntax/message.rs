@@ -3,7 +3,7 @@
 use roxmltree::Node as Xml;
 
 use super::composite::Place;
-use super::element::{Reader, fold};
+use super::element::{FLAGS, Reader, fold};
 use super::{Construct, Content, Declaration, DeclarationKind, EventDef, MessageDef, Section};
 use crate::source::Spanned;
 
@@ -26,9 +26,11 @@ impl Reader<'_> {
             return Some(Declaration {
                 span: node.span,
                 name: node.name.clone(),
+                sound: node.sound,
                 kind: DeclarationKind::Node(node),
             });
         }
+        let before = self.report.errors();
         let name = self.name(xml);
         let kind = if declared {
             self.reference(xml, construct, &["name", "deprecated", "interpretation"])
@@ -49,10 +51,9 @@ impl Reader<'_> {
         };
         Some(Declaration {
             span: self.span(xml),
-            kind: kind
-                .filter(|_| name.is_some())
-                .unwrap_or(DeclarationKind::Faulty),
             name: name.unwrap_or_default(),
+            kind: kind.unwrap_or(DeclarationKind::Faulty),
+            sound: self.report.errors() == before,
         })
     }
 
@@ -70,14 +71,14 @@ impl Reader<'_> {
         let code = self
             .required(xml, "message_id")
             .and_then(|text| self.code(&text));
-        let is_command = self.flag(xml, "is_command");
-        let deprecated = self.flag(xml, "deprecated");
+        let is_command = self
+            .required(xml, "is_command")
+            .and_then(|text| self.word(&text, "is_command", &FLAGS));
         let mut description = None;
         let [header, body, footer] = self.sections(xml, &mut description);
-        deprecated.ok()?;
         Some(MessageDef {
             code: code?,
-            is_command: is_command.ok()?.unwrap_or(false),
+            is_command: is_command?,
             description: description.unwrap_or_default(),
             header: header?,
             body: body?,

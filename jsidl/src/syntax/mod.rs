@@ -96,6 +96,8 @@ pub(crate) struct Declaration {
     pub(crate) span: Span,
     pub(crate) name: String,
     pub(crate) kind: DeclarationKind,
+    /// As [`Node::sound`].
+    pub(crate) sound: bool,
 }
 
 /// What a declaration declares.
@@ -177,6 +179,9 @@ pub(crate) struct Node {
     pub(crate) optional: Option<bool>,
     pub(crate) interpretation: Option<String>,
     pub(crate) kind: Kind,
+    /// Whether nothing was reported while it was read. If not, it is looked at for further
+    /// mistakes and then left out.
+    pub(crate) sound: bool,
 }
 
 /// The constructs, as written.
