@@ -92,6 +92,7 @@ impl Header {
     ///
     /// # Errors
     /// [`Problem::Truncated`] if there are fewer octets than the header has. The size is not checked.
+    #[inline]
     pub fn decode(octets: &[u8]) -> Result<Self, Problem> {
         let truncated = || Problem::Truncated {
             needed: HEADER_LEN,
@@ -105,6 +106,7 @@ impl Header {
     ///
     /// # Errors
     /// [`EncodeError::NotPlain`] if it has a type or compression: those are never sent.
+    #[inline]
     pub fn encode(&self, out: &mut BytesMut) -> Result<(), EncodeError> {
         if self.kind != Kind::default() || self.compression.is_some() {
             return Err(EncodeError::NotPlain);

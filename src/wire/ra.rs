@@ -87,6 +87,7 @@ impl Header {
     ///
     /// # Errors
     /// [`Problem::Truncated`] if there are fewer octets than the header has. The data size is not checked.
+    #[inline]
     pub fn decode(octets: &[u8]) -> Result<Self, Problem> {
         let truncated = || Problem::Truncated {
             needed: HEADER_LEN,

@@ -1,0 +1,138 @@
+//! What a datagram costs: its header alone, the whole frame, and its way through an endpoint.
+
+#![expect(clippy::expect_used, clippy::panic, reason = "a benchmark")]
+
+use std::hint::black_box;
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use bytes::{Bytes, BytesMut};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use jaus::address::JausId;
+use jaus::endpoint::{Config, Endpoint, Event, LinkId, Outgoing, Path};
+use jaus::wire::{Flags, Frame, as5669a, judp, ra};
+
+const US: JausId = JausId::new(101, 1, 1);
+const PEER: JausId = JausId::new(42, 1, 1);
+
+fn frame(payload: usize) -> Frame {
+    Frame {
+        sequence: 7,
+        ..Frame::new(PEER, US, vec![0x44; payload].into())
+    }
+}
+
+/// The least that reading an uncompressed header can be: one check of the length, five loads.
+fn by_hand(octets: &[u8]) -> Option<(u8, u16, u8, JausId, JausId)> {
+    let &[kind, s0, s1, flags, d0, d1, d2, d3, a0, a1, a2, a3] = octets.first_chunk()?;
+    let (destination, source) = ([d0, d1, d2, d3], [a0, a1, a2, a3]);
+    let size = u16::from_le_bytes([s0, s1]);
+    Some((
+        kind,
+        size,
+        flags,
+        JausId::from_wire(destination),
+        JausId::from_wire(source),
+    ))
+}
+
+fn header(c: &mut Criterion) {
+    let mut group = c.benchmark_group("header");
+    let datagram = judp::encode(&frame(50)).expect("a datagram");
+    group.bench_function("as5669a/decode", |b| {
+        b.iter(|| as5669a::Header::decode(black_box(&datagram[1..])).expect("a header"));
+    });
+    group.bench_function("as5669a/decode by hand", |b| {
+        b.iter(|| by_hand(black_box(&datagram[1..])).expect("a header"));
+    });
+    let mut out = BytesMut::with_capacity(64);
+    group.bench_function("as5669a/encode", |b| {
+        b.iter(|| {
+            out.clear();
+            as5669a::Header::new(black_box(Flags::default()), PEER, US, 64)
+                .encode(&mut out)
+                .expect("a plain header");
+        });
+    });
+    group.bench_function("ra/decode", |b| {
+        b.iter(|| ra::Header::decode(black_box(&datagram[1..])).expect("a header"));
+    });
+    group.finish();
+}
+
+fn datagram(c: &mut Criterion) {
+    let mut group = c.benchmark_group("datagram");
+    for payload in [50, 1425] {
+        let frame = frame(payload);
+        let datagram = judp::encode(&frame).expect("a datagram");
+        group.throughput(Throughput::Bytes(datagram.len() as u64));
+        group.bench_function(format!("read/{payload}"), |b| {
+            b.iter(|| {
+                judp::frames(black_box(&datagram).clone())
+                    .expect("JAUS")
+                    .next()
+            });
+        });
+        group.bench_function(format!("write/{payload}"), |b| {
+            b.iter(|| judp::encode(black_box(&frame)).expect("a datagram"));
+        });
+    }
+    group.finish();
+}
+
+/// An endpoint that knows a peer, with a clock that stands still.
+#[expect(clippy::disallowed_methods, reason = "an arbitrary beginning of time")]
+fn endpoint() -> (Endpoint, Path, Instant) {
+    let peer = Path {
+        link: LinkId(0),
+        peer: SocketAddr::from(([10, 0, 0, 2], judp::PORT)),
+    };
+    let now = Instant::now();
+    let mut endpoint = Endpoint::new(Config::default());
+    endpoint.add_link(LinkId(0), [SocketAddr::from(([10, 0, 0, 1], judp::PORT))]);
+    endpoint.attach(US).expect("an id of one component");
+    endpoint.handle_datagram(now, peer, judp::encode(&frame(2)).expect("a datagram"));
+    while endpoint.poll_event().is_some() {}
+    (endpoint, peer, now)
+}
+
+fn through_an_endpoint(c: &mut Criterion) {
+    let mut group = c.benchmark_group("endpoint");
+    for payload in [50, 1425] {
+        let (mut receiver, path, mut now) = endpoint();
+        let mut sequence = 0;
+        group.bench_function(format!("receive/{payload}"), |b| {
+            b.iter_batched(
+                || {
+                    sequence += 1;
+                    judp::encode(&Frame {
+                        sequence,
+                        ..frame(payload)
+                    })
+                    .expect("a datagram")
+                },
+                |datagram| {
+                    now += Duration::from_micros(100);
+                    receiver.handle_datagram(now, path, datagram);
+                    let Some(Event::Received(message)) = receiver.poll_event() else {
+                        panic!("not delivered");
+                    };
+                    message
+                },
+                BatchSize::SmallInput,
+            );
+        });
+        let (mut sender, _, now) = endpoint();
+        let message = Outgoing::new(US, PEER, Bytes::from(vec![0x44; payload]));
+        group.bench_function(format!("send/{payload}"), |b| {
+            b.iter(|| {
+                sender.send(now, message.clone()).expect("a known peer");
+                sender.poll_transmit().expect("a datagram")
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, header, datagram, through_an_endpoint);
+criterion_main!(benches);
