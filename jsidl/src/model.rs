@@ -2,7 +2,7 @@
 //!
 //! Nothing here remembers XML. The reader, the resolver and the checker build these types; the
 //! emitters and the dynamic codec only read them. A [`Service`] holds the messages that it
-//! declares itself; those of the services it inherits from are reached through [`Library`].
+//! declares itself; those of the services it inherits from are reached through [`Library`](crate::Library).
 //!
 //! On the wire a message is `code ++ header ++ body ++ footer`, little-endian, without padding.
 
