@@ -1,16 +1,17 @@
-//! Who is who: [`JausId`], the 32-bit identity of a component that every JAUS message carries twice.
+//! Who is who: [`JausId`], the 32-bit identity of a component that every JAUS message carries
+//! twice.
 //!
-//! An id names subsystem (a vehicle, an operator station), node (a computer) and component (a program), and is
-//! written `101.1.33`. A destination may stand for many: subsystem 65535, node 255 and component 255 each mean
-//! "all of them" in their own field. Zero names nobody.
+//! An id names subsystem (a vehicle, an operator station), node (a computer) and component (a
+//! program), and is written `101.1.33`. A destination may stand for many: subsystem 65535, node 255
+//! and component 255 each mean "all of them" in their own field. Zero names nobody.
 
 use std::fmt;
 use std::str::FromStr;
 
 /// The identity of a component, or as a destination a pattern of them.
 ///
-/// Any 32 bits make a `JausId`, because any 32 bits can arrive; [`is_unicast`](Self::is_unicast) tells whether it
-/// names one component. Ordering is by subsystem, then node, then component.
+/// Any 32 bits make a `JausId`, because any 32 bits can arrive; [`is_unicast`](Self::is_unicast)
+/// tells whether it names one component. Ordering is by subsystem, then node, then component.
 ///
 /// ```
 /// use jaus::address::JausId;
@@ -114,8 +115,8 @@ impl JausId {
 
     /// Whether this destination reaches `component`: each field is equal or stands for all.
     ///
-    /// A zero stands for nobody on either side. (One peer family reads zero as a wildcard; taking that over would
-    /// make ids with a zero octet reach strangers.)
+    /// A zero stands for nobody on either side. (One peer family reads zero as a wildcard; taking
+    /// that over would make ids with a zero octet reach strangers.)
     ///
     /// ```
     /// use jaus::address::JausId;

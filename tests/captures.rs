@@ -1,8 +1,8 @@
-//! Recorded traffic of other JAUS stacks, put through the wire formats and, in the place of one of the two parties,
-//! through an endpoint.
+//! Recorded traffic of other JAUS stacks, put through the wire formats and, in the place of one of
+//! the two parties, through an endpoint.
 //!
-//! The captures are in the directory that `JAUS_SHARED` names (default: `../shared`). Without them nothing is tested,
-//! loudly; with `CI` set that is a failure.
+//! The captures are in the directory that `JAUS_SHARED` names (default: `../shared`). Without them
+//! nothing is tested, loudly; with `CI` set that is a failure.
 
 #![cfg(feature = "view")]
 #![expect(clippy::expect_used, reason = "helpers of tests")]
@@ -73,8 +73,8 @@ fn recorded(file: &FilePath) -> Vec<Recorded> {
     datagrams
 }
 
-/// What is in a capture: datagrams, messages by header version (AS5669A, AS5669, RA), datagrams with stale octets,
-/// datagrams that cannot be read.
+/// What is in a capture: datagrams, messages by header version (AS5669A, AS5669, RA), datagrams
+/// with stale octets, datagrams that cannot be read.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Contents {
     datagrams: usize,
@@ -106,7 +106,8 @@ fn contents(datagrams: &[Recorded]) -> Contents {
     contents
 }
 
-/// Each file of UDP traffic; those of TCP and of OpenJAUS's inner traffic hold nothing on the JAUS port.
+/// Each file of UDP traffic; those of TCP and of OpenJAUS's inner traffic hold nothing on the JAUS
+/// port.
 #[test]
 fn every_recorded_datagram_is_read() {
     let Some(captures) = captures() else { return };
@@ -448,7 +449,8 @@ fn what_jauspp_sends_is_delivered_and_nothing_else() {
     }
 }
 
-/// The heartbeats go to 255.255.1.1 in the older notation, which reads as component 1 of node 1 of every subsystem.
+/// The heartbeats go to 255.255.1.1 in the older notation, which reads as component 1 of node 1 of
+/// every subsystem.
 #[test]
 fn openjaus_is_heard_through_both_older_headers() {
     let Some(captures) = captures() else { return };

@@ -7,7 +7,7 @@ use tracing::debug;
 
 use super::{Config, Counter, Endpoint, Event, Path, To, Transmit};
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version, judp, ra};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Kind, Version, judp, ra};
 
 /// Names a sent message in the events about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -125,8 +125,9 @@ impl Acknowledgements {
 }
 
 impl Endpoint {
-    /// Answers a message that wants an acknowledgement, and does so for each copy: the peer repeats it because an
-    /// answer got lost. A broadcast to many is not acknowledged, or all would answer at once.
+    /// Answers a message that wants an acknowledgement, and does so for each copy: the peer repeats
+    /// it because an answer got lost. A broadcast to many is not acknowledged, or all would answer
+    /// at once.
     pub(super) fn acknowledge(&mut self, from: Path, request: &Frame) {
         if !request.destination.is_unicast() {
             return;
@@ -138,7 +139,7 @@ impl Endpoint {
         };
         let answer = Frame {
             version: request.version,
-            kind: request.kind,
+            kind: Kind::default(),
             flags: request
                 .flags
                 .with_acknowledgement(Acknowledgement::Positive)
@@ -158,8 +159,9 @@ impl Endpoint {
             priority: request.flags.priority(),
             payload,
         };
-        self.transmit(transmit);
-        self.counters.add(Counter::AcknowledgementsSent);
+        if self.transmit(transmit) {
+            self.counters.add(Counter::AcknowledgementsSent);
+        }
     }
 
     /// Takes the answer to a message of ours.
@@ -172,7 +174,7 @@ impl Endpoint {
         let waiting = self
             .acknowledgements
             .take(key)
-            .ok_or(Counter::UnexpectedAcknowledgement)?;
+            .ok_or(Counter::UnawaitedAcknowledgement)?;
         let message = waiting.message;
         if frame.flags.acknowledgement() == Acknowledgement::Negative {
             self.give_up(message, frame.source, true);

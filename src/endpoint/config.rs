@@ -12,33 +12,39 @@ use crate::address::JausId;
 pub struct Config {
     /// The most components that can be attached.
     pub max_components: usize,
-    /// The most peers whose address is remembered. When there is one more, the one heard longest ago is forgotten;
-    /// messages to it go to the group again until it is heard. Static peers do not count and are never forgotten.
+    /// The most peers whose address is remembered. When there is one more, the one heard longest
+    /// ago is forgotten; messages to it go to the group again until it is heard. Static peers do
+    /// not count and are never forgotten.
     pub max_peers: usize,
     /// Peers whose address is known beforehand and not learned.
     pub static_peers: Vec<StaticPeer>,
-    /// The longest payload, in octets, that is sent in one message. The default stays under one Ethernet frame and
-    /// under the 1425 octets above which JAUS++ expects its own way of fragmenting.
+    /// The longest payload, in octets, that is sent in one message. The default fits one
+    /// Ethernet frame, and is the most that JAUS++ does not expect to be fragmented in a way of
+    /// its own.
     pub payload_limit: usize,
-    /// The longest message, in octets, that is sent or received. Above [`payload_limit`](Self::payload_limit) it travels
-    /// in fragments. Also the most that is kept of the unfinished messages of one sender.
+    /// The longest message, in octets, that is sent or received. Above
+    /// [`payload_limit`](Self::payload_limit) it travels in fragments. Also the most that is kept
+    /// of the unfinished messages of one sender.
     pub max_message: usize,
-    /// The most octets that are kept of unfinished messages of all senders. The oldest are forgotten first.
+    /// The most octets that are kept of unfinished messages of all senders. The oldest are
+    /// forgotten first.
     pub max_reassembly: usize,
     /// How long an unfinished message is kept after its latest fragment.
     pub reassembly_timeout: Duration,
-    /// The most entries of each queue (datagrams to send and messages to deliver, both per priority; news). What comes
-    /// when a queue is full is dropped and counted.
+    /// The most entries of each queue (datagrams to send and messages to deliver, both per
+    /// priority; news). What comes when a queue is full is dropped and counted.
     pub queue_limit: usize,
-    /// How long the same message (source, destination, sequence number and content) is taken for a duplicate made by
-    /// the network. Short, because a restarted peer may well begin with the same message.
+    /// How long the same message (source, destination, sequence number and content) is taken for a
+    /// duplicate made by the network. Short, because a restarted peer may well begin with the same
+    /// message.
     pub duplicate_window: Duration,
-    /// The same for messages that want an acknowledgement, which a peer repeats when ours got lost. Junior gives up
-    /// after 0.42 s.
+    /// The same for messages that want an acknowledgement, which a peer repeats when ours got lost.
+    /// Junior gives up after 0.42 s.
     pub retransmission_window: Duration,
     /// How long our own multicast is expected to come back to us.
     pub echo_window: Duration,
-    /// The most messages remembered to tell duplicates, and likewise echoes. The oldest is forgotten first.
+    /// The most messages remembered to tell duplicates, and likewise echoes. The oldest is
+    /// forgotten first.
     pub max_recent: usize,
     /// How long to wait for an acknowledgement before sending again.
     pub acknowledge_timeout: Duration,
@@ -48,8 +54,8 @@ pub struct Config {
     pub max_unacknowledged: usize,
     /// The shortest time between two [`Event::IdConflict`](super::Event::IdConflict) about one id.
     pub conflict_interval: Duration,
-    /// The number before the first sequence number. A node should choose it at random, because some peers take a
-    /// restarted node's first messages for duplicates of earlier ones.
+    /// The number before the first sequence number. A node should choose it at random, because some
+    /// peers take a restarted node's first messages for duplicates of earlier ones.
     pub first_sequence: u16,
 }
 
@@ -80,7 +86,8 @@ impl Default for Config {
 /// A peer whose address is configured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StaticPeer {
-    /// Its id. With wildcards: everyone who matches and has no address of their own lives behind this address.
+    /// Its id. With wildcards: everyone who matches and has no address of their own lives behind
+    /// this address.
     pub id: JausId,
     /// Its address. What is heard from elsewhere does not change it.
     pub path: Path,

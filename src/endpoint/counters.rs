@@ -39,11 +39,15 @@ counters! {
     MessagesSent = "messages sent",
     /// Acknowledgements sent.
     AcknowledgementsSent = "acknowledgements sent",
+    /// Acknowledgements received that no component waits for, among them those to the first
+    /// messages for unknown ids, which only teach the address.
+    UnawaitedAcknowledgement = "acknowledgements that nobody waits for",
     /// Messages sent again for want of an acknowledgement.
     Retransmissions = "retransmissions",
     /// Peers forgotten because more were heard than the table holds.
     PeersEvicted = "peers forgotten, table full",
-    /// Octets behind the last message of a datagram, left by a peer that does not shorten its buffer.
+    /// Octets behind the last message of a datagram, left by a peer that does not shorten its
+    /// buffer.
     StaleOctets = "stale octets behind messages",
     /// Dropped: a datagram from a link that the endpoint does not have.
     UnknownLink = "dropped: unknown link",
@@ -69,15 +73,14 @@ counters! {
     OutOfScope = "dropped: local broadcast of another subsystem",
     /// Dropped: an acknowledgement with a message in it.
     AcknowledgementWithPayload = "dropped: acknowledgement with payload",
-    /// Dropped: an acknowledgement that nobody waits for.
-    UnexpectedAcknowledgement = "dropped: unexpected acknowledgement",
     /// Dropped: the same message within a short time.
     Duplicate = "dropped: duplicate",
     /// Dropped: a message too short for a message code.
     NoMessageCode = "dropped: no message code",
     /// Dropped: a large message that is longer than the limit.
     MessageTooLong = "dropped: large message above the limit",
-    /// Dropped: a part of a large message of which the rest did not come in time, or for which there is no room.
+    /// Dropped: a part of a large message of which the rest did not come in time, or for which
+    /// there is no room.
     FragmentsForgotten = "dropped: unfinished large message",
     /// Dropped: a received message, because too many wait to be delivered.
     DeliveryQueueFull = "dropped: delivery queue full",

@@ -1,4 +1,5 @@
-//! What goes in and out of an endpoint beside datagrams: messages to send, messages received, and news.
+//! What goes in and out of an endpoint beside datagrams: messages to send, messages received, and
+//! news.
 
 use bytes::Bytes;
 
@@ -81,7 +82,8 @@ pub enum Event {
         /// Where it is.
         to: Path,
     },
-    /// A peer was forgotten because more were heard than [`Config::max_peers`](super::Config::max_peers).
+    /// A peer was forgotten because more were heard than
+    /// [`Config::max_peers`](super::Config::max_peers).
     PeerForgotten {
         /// Who.
         id: JausId,

@@ -1,10 +1,12 @@
 //! Large messages: cut into fragments when sent, put together when received.
 //!
-//! A fragment is a message of its own with the next sequence number and the data control first, middle or last; the
-//! message code stands only at the beginning of the first (AS5669A; Junior does the same, JAUS++ repeats the code in
-//! every fragment and is not understood). Fragments may come in any order.
+//! A fragment is a message of its own with the next sequence number and the data control first,
+//! middle or last; the message code stands only at the beginning of the first (AS5669A; Junior does
+//! the same, JAUS++ repeats the code in every fragment and is not understood). Fragments may come
+//! in any order.
 //!
-//! What is kept of unfinished messages is bounded in octets, per sender and in all, in number and in time.
+//! What is kept of unfinished messages is bounded in octets, per sender and in all, in number and
+//! in time.
 
 use std::time::{Duration, Instant};
 
@@ -115,7 +117,8 @@ impl Reassembly {
         }
     }
 
-    /// Takes a fragment, and gives the message if it is whole now. What a bound makes it forget is counted.
+    /// Takes a fragment, and gives the message if it is whole now. What a bound makes it forget is
+    /// counted.
     pub(super) fn insert(
         &mut self,
         now: Instant,

@@ -1,12 +1,13 @@
 //! The protocol core of a node: who is here, who is where, what to send and what to deliver.
 //!
-//! An [`Endpoint`] does no I/O and reads no clock. Its owner says what happened ([`Endpoint::handle_datagram`],
-//! [`Endpoint::handle_timeout`]), what is wanted ([`Endpoint::attach`], [`Endpoint::send`]), and then polls until there
-//! is no more: [`Endpoint::poll_transmit`] for datagrams to send, [`Endpoint::poll_event`] for messages to deliver and
-//! news, [`Endpoint::poll_timeout`] for when to call `handle_timeout`.
+//! An [`Endpoint`] does no I/O and reads no clock. Its owner says what happened
+//! ([`Endpoint::handle_datagram`], [`Endpoint::handle_timeout`]), what is wanted
+//! ([`Endpoint::attach`], [`Endpoint::send`]), and then polls until there is no more:
+//! [`Endpoint::poll_transmit`] for datagrams to send, [`Endpoint::poll_event`] for messages to
+//! deliver and news, [`Endpoint::poll_timeout`] for when to call `handle_timeout`.
 //!
-//! Received rubbish is never an error here: it is counted ([`Counters`]), traced and forgotten. Every table and queue
-//! has a bound in [`Config`]; what is dropped for a bound is counted too.
+//! Received rubbish is never an error here: it is counted ([`Counters`]), traced and forgotten.
+//! Every table and queue has a bound in [`Config`]; what is dropped for a bound is counted too.
 //!
 //! ```
 //! use std::time::Instant;
@@ -144,7 +145,8 @@ impl Endpoint {
     /// Takes in a local component: messages to `id` are delivered from now on, and it may send.
     ///
     /// # Errors
-    /// An id that does not name one component or is here already, or more than [`Config::max_components`].
+    /// An id that does not name one component or is here already, or more than
+    /// [`Config::max_components`].
     pub fn attach(&mut self, id: JausId) -> Result<(), AttachError> {
         self.components.attach(id)?;
         self.peers.forget(id);
@@ -165,8 +167,9 @@ impl Endpoint {
 
     /// Takes in a link, or tells that its addresses have changed.
     ///
-    /// `own` are the addresses that the link sends from, as peers see them. A message from one of our ids that comes
-    /// from elsewhere is an id conflict and not an echo of our own multicast; without addresses only the content tells.
+    /// `own` are the addresses that the link sends from, as peers see them. A message from one of
+    /// our ids that comes from elsewhere is an id conflict and not an echo of our own multicast;
+    /// without addresses only the content tells.
     pub fn add_link(&mut self, link: LinkId, own: impl IntoIterator<Item = SocketAddr>) {
         self.links.insert(link, own.into_iter().collect());
     }
@@ -188,8 +191,8 @@ impl Endpoint {
         self.peers.iter()
     }
 
-    /// Tells that time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached; early calls are
-    /// harmless.
+    /// Tells that time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached;
+    /// early calls are harmless.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.retry_unacknowledged(now);
         self.reassembly.expire(now, &mut self.counters);
@@ -235,10 +238,12 @@ impl Endpoint {
         }
     }
 
-    /// Queues a datagram; a full queue is counted.
-    fn transmit(&mut self, transmit: Transmit) {
-        if self.transmits.push(transmit.priority, transmit).is_err() {
+    /// Queues a datagram, if there is room; a full queue is counted.
+    fn transmit(&mut self, transmit: Transmit) -> bool {
+        let queued = self.transmits.push(transmit.priority, transmit).is_ok();
+        if !queued {
             self.counters.add(Counter::TransmitQueueFull);
         }
+        queued
     }
 }

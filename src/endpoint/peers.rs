@@ -52,7 +52,8 @@ impl Peers {
         self.configured = peers;
     }
 
-    /// Takes note of where a message came from. The latest word counts; a full table forgets whom it heard longest ago.
+    /// Takes note of where a message came from. The latest word counts; a full table forgets whom
+    /// it heard longest ago.
     pub(super) fn learn(&mut self, peer: Peer) -> Learned {
         if let Some(known) = self.learned.get_mut(&peer.id) {
             let from = known.path;
@@ -78,8 +79,8 @@ impl Peers {
         Some(oldest)
     }
 
-    /// Where and with which header to reach `id`, if known. A configured address goes before a learned one, and that
-    /// before a configured pattern.
+    /// Where and with which header to reach `id`, if known. A configured address goes before a
+    /// learned one, and that before a configured pattern.
     pub(super) fn route(&self, id: JausId) -> Option<(Path, Version)> {
         let configured = |exact: bool| {
             let applies =

@@ -1,4 +1,5 @@
-//! From a datagram to deliveries: each message is judged, learned from, acknowledged, filtered and handed out.
+//! From a datagram to deliveries: each message is judged, learned from, acknowledged, filtered and
+//! handed out.
 
 use std::time::Instant;
 
@@ -13,8 +14,9 @@ use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version, judp}
 impl Endpoint {
     /// Takes a datagram that came from `from`.
     ///
-    /// Nothing in it is an error: what cannot be used is counted and traced. Messages, answers and news come out of
-    /// [`poll_event`](Self::poll_event) and [`poll_transmit`](Self::poll_transmit).
+    /// Nothing in it is an error: what cannot be used is counted and traced. Messages, answers and
+    /// news come out of [`poll_event`](Self::poll_event) and
+    /// [`poll_transmit`](Self::poll_transmit).
     pub fn handle_datagram(&mut self, now: Instant, from: Path, data: Bytes) {
         self.counters.add(Counter::DatagramsReceived);
         if !self.links.contains_key(&from.link) {
@@ -101,7 +103,8 @@ impl Endpoint {
         }
     }
 
-    /// Whether this is our own multicast come back. A component that has gone meanwhile is known by what it sent.
+    /// Whether this is our own multicast come back. A component that has gone meanwhile is known by
+    /// what it sent.
     fn is_own_echo(&self, now: Instant, from: Path, frame: &Frame) -> bool {
         let mut own_addresses = self.links.values().flatten().peekable();
         let may_be_own =
@@ -159,8 +162,8 @@ impl Endpoint {
 
     /// Drops what was received before.
     ///
-    /// The older headers' peers leave the sequence number at 0, so there only a message that wants an acknowledgement,
-    /// and hence may be repeated, can be told.
+    /// The older headers' peers leave the sequence number at 0, so there only a message that wants
+    /// an acknowledgement, and hence may be repeated, can be told.
     fn filter_duplicate(&mut self, now: Instant, frame: &Frame) -> Result<(), Counter> {
         let repeats = frame.flags.acknowledgement() == Acknowledgement::Request;
         if !repeats && frame.version != Version::As5669a {

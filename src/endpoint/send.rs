@@ -68,13 +68,14 @@ pub enum SendError {
 impl Endpoint {
     /// Sends a message from a local component: to siblings at once, to others through the links.
     ///
-    /// A message to one component goes to its address if that is known; else to the group of every link, as a global
-    /// broadcast that wants an acknowledgement, because the answer teaches the address. A destination with wildcards
-    /// goes to the group, and to matching siblings (not to the sender itself).
+    /// A message to one component goes to its address if that is known; else to the group of every
+    /// link, as a global broadcast that wants an acknowledgement, because the answer teaches the
+    /// address. A destination with wildcards goes to the group, and to matching siblings (not to
+    /// the sender itself).
     ///
     /// # Errors
-    /// A [`SendError`] tells what is wrong; then nothing was sent. That a message was sent does not mean that it
-    /// arrives; ask for an acknowledgement to be told.
+    /// A [`SendError`] tells what is wrong; then nothing was sent. That a message was sent does not
+    /// mean that it arrives; ask for an acknowledgement to be told.
     pub fn send(&mut self, now: Instant, message: Outgoing) -> Result<MessageHandle, SendError> {
         let scope = self.check(&message)?;
         let handle = self.acknowledgements.next_handle();
@@ -222,7 +223,10 @@ impl Endpoint {
 
     /// The first of `count` consecutive sequence numbers.
     ///
-    /// They neither hold 0, which JAUS++ refuses in fragments, nor go round within a message, which it does not follow.
+    /// One counter serves all destinations and all components: Junior tells duplicates by source
+    /// and number alone, so that a broadcast and a message to it must not share a number. The
+    /// numbers neither hold 0, which JAUS++ refuses in fragments, nor go round within a message,
+    /// which it does not follow.
     fn take_sequence_numbers(&mut self, count: usize) -> u16 {
         let last = u16::try_from(count)
             .ok()

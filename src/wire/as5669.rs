@@ -1,8 +1,9 @@
-//! AS5669 first edition over UDP: a four-octet message prefix in front of the Reference Architecture's header.
+//! AS5669 first edition over UDP: a four-octet message prefix in front of the Reference
+//! Architecture's header.
 //!
-//! The prefix holds the header compression number, the header compression length (bits 6-7) with its flags, all zero
-//! in every peer seen, and the length of header and data, big-endian. Peers write that length and do not read it; the
-//! header's own data size counts.
+//! The prefix holds the header compression number, the header compression length (bits 6-7) with
+//! its flags, all zero in every peer seen, and the length of header and data, big-endian. Peers
+//! write that length and do not read it; the header's own data size counts.
 
 use bytes::{BufMut, Bytes, BytesMut};
 

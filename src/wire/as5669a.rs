@@ -1,4 +1,5 @@
-//! The AS5669A message: header, payload, sequence number. The same in datagrams, TCP streams and on serial lines.
+//! The AS5669A message: header, payload, sequence number. The same in datagrams, TCP streams and on
+//! serial lines.
 //!
 //! Layout, little-endian (offsets without / with the header compression fields):
 //!
@@ -91,7 +92,8 @@ impl Header {
     /// Reads a header from the beginning of `octets`.
     ///
     /// # Errors
-    /// [`Problem::Truncated`] if there are fewer octets than the header has. The size is not checked.
+    /// [`Problem::Truncated`] if there are fewer octets than the header has. The size is not
+    /// checked.
     #[inline]
     pub fn decode(octets: &[u8]) -> Result<Self, Problem> {
         let truncated = || Problem::Truncated {

@@ -1,5 +1,6 @@
-//! The fields below an octet: message type and header compression in one, priority, broadcast, acknowledgement and
-//! data control in another (AS5669A; the older headers are translated to these).
+//! The fields below an octet: message type and header compression in one, priority, broadcast,
+//! acknowledgement and data control in another (AS5669A; the older headers are translated to
+//! these).
 
 use std::fmt;
 
@@ -140,8 +141,8 @@ macro_rules! display_by_name {
 }
 display_by_name!(Priority, Broadcast, Acknowledgement, DataControl);
 
-/// The flags octet of an AS5669A header: priority in bits 0-1, broadcast in 2-3, acknowledgement in 4-5, data
-/// control in 6-7.
+/// The flags octet of an AS5669A header: priority in bits 0-1, broadcast in 2-3, acknowledgement in
+/// 4-5, data control in 6-7.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, DekuRead, DekuWrite)]
 pub struct Flags(pub u8);
 
@@ -244,10 +245,11 @@ impl fmt::Debug for Flags {
     }
 }
 
-/// The first octet of an AS5669A message: its type in bits 0-5 and header compression flags in bits 6-7.
+/// The first octet of an AS5669A message: its type in bits 0-5 and header compression flags in bits
+/// 6-7.
 ///
-/// Type 0 is a JAUS message; the others are reserved. (Junior reads the compression flags from bits 0-1; no other
-/// implementation does.)
+/// Type 0 is a JAUS message; the others are reserved. (Junior reads the compression flags from bits
+/// 0-1; no other implementation does.)
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, DekuRead, DekuWrite)]
 pub struct Kind(pub u8);
 
@@ -264,14 +266,16 @@ impl Kind {
         self.0 >> 6
     }
 
-    /// Whether a header compression number and length follow the size. They do when any flag is set.
+    /// Whether a header compression number and length follow the size. They do when any flag is
+    /// set.
     #[must_use]
     pub const fn has_compression_fields(self) -> bool {
         self.compression() != 0
     }
 
-    /// Whether the rest of the header is itself compressed (flags 3), which cannot be read without the negotiation
-    /// that we never enter. With flags 1 and 2 the peer only offers, and the header is whole.
+    /// Whether the rest of the header is itself compressed (flags 3), which cannot be read without
+    /// the negotiation that we never enter. With flags 1 and 2 the peer only offers, and the header
+    /// is whole.
     #[must_use]
     pub const fn is_compressed(self) -> bool {
         self.compression() == 3

@@ -1,8 +1,8 @@
 //! JUDP: what one UDP datagram holds. The first octet tells which transport wrote it.
 //!
-//! An AS5669A datagram is the octet 02h and one message or several. JAUS++ does not shorten its send buffer, so that
-//! the end of an older, longer message may follow; hence reading stops quietly at the first implausible header after
-//! the first message.
+//! An AS5669A datagram is the octet 02h and one message or several. JAUS++ does not shorten its
+//! send buffer, so that the end of an older, longer message may follow; hence reading stops quietly
+//! at the first implausible header after the first message.
 
 use bytes::{BufMut, Bytes, BytesMut};
 
@@ -60,7 +60,8 @@ pub fn frames(datagram: Bytes) -> Result<Frames, Error> {
     })
 }
 
-/// The messages of a datagram: the first, or why it cannot be read; then the others up to the first implausible one.
+/// The messages of a datagram: the first, or why it cannot be read; then the others up to the first
+/// implausible one.
 #[derive(Clone, Debug)]
 pub struct Frames {
     datagram: Bytes,
@@ -83,7 +84,8 @@ impl Frames {
         self.version
     }
 
-    /// Where the next message would begin, or at the end where the octets begin that no message was found in.
+    /// Where the next message would begin, or at the end where the octets begin that no message was
+    /// found in.
     #[must_use]
     pub fn offset(&self) -> usize {
         self.offset

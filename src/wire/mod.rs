@@ -1,11 +1,12 @@
 //! Octets ↔ frames: what JAUS transports put around a message. Pure functions, no I/O, no clock.
 //!
-//! A [`Frame`] is one transport message, whichever header it came with:
-//! [`as5669a`] is today's, [`as5669`] its first edition and [`ra`] the header of the Reference Architecture that the
-//! latter took over. [`judp`] reads and writes datagrams; the first octet tells the three apart.
+//! A [`Frame`] is one transport message, whichever header it came with: [`as5669a`] is today's,
+//! [`as5669`] its first edition and [`ra`] the header of the Reference Architecture that the latter
+//! took over. [`judp`] reads and writes datagrams; the first octet tells the three apart.
 //!
-//! Parsing checks every length against what is there, and gives an [`Error`] with the offset at fault; payloads are
-//! shared slices of the datagram. Nothing here judges whether a frame makes sense: that is the endpoint's business.
+//! Parsing checks every length against what is there, and gives an [`Error`] with the offset at
+//! fault; payloads are shared slices of the datagram. Nothing here judges whether a frame makes
+//! sense: that is the endpoint's business.
 
 pub mod as5669;
 pub mod as5669a;
@@ -61,7 +62,8 @@ pub struct Frame {
     pub version: Version,
     /// Message type and header compression; zero but in rare AS5669A frames.
     pub kind: Kind,
-    /// Priority, broadcast, acknowledgement and data control. For the older headers these are translated.
+    /// Priority, broadcast, acknowledgement and data control. For the older headers these are
+    /// translated.
     pub flags: Flags,
     /// For whom; may hold wildcards.
     pub destination: JausId,
@@ -69,9 +71,9 @@ pub struct Frame {
     pub source: JausId,
     /// The number that acknowledgements, duplicates and fragments are told by.
     pub sequence: u16,
-    /// The JAUS message, beginning with its two code octets (in the older headers these are a header field, and are
-    /// moved here). Empty in an AS5669A acknowledgement; without code in all but the first fragment of a large
-    /// message.
+    /// The JAUS message, beginning with its two code octets (in the older headers these are a
+    /// header field, and are moved here). Empty in an AS5669A acknowledgement; without code in all
+    /// but the first fragment of a large message.
     pub payload: Bytes,
 }
 
@@ -98,7 +100,8 @@ impl Frame {
             .map(|&code| u16::from_le_bytes(code))
     }
 
-    /// What the payload holds besides the code, of which the older headers' acknowledgements carry a copy.
+    /// What the payload holds besides the code, of which the older headers' acknowledgements carry
+    /// a copy.
     fn body_len(&self) -> usize {
         match self.version {
             Version::As5669a => self.payload.len(),
@@ -106,13 +109,15 @@ impl Frame {
         }
     }
 
-    /// Whether this is a pure acknowledgement, positive or negative, as it should be: without a message.
+    /// Whether this is a pure acknowledgement, positive or negative, as it should be: without a
+    /// message.
     #[must_use]
     pub fn is_acknowledgement(&self) -> bool {
         self.flags.acknowledgement().is_answer() && self.body_len() == 0
     }
 
-    /// Whether this could have been written on purpose: an uncompressed message of type 0 from somebody to somebody.
+    /// Whether this could have been written on purpose: an uncompressed message of type 0 from
+    /// somebody to somebody.
     ///
     /// One peer leaves stale octets behind its messages; their beginnings seldom pass this test.
     #[must_use]

@@ -1,11 +1,13 @@
-//! The 16-octet header of the Reference Architecture 3.x, and its UDP framing "JAUS01.0". AS5669 took the header over.
+//! The 16-octet header of the Reference Architecture 3.x, and its UDP framing "JAUS01.0". AS5669
+//! took the header over.
 //!
-//! Layout, little-endian: properties (2), command code (2), destination (4), source (4), data control (2: size in
-//! bits 0-11, fragment flag in bits 12-15), sequence number (2). Properties: priority 0..=15 in bits 0-3,
-//! acknowledgement in 4-5, service connection in 6, experimental in 7, version in 8-13.
+//! Layout, little-endian: properties (2), command code (2), destination (4), source (4), data
+//! control (2: size in bits 0-11, fragment flag in bits 12-15), sequence number (2). Properties:
+//! priority 0..=15 in bits 0-3, acknowledgement in 4-5, service connection in 6, experimental in 7,
+//! version in 8-13.
 //!
-//! An RA id has four fields of one octet each, so its octets read as a [`JausId`] put subsystem and node into the
-//! 16-bit subsystem number; [`RaId`] names the four.
+//! An RA id has four fields of one octet each, so its octets read as a [`JausId`] put subsystem and
+//! node into the 16-bit subsystem number; [`RaId`] names the four.
 
 use std::fmt;
 
@@ -21,7 +23,8 @@ use crate::address::JausId;
 pub const PREFIX: &[u8; 8] = b"JAUS01.0";
 /// Octets of the header.
 pub const HEADER_LEN: usize = 16;
-/// Octets of the message code, which is a header field here and the beginning of the payload in a [`Frame`].
+/// Octets of the message code, which is a header field here and the beginning of the payload in a
+/// [`Frame`].
 pub const CODE_LEN: usize = 2;
 /// The longest data that a header of this kind may state (RA 3.3; the field would hold 4095).
 pub const MAX_DATA: usize = 4080;
@@ -86,7 +89,8 @@ impl Header {
     /// Reads a header from the beginning of `octets`.
     ///
     /// # Errors
-    /// [`Problem::Truncated`] if there are fewer octets than the header has. The data size is not checked.
+    /// [`Problem::Truncated`] if there are fewer octets than the header has. The data size is not
+    /// checked.
     #[inline]
     pub fn decode(octets: &[u8]) -> Result<Self, Problem> {
         let truncated = || Problem::Truncated {
@@ -97,7 +101,8 @@ impl Header {
         Ok(header)
     }
 
-    /// Priority, acknowledgement and data control in AS5669A's terms; a wildcard makes the message a global broadcast.
+    /// Priority, acknowledgement and data control in AS5669A's terms; a wildcard makes the message
+    /// a global broadcast.
     fn flags(&self) -> Result<Flags, Problem> {
         let data = match self.data_control >> 12 {
             0 => DataControl::Single,

@@ -94,8 +94,9 @@ fn several_messages_share_a_datagram() {
     );
 }
 
-/// JAUS++ sends a short message from the buffer of a longer one, whose end follows. Both tails were recorded; the
-/// second looks like a message from 29295.99.58 with a fitting size, but is an acknowledgement with a payload.
+/// JAUS++ sends a short message from the buffer of a longer one, whose end follows. Both tails were
+/// recorded; the second looks like a message from 29295.99.58 with a fitting size, but is an
+/// acknowledgement with a payload.
 #[test]
 fn stale_octets_behind_a_message_end_the_reading_quietly() {
     let message = "02 00 1100 01 0701e803 02019800 002b02 1200";
@@ -176,7 +177,8 @@ fn the_code_of_an_older_header_is_moved_in_front_of_the_payload() {
 
 #[test]
 fn older_headers_are_written_as_their_peers_write_them() {
-    // Junior writes the length of header and data there, big-endian; its 16 octets of data make 20h.
+    // Junior writes the length of header and data there, big-endian; its 16 octets of data make
+    // 20h.
     for recorded in [JUNIOR_V1, JUNIOR_V1_ACK, OPENJAUS_HEARTBEAT] {
         assert_eq!(
             judp::encode(&only_frame(recorded)).unwrap(),

@@ -1,8 +1,10 @@
-//! A network in memory: endpoints, virtual time, and a seeded wire that delays, loses, repeats and reorders.
+//! A network in memory: endpoints, virtual time, and a seeded wire that delays, loses, repeats and
+//! reorders.
 //!
-//! Used by several test binaries (`mod sim;`). Each node is an [`Endpoint`] with an [`Owner`] that takes its events:
-//! [`Mailbox`] keeps them for the test to look at, and whoever builds on the endpoint (a service, a component) puts
-//! its own state machine there. Nothing waits for real time, and the same seed gives the same run.
+//! Used by several test binaries (`mod sim;`). Each node is an [`Endpoint`] with an [`Owner`] that
+//! takes its events: [`Mailbox`] keeps them for the test to look at, and whoever builds on the
+//! endpoint (a service, a component) puts its own state machine there. Nothing waits for real time,
+//! and the same seed gives the same run.
 
 #![allow(
     clippy::panic,
@@ -280,7 +282,8 @@ impl<O: Owner> Network<O> {
         panic!("the network does not come to rest");
     }
 
-    /// Goes to the next time at which something happens, and lets it happen. False if nothing is left.
+    /// Goes to the next time at which something happens, and lets it happen. False if nothing is
+    /// left.
     pub fn step(&mut self) -> bool {
         let Some(next) = self.next_time() else {
             return false;

@@ -52,6 +52,20 @@ fn a_repeated_request_is_acknowledged_again_but_not_delivered_again() {
 }
 
 #[test]
+fn an_offer_of_header_compression_is_acknowledged_without_it() {
+    let mut rig = Rig::new();
+    // The request with compression flags 1, and number and length behind the size.
+    let mut datagram = judp::encode(&request()).unwrap().to_vec();
+    datagram[1] = 0x40;
+    datagram[2] += 2;
+    datagram.splice(4..4, [0, 12]);
+    rig.hear_octets(PEER_HOST, datagram.into());
+    let (_, answer) = rig.sent().remove(0);
+    assert!(answer.is_acknowledgement() && answer.is_plausible());
+    assert_eq!(rig.received().len(), 1);
+}
+
+#[test]
 fn a_request_to_many_is_not_acknowledged() {
     let mut rig = Rig::new();
     rig.hear(&Frame {
@@ -207,7 +221,7 @@ fn answers_that_nobody_waits_for_are_dropped_quietly() {
         ..right
     });
     assert_eq!((rig.events(), rig.transmits()), (vec![], vec![]));
-    assert_eq!(rig.count(Counter::UnexpectedAcknowledgement), 2);
+    assert_eq!(rig.count(Counter::UnawaitedAcknowledgement), 2);
     assert_eq!(rig.count(Counter::AcknowledgementWithPayload), 1);
     assert!(
         rig.endpoint.poll_timeout().is_some(),

@@ -142,7 +142,8 @@ fn take(rig: &mut Rig, step: Step) {
     }
 }
 
-/// No message is dropped for two reasons: those that exclude each other do not outnumber the messages.
+/// No message is dropped for two reasons: those that exclude each other do not outnumber the
+/// messages.
 fn is_accounted_for(rig: &Rig) -> bool {
     let before_delivery: u64 = [
         Counter::ReservedType,
@@ -154,7 +155,7 @@ fn is_accounted_for(rig: &Rig) -> bool {
         Counter::NotForUs,
         Counter::OutOfScope,
         Counter::AcknowledgementWithPayload,
-        Counter::UnexpectedAcknowledgement,
+        Counter::UnawaitedAcknowledgement,
         Counter::Duplicate,
         Counter::NoMessageCode,
         Counter::MessageTooLong,

@@ -1,4 +1,5 @@
-//! Nothing that peers or components do makes an endpoint grow without end; what is dropped for that is counted.
+//! Nothing that peers or components do makes an endpoint grow without end; what is dropped for that
+//! is counted.
 
 use super::*;
 

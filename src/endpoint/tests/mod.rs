@@ -1,4 +1,5 @@
-//! What an endpoint must and must not do, one rule a test. Time is virtual; peers are frames written by hand.
+//! What an endpoint must and must not do, one rule a test. Time is virtual; peers are frames
+//! written by hand.
 
 mod acknowledgements;
 mod anything;

@@ -182,7 +182,8 @@ fn rubbish_is_counted_by_its_kind() {
     }
 }
 
-/// Recorded: Junior turns priority 0 into flags FFh, an acknowledgement of the end of a large reserved broadcast.
+/// Recorded: Junior turns priority 0 into flags FFh, an acknowledgement of the end of a large
+/// reserved broadcast.
 #[test]
 fn juniors_priority_zero_fault_is_dropped() {
     let mut rig = Rig::new();
