@@ -112,7 +112,7 @@ impl Driver {
                     }
                 }
             }
-            Command::Offer(service) => self.stack.offer(service),
+            Command::Offer(service) => self.stack.offer(Instant::now(), service),
             Command::Withdraw(urn) => {
                 self.stack.withdraw(urn);
             }

@@ -168,8 +168,7 @@ impl Component {
         }
     }
 
-    /// Offers one more service; whoever asks from now on sees it. Without effect if the
-    /// component has stopped.
+    /// Offers one more service, and tells the peers. Without effect if the component has stopped.
     pub async fn offer(&self, service: impl Service + 'static) {
         // An error means that there is nobody left to offer anything to.
         let _ = self
@@ -179,7 +178,7 @@ impl Component {
             .await;
     }
 
-    /// Takes a service back, in all its versions.
+    /// Takes a service back, in all its versions, and tells the peers.
     pub async fn withdraw(&self, urn: &'static str) {
         // As in `offer`.
         let _ = self.shared.commands.send(Command::Withdraw(urn)).await;

@@ -35,13 +35,14 @@ impl Stack {
     /// A component with its discovery and what else it offers.
     #[must_use]
     pub fn new(mut discovery: Discovery, services: Vec<Box<dyn Service>>) -> Self {
+        let mut out = Outbox::new(discovery.id());
         let offers = services.iter().flat_map(|service| service.offers());
-        discovery.set_offers(offers);
+        discovery.set_offers(offers, &mut out);
         Self {
-            out: Outbox::new(discovery.id()),
             discovery,
             services,
             inquiries: Inquiries::default(),
+            out,
             events: VecDeque::new(),
         }
     }
@@ -121,21 +122,26 @@ impl Stack {
         self.inquiries.cancel(now, inquiry, &mut self.out);
     }
 
-    /// Adds a service while the component runs; whoever asks from now on sees it.
-    pub fn offer(&mut self, service: Box<dyn Service>) {
+    /// Adds a service while the component runs, and tells the peers.
+    pub fn offer(&mut self, now: Instant, service: Box<dyn Service>) {
         self.services.push(service);
-        self.discovery
-            .set_offers(self.services.iter().flat_map(|service| service.offers()));
+        self.publish_offers();
+        self.wake(now);
     }
 
-    /// Takes a service back, whatever its version. Says whether it was there.
+    /// Takes a service back, whatever its version, and tells the peers. Says whether it was there.
     pub fn withdraw(&mut self, urn: &str) -> bool {
         let before = self.services.len();
         self.services
             .retain(|service| service.offers().iter().all(|id| id.urn != urn));
-        self.discovery
-            .set_offers(self.services.iter().flat_map(|service| service.offers()));
+        self.publish_offers();
         self.services.len() < before
+    }
+
+    fn publish_offers(&mut self) {
+        let offers = self.services.iter().flat_map(|service| service.offers());
+        self.discovery.set_offers(offers, &mut self.out);
+        self.collect();
     }
 
     /// The next message to send.

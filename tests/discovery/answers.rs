@@ -200,7 +200,7 @@ fn asked_alone_a_component_speaks_for_its_subsystem_and_together_for_itself() {
 fn a_long_list_of_services_is_cut_into_reports_of_one_packet() {
     let mut world = World::new();
     world.start(stack(OWN, "rover", Vec::new()));
-    for node in 2..=40 {
+    for node in 2..=12 {
         world.start(stack(
             JausId::new(101, node, 1),
             "part of the rover",
@@ -208,7 +208,7 @@ fn a_long_list_of_services_is_cut_into_reports_of_one_packet() {
         ));
     }
     let asker = world.puppet(ASKER);
-    world.run(Duration::from_secs(300));
+    world.run(Duration::from_secs(60));
     let reports = answers(&mut world, asker, OWN, &[0x03, 0x2B, 0]);
     assert!(reports.len() > 1);
     assert!(reports.iter().all(|report| report.payload.len() <= 1400));
@@ -220,7 +220,7 @@ fn a_long_list_of_services_is_cut_into_reports_of_one_packet() {
     });
     let mut nodes: Vec<_> = nodes.map(|node| node.node_rec.node_id).collect();
     nodes.sort_unstable();
-    assert_eq!(nodes, (1..=40).collect::<Vec<_>>(), "each once");
+    assert_eq!(nodes, (1..=12).collect::<Vec<_>>(), "each once");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Who finds whom, and when: components that come, change, fall silent and go.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus::codec::ServiceId;
@@ -9,7 +9,9 @@ use jaus::messages::core::{
     ReportHeartbeatPulse, ReportIdentification, ReportServices, report_configuration,
     report_services,
 };
-use jaus::service::{Change, Handlers, Kind, Level, Loss, Offer, Stack};
+use jaus::service::{
+    Change, Discovery, Handlers, Kind, Level, Loss, Offer, Profile, Scope, Stack, Timing,
+};
 
 use crate::world::{World, stack};
 
@@ -184,14 +186,13 @@ fn a_peer_that_restarts_under_another_name_is_asked_for_its_services_at_once() {
 }
 
 #[test]
-fn a_service_that_is_offered_or_withdrawn_later_is_noticed_with_the_next_refresh() {
+fn a_service_that_is_offered_or_withdrawn_later_is_noticed_at_once() {
     let mut world = World::new();
     let operator = world.start(plain(OPERATOR, "desk"));
     let vehicle = world.start(plain(VEHICLE, "rover"));
     world.run(seconds(10));
-    world.stack(vehicle).offer(Box::new(Handlers::new(CAMERA)));
-    world.run(seconds(33));
     let offered = |world: &mut World| {
+        world.run(Duration::from_millis(10));
         world
             .stack(operator)
             .directory()
@@ -199,10 +200,96 @@ fn a_service_that_is_offered_or_withdrawn_later_is_noticed_with_the_next_refresh
             .unwrap()
             .offers(CAMERA.urn)
     };
+    assert!(!offered(&mut world));
+    let now = world.now;
+    world
+        .stack(vehicle)
+        .offer(now, Box::new(Handlers::new(CAMERA)));
     assert!(offered(&mut world));
     assert!(world.stack(vehicle).withdraw(CAMERA.urn));
-    world.run(seconds(33));
     assert!(!offered(&mut world));
+}
+
+#[test]
+fn a_peer_that_restarts_with_other_services_is_noticed_with_the_next_refresh() {
+    let mut world = World::new();
+    let operator = world.start(plain(OPERATOR, "desk"));
+    let first = world.start(plain(VEHICLE, "rover"));
+    world.run(seconds(10));
+    world.kill(first);
+    world.start(stack(
+        VEHICLE,
+        "rover",
+        vec![Box::new(Handlers::new(CAMERA))],
+    ));
+    world.run(seconds(33));
+    let lost = |change: &(Instant, Change)| matches!(change.1, Change::Lost(..));
+    assert!(
+        !world.changes(operator).iter().any(lost),
+        "it was not away for long"
+    );
+    let directory = world.stack(operator).directory();
+    assert!(directory.component(VEHICLE).unwrap().offers(CAMERA.urn));
+}
+
+#[test]
+fn nobody_is_lost_in_an_hour_in_which_every_tenth_datagram_is() {
+    let mut world = World::new();
+    let places = [VEHICLE, OPERATOR, JausId::new(7, 1, 1)]
+        .map(|id| world.start(plain(id, "on a bad network")));
+    world.lose_every(10);
+    world.run(seconds(3600));
+    for place in places {
+        assert_eq!(world.stack(place).directory().len(), 3);
+        let changes = world.changes(place);
+        let lost = changes
+            .iter()
+            .filter(|(_, change)| matches!(change, Change::Lost(..)));
+        assert_eq!(lost.count(), 0);
+    }
+}
+
+fn scoped(id: JausId, scope: Scope) -> Stack {
+    let profile = Profile::new(Kind::Vehicle, "scoped");
+    Stack::new(
+        Discovery::new(id, profile, scope, Timing::default(), 1),
+        Vec::new(),
+    )
+}
+
+#[test]
+fn a_component_that_looks_for_nobody_says_nothing_unless_it_is_asked() {
+    let mut world = World::new();
+    let quiet = world.start(scoped(VEHICLE, Scope::Nobody));
+    world.run(seconds(3600));
+    assert_eq!(world.datagrams(quiet), 0);
+    let operator = world.start(plain(OPERATOR, "desk"));
+    world.run(seconds(1));
+    assert!(
+        world
+            .stack(operator)
+            .directory()
+            .component(VEHICLE)
+            .is_some()
+    );
+    assert_eq!(world.stack(quiet).directory().len(), 1);
+}
+
+#[test]
+fn a_component_that_looks_for_its_subsystem_does_not_see_others() {
+    let sibling = JausId::new(101, 2, 1);
+    let mut world = World::new();
+    let near = world.start(scoped(VEHICLE, Scope::Subsystem));
+    world.start(plain(OPERATOR, "desk"));
+    world.start(plain(sibling, "rover"));
+    world.run(seconds(60));
+    let known: Vec<_> = world
+        .stack(near)
+        .directory()
+        .components()
+        .map(|c| c.id)
+        .collect();
+    assert_eq!(known, [VEHICLE, sibling]);
 }
 
 #[test]
@@ -373,13 +460,12 @@ fn a_stranger_that_says_nothing_about_itself_is_asked_a_few_times_and_not_for_ev
 #[test]
 fn a_full_directory_ignores_the_next_component_and_keeps_the_others() {
     let mut world = World::new();
-    let profile = jaus::service::Profile::new(Kind::Vehicle, "small");
-    let timing = jaus::service::Timing {
+    let profile = Profile::new(Kind::Vehicle, "small");
+    let timing = Timing {
         max_components: 2,
-        ..Default::default()
+        ..Timing::default()
     };
-    let scope = jaus::service::Scope::System;
-    let discovery = jaus::service::Discovery::new(OPERATOR, profile, scope, timing, 1);
+    let discovery = Discovery::new(OPERATOR, profile, Scope::System, timing, 1);
     let operator = world.start(Stack::new(discovery, Vec::new()));
     for subsystem in 1..=5 {
         world.start(plain(JausId::new(subsystem, 1, 1), "one of many"));

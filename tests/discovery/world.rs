@@ -22,6 +22,8 @@ pub(crate) struct World {
     /// Datagrams on their way, by arrival and number.
     flights: BTreeMap<(Instant, u64), Flight>,
     flown: u64,
+    /// Of how many datagrams the network loses one; 0 for a good network.
+    lost_of: u64,
 }
 
 /// A computer with one component: a stack, or a puppet whose strings the test holds.
@@ -67,6 +69,7 @@ impl World {
             nodes: Vec::new(),
             flights: BTreeMap::new(),
             flown: 0,
+            lost_of: 0,
         }
     }
 
@@ -151,6 +154,16 @@ impl World {
         node.endpoint
             .send(self.now, Outgoing::new(node.id, to, payload))
             .unwrap();
+    }
+
+    /// Has the network lose datagrams, one of `many` on average and always the same ones.
+    pub(crate) fn lose_every(&mut self, many: u64) {
+        self.lost_of = many;
+    }
+
+    fn is_lost(&self) -> bool {
+        let mixed = self.flown.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
+        self.lost_of > 0 && mixed.is_multiple_of(self.lost_of)
     }
 
     /// Lets time pass.
@@ -264,7 +277,9 @@ impl World {
                     to,
                     payload: transmit.payload.clone(),
                 };
-                self.flights.insert((now + DELAY, self.flown), flight);
+                if !self.is_lost() {
+                    self.flights.insert((now + DELAY, self.flown), flight);
+                }
             }
         }
     }

@@ -136,6 +136,19 @@ impl Discovery {
         }
     }
 
+    /// Tells the own services to every peer that may have asked for them.
+    pub(super) fn tell_services(&self, out: &mut Outbox) {
+        let mut reports = Vec::new();
+        if let Some(own) = self.directory.component(self.own) {
+            add_services(&mut reports, own);
+        }
+        for (peer, _) in self.search.speakers() {
+            for report in &reports {
+                out.send(peer, report);
+            }
+        }
+    }
+
     pub(super) fn answer_service_list(
         &mut self,
         now: Instant,

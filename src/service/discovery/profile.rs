@@ -96,9 +96,9 @@ impl Default for Timing {
     fn default() -> Self {
         Self {
             call: Duration::from_secs(5),
-            call_per_peer: Duration::from_secs(2),
+            call_per_peer: Duration::from_millis(1500),
             refresh: Duration::from_secs(30),
-            refresh_per_peer: Duration::from_secs(10),
+            refresh_per_peer: Duration::from_secs(20),
             probes: 3,
             probe_interval: Duration::from_secs(1),
             max_components: 1024,

@@ -209,7 +209,7 @@ impl Search {
     }
 
     /// The peers that speak for themselves.
-    fn speakers(&self) -> impl Iterator<Item = (JausId, &Peer)> {
+    pub(super) fn speakers(&self) -> impl Iterator<Item = (JausId, &Peer)> {
         self.peers
             .iter()
             .filter(|(_, peer)| peer.listed_by.is_none())
