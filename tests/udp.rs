@@ -130,6 +130,28 @@ async fn a_peer_that_is_gone_does_not_end_the_link() {
     assert_eq!(receive(&mut a).await.1, &b"still there"[..]);
 }
 
+#[cfg(target_os = "linux")]
+#[tokio::test]
+async fn what_the_kernel_drops_is_told() {
+    let small = Settings {
+        receive_buffer: 4096,
+        ..settings()
+    };
+    let mut slow = UdpLink::open(&loopback(), &small).unwrap();
+    let mut fast = UdpLink::open(&loopback(), &settings()).unwrap();
+    assert_eq!(slow.kernel_drops(), Some(0));
+    let datagram = Bytes::from(vec![0; 1000]);
+    for _ in 0..100 {
+        fast.send_to(slow.local(), Priority::Standard, &datagram);
+    }
+    let dropped = slow.kernel_drops().unwrap();
+    assert!(dropped > 0);
+    for _ in dropped..100 {
+        receive(&mut slow).await;
+    }
+    assert_eq!(slow.counters().received + dropped, 100);
+}
+
 #[tokio::test]
 async fn the_longest_datagram_arrives_whole() {
     let mut a = UdpLink::open(&loopback(), &settings()).unwrap();

@@ -29,6 +29,7 @@ mod group;
 mod holder;
 pub mod interface;
 mod slab;
+mod socket_table;
 pub mod udp;
 
 pub use error::Error;

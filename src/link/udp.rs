@@ -6,6 +6,7 @@
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
+use std::path::PathBuf;
 use std::task::{Context, Poll, ready};
 
 use bytes::Bytes;
@@ -14,6 +15,7 @@ use tokio::net::UdpSocket;
 
 use super::backlog::{Backlog, Bounds};
 use super::group::{Group, STANDARD_PORT};
+use super::socket_table::{self, Entry};
 use super::{Error, Holder, Interface, Slab};
 use crate::wire::Priority;
 
@@ -159,6 +161,19 @@ impl UdpLink {
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         &self.counters
+    }
+
+    /// How many datagrams the kernel dropped because this process did not read them in time, if
+    /// it tells (Linux does). Reads a table of all sockets: nothing to ask every second.
+    #[must_use]
+    pub fn kernel_drops(&self) -> Option<u64> {
+        let group = self.group.as_ref().map(|group| &group.socket);
+        let sockets = [Some(&self.unicast), group].into_iter().flatten();
+        let files: Vec<PathBuf> = sockets.filter_map(file).collect();
+        let ours = |entry: &Entry| files.contains(&socket_table::file_of(entry.inode).into());
+        let table = socket_table::all();
+        let drops: Vec<u64> = table.iter().filter(|e| ours(e)).map(|e| e.drops).collect();
+        (!drops.is_empty()).then(|| drops.iter().sum())
     }
 
     /// Names the peers that get a unicast copy of everything sent to the group, for networks that
@@ -358,6 +373,18 @@ fn open_group(
         address: group.into(),
         socket,
     })
+}
+
+/// What the socket's file descriptor links to: its number in the kernel.
+#[cfg(unix)]
+fn file(socket: &UdpSocket) -> Option<PathBuf> {
+    use std::os::fd::AsRawFd;
+    std::fs::read_link(format!("/proc/self/fd/{}", socket.as_raw_fd())).ok()
+}
+
+#[cfg(not(unix))]
+fn file(_: &UdpSocket) -> Option<PathBuf> {
+    None
 }
 
 fn new_socket() -> Result<Socket, Error> {

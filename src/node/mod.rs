@@ -121,6 +121,7 @@ impl Node {
             local: link.local(),
             group: link.group(),
             counters: *link.counters(),
+            kernel_drops: link.kernel_drops(),
         };
         core.links.iter().map(report).collect()
     }
@@ -183,6 +184,8 @@ pub struct LinkReport {
     pub group: Option<SocketAddr>,
     /// What it has done.
     pub counters: udp::Counters,
+    /// Datagrams that the kernel dropped because the node did not read them in time, if it tells.
+    pub kernel_drops: Option<u64>,
 }
 
 /// A listener to a node's news. One that falls behind by more than 256 misses the oldest.

@@ -1,0 +1,108 @@
+//! Linux's table of UDP sockets, `/proc/net/udp`: who holds a port, and what the kernel dropped.
+//!
+//! Elsewhere there is no such table, and nothing is found.
+
+use std::fs;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+
+/// One socket, as far as we are concerned.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Entry {
+    /// `None` for an IPv6 address other than "all".
+    ip: Option<Ipv4Addr>,
+    port: u16,
+    /// The user it belongs to.
+    pub(super) uid: u32,
+    /// Its number in the kernel.
+    pub(super) inode: u64,
+    /// Datagrams that found its receive buffer full.
+    pub(super) drops: u64,
+}
+
+impl Entry {
+    /// Whether this socket is bound to the address, or to its port of all addresses.
+    pub(super) fn keeps_from(&self, address: SocketAddr) -> bool {
+        self.port == address.port()
+            && self
+                .ip
+                .is_some_and(|ip| ip.is_unspecified() || IpAddr::V4(ip) == address.ip())
+    }
+}
+
+/// All sockets that this host shows.
+pub(super) fn all() -> Vec<Entry> {
+    let tables = ["/proc/net/udp", "/proc/net/udp6"].map(fs::read_to_string);
+    tables
+        .iter()
+        .flatten()
+        .flat_map(|table| read(table))
+        .collect()
+}
+
+/// What a file descriptor of the socket with this number links to.
+pub(super) fn file_of(inode: u64) -> String {
+    format!("socket:[{inode}]")
+}
+
+fn read(table: &str) -> impl Iterator<Item = Entry> + '_ {
+    table.lines().skip(1).filter_map(|line| {
+        let columns: Vec<&str> = line.split_whitespace().collect();
+        let (ip, port) = columns.get(1)?.split_once(':')?;
+        Some(Entry {
+            ip: ipv4(ip),
+            port: u16::from_str_radix(port, 16).ok()?,
+            uid: columns.get(7)?.parse().ok()?,
+            inode: columns.get(9)?.parse().ok()?,
+            drops: columns.last()?.parse().ok()?,
+        })
+    })
+}
+
+/// The table shows addresses as hexadecimal words in the host's byte order. IPv6's "all" keeps
+/// IPv4 sockets out too.
+fn ipv4(word: &str) -> Option<Ipv4Addr> {
+    if word.bytes().all(|digit| digit == b'0') {
+        return Some(Ipv4Addr::UNSPECIFIED);
+    }
+    u32::from_str_radix(word, 16)
+        .ok()
+        .map(|word| Ipv4Addr::from(word.to_ne_bytes()))
+}
+
+#[cfg(test)]
+#[cfg(target_endian = "little")]
+mod tests {
+    use super::*;
+
+    const TABLE: &str = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode ref pointer drops
+  107: 0100007F:0ED2 00000000:0000 07 00000000:00000000 00:00000000 00000000  1000        0 4242 2 0000000000000000 9
+  108: 00000000:0035 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 77 2 0000000000000000 0
+garbage
+";
+
+    fn in_the_way(address: &str) -> Vec<u64> {
+        let address = address.parse().unwrap();
+        read(TABLE)
+            .filter(|e| e.keeps_from(address))
+            .map(|e| e.inode)
+            .collect()
+    }
+
+    #[test]
+    fn the_socket_bound_to_the_address_or_to_all_is_found() {
+        assert_eq!(in_the_way("127.0.0.1:3794"), [4242]);
+        assert_eq!(in_the_way("10.0.0.1:53"), [77]);
+    }
+
+    #[test]
+    fn a_socket_of_another_address_or_port_is_not_blamed() {
+        assert!(in_the_way("127.0.0.2:3794").is_empty());
+        assert!(in_the_way("127.0.0.1:3795").is_empty());
+    }
+
+    #[test]
+    fn owner_and_drops_are_read() {
+        let first = read(TABLE).next().unwrap();
+        assert_eq!((first.uid, first.drops), (1000, 9));
+    }
+}

@@ -1,0 +1,183 @@
+//! Two hosts to test on, and nodes in processes of their own on them.
+
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// Longer than anything takes; reached only when a test fails.
+pub(crate) const LIMIT: Duration = Duration::from_secs(30);
+
+/// Set for a process that plays a node; says which.
+pub(crate) const ROLE: &str = "JAUS_TEST_ROLE";
+
+/// Set for a test that was started again in a user namespace.
+const INSIDE: &str = "JAUS_TEST_IN_USER_NAMESPACE";
+
+/// Two network namespaces, joined by a cable; gone when dropped.
+pub(crate) struct TwoHosts {
+    pub(crate) names: [String; 2],
+}
+
+impl TwoHosts {
+    const ADDRESSES: [&str; 2] = ["10.213.77.1", "10.213.77.2"];
+
+    fn new() -> Result<Self, String> {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let name = |end| format!("jaus-{}-{number}-{end}", std::process::id());
+        let hosts = Self {
+            names: [name("a"), name("b")],
+        };
+        hosts.set_up().map(|()| hosts)
+    }
+
+    fn set_up(&self) -> Result<(), String> {
+        let [a, b] = &self.names;
+        ip(&["netns", "add", a])?;
+        ip(&["netns", "add", b])?;
+        ip(&[
+            "link", "add", "jaus0", "netns", a, "type", "veth", "peer", "jaus0", "netns", b,
+        ])?;
+        for (name, address) in self.names.iter().zip(Self::ADDRESSES) {
+            let prefixed = format!("{address}/24");
+            ip(&["-n", name, "address", "add", &prefixed, "dev", "jaus0"])?;
+            ip(&["-n", name, "link", "set", "lo", "up"])?;
+            ip(&["-n", name, "link", "set", "jaus0", "up"])?;
+        }
+        Ok(())
+    }
+
+    /// Runs `ip` on one of the two hosts.
+    pub(crate) fn ip(&self, host: usize, arguments: &[&str]) {
+        ip(&[&["-n", &self.names[host]], arguments].concat()).unwrap();
+    }
+
+    /// Starts this test binary in the role of a node on one of the two hosts.
+    pub(crate) fn start(&self, host: usize, role: &str) -> Process {
+        let mut child = Command::new("ip")
+            .args(["netns", "exec", &self.names[host]])
+            .arg(std::env::current_exe().unwrap())
+            .args([
+                "--exact",
+                "a_process_that_plays_a_node",
+                "--nocapture",
+                "--test-threads=1",
+            ])
+            .env(ROLE, role)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (sender, lines) = channel();
+        let stdout = BufReader::new(child.stdout.take().unwrap());
+        std::thread::spawn(move || {
+            for line in stdout.lines().map_while(Result::ok) {
+                if sender.send(line).is_err() {
+                    break;
+                }
+            }
+        });
+        Process { child, lines }
+    }
+}
+
+impl Drop for TwoHosts {
+    fn drop(&mut self) {
+        for name in &self.names {
+            // Not there if setting up failed half-way.
+            let _ = ip(&["netns", "delete", name]);
+        }
+    }
+}
+
+/// Runs a test's body on two hosts: made here; or else in a user namespace, where this test binary
+/// is started again for the same test; or not at all, said loudly.
+pub(crate) fn on_two_hosts(test: &str, body: impl FnOnce(&TwoHosts)) {
+    let reason = match TwoHosts::new() {
+        Ok(hosts) => return body(&hosts),
+        Err(reason) => reason,
+    };
+    if std::env::var_os(INSIDE).is_none()
+        && in_user_namespace(&["true"])
+            .status()
+            .is_ok_and(|s| s.success())
+    {
+        let again = std::env::current_exe().unwrap();
+        let again = [again.to_str().unwrap(), "--exact", test, "--nocapture"];
+        assert!(
+            in_user_namespace(&again)
+                .status()
+                .is_ok_and(|s| s.success()),
+            "{test} failed in a user namespace"
+        );
+        return;
+    }
+    say_skipped(test, &format!("no network namespaces here: {reason}"));
+}
+
+/// Says it past the test harness, which would keep the words of a test that passes.
+pub(crate) fn say_skipped(test: &str, reason: &str) {
+    let words = format!(
+        "\n*** SKIPPED {test}: {reason}\n\
+         *** To run it: as root, with iproute2 installed.\n\n"
+    );
+    std::io::stderr().write_all(words.as_bytes()).unwrap();
+}
+
+/// A command as root of namespaces of its own, which a plain user may often be.
+fn in_user_namespace(command: &[&str]) -> Command {
+    let mut unshare = Command::new("unshare");
+    unshare
+        .args(["--user", "--map-root-user", "--net", "--mount", "sh", "-c"])
+        .args(["mount -t tmpfs none /run && exec \"$@\"", "sh"])
+        .args(command)
+        .env(INSIDE, "1");
+    unshare
+}
+
+fn ip(arguments: &[&str]) -> Result<(), String> {
+    run("ip", arguments)
+}
+
+pub(crate) fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
+    let output = Command::new(program).args(arguments).output();
+    let output = output.map_err(|e| format!("{program}: {e}"))?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    if output.status.success() {
+        Ok(())
+    } else {
+        Err(said.trim().replace('\n', "; "))
+    }
+}
+
+/// A node in a process of its own; killed when dropped.
+pub(crate) struct Process {
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Process {
+    /// Waits until the process prints a line that begins so, and gives the rest of it.
+    pub(crate) fn says(&self, beginning: &str) -> String {
+        let deadline = Instant::now() + LIMIT;
+        loop {
+            let left = deadline.saturating_duration_since(Instant::now());
+            match self.lines.recv_timeout(left) {
+                Ok(line) => {
+                    if let Some(rest) = line.strip_prefix(beginning) {
+                        return rest.trim().to_owned();
+                    }
+                }
+                Err(e) => panic!("the other process did not say `{beginning}`: {e}"),
+            }
+        }
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

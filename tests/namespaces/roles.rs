@@ -1,0 +1,118 @@
+//! What the processes do that play nodes. They print what the tests wait for.
+
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::component::{Change, Component, Kind};
+use jaus::endpoint::Outgoing;
+use jaus::node::{Config, Node};
+use jaus::wire::Priority;
+
+/// Messages that the flood is made of.
+pub(crate) const FLOOD: usize = 2000;
+
+/// Answers whatever it hears, until it is killed.
+pub(crate) async fn echo() {
+    let node = Node::start(Config::new(101, 1)).unwrap();
+    let mut port = node.attach(33).unwrap();
+    println!("\nlistening on {}", node.links()[0].local);
+    while let Some(message) = port.recv().await {
+        println!("heard {} at {}", message.source, message.path.unwrap().peer);
+        port.send(Outgoing::new(port.id(), message.source, message.payload))
+            .unwrap();
+    }
+}
+
+/// Asks everyone until somebody answers.
+pub(crate) async fn call() {
+    let node = Node::start(Config::new(102, 1)).unwrap();
+    let mut port = node.attach(1).unwrap();
+    let query_identification = Bytes::from_static(&[0x00, 0x2B, 0x02]);
+    let answer = loop {
+        let query = Outgoing::new(port.id(), JausId::EVERYONE, query_identification.clone());
+        port.send(query).unwrap();
+        if let Ok(answer) = tokio::time::timeout(Duration::from_millis(200), port.recv()).await {
+            break answer.unwrap();
+        }
+    };
+    println!(
+        "\nanswered by {} at {}",
+        answer.source,
+        answer.path.unwrap().peer
+    );
+    node.shutdown().await;
+}
+
+/// Counts what comes, and says when the urgent message came.
+pub(crate) async fn sink() {
+    let node = Node::start(Config::new(101, 1)).unwrap();
+    let mut port = node.attach(33).unwrap();
+    println!("\nlistening on {}", node.links()[0].local);
+    let mut usual = 0;
+    let mut urgent = false;
+    while usual < FLOOD || !urgent {
+        let message = port.recv().await.unwrap();
+        if message.priority == Priority::SafetyCritical {
+            urgent = true;
+            println!("urgent message after {usual}");
+        } else {
+            usual += 1;
+        }
+    }
+    println!("all {usual}");
+    std::future::pending::<()>().await;
+}
+
+/// Sends far more than the network takes, and then something urgent.
+pub(crate) async fn flood() {
+    let node = Node::start(Config::new(102, 1)).unwrap();
+    let port = node.attach(1).unwrap();
+    let picture = Bytes::from(vec![0; 1400]);
+    let usual = Outgoing::new(port.id(), JausId::EVERYONE, picture);
+    let set_emergency = Bytes::from_static(&[0x06, 0x00, 0x01]);
+    let urgent = Outgoing {
+        priority: Priority::SafetyCritical,
+        ..Outgoing::new(port.id(), JausId::EVERYONE, set_emergency)
+    };
+    for _ in 0..FLOOD {
+        port.send(usual.clone()).unwrap();
+    }
+    port.send(urgent).unwrap();
+    std::future::pending::<()>().await;
+}
+
+/// A vehicle that offers the core services, until it is killed.
+pub(crate) async fn vehicle() {
+    let node = Node::start(Config::new(101, 1)).unwrap();
+    let rover = Component::builder(Kind::Vehicle, "Rover")
+        .attach(&node, 33)
+        .unwrap();
+    tell_changes(&rover, Instant::now()).await;
+}
+
+/// An operator that looks for vehicles, until it is killed.
+pub(crate) async fn operator() {
+    let started = Instant::now();
+    let node = Node::start(Config::new(102, 1)).unwrap();
+    let desk = Component::builder(Kind::OperatorControlUnit, "Desk")
+        .attach(&node, 1)
+        .unwrap();
+    tell_changes(&desk, started).await;
+}
+
+/// Prints who is found, once its services are known, and who is lost, and the milliseconds since.
+async fn tell_changes(component: &Component, since: Instant) {
+    let mut changes = component.watch();
+    println!("\nstarted");
+    while let Some(change) = changes.next().await {
+        let after = since.elapsed().as_millis();
+        match change {
+            Change::Services(id) if id != component.id() => {
+                println!("found {id} with its services after {after}");
+            }
+            Change::Lost(id, _) => println!("lost {id} after {after}"),
+            _ => {}
+        }
+    }
+}
