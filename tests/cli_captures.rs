@@ -6,7 +6,10 @@ mod cli_support;
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
-use cli_support::{Message, RAW, ip_packet, jaus, pcap, pcap_of, run, shared};
+use cli_support::{
+    Message, RAW, block, enhanced_packet, interface, ip_packet, jaus, pcap, pcap_of, run,
+    section_header, shared,
+};
 use serde_json::Value as Json;
 
 /// 42.1.1 asks the component 105.1.255 for its subsystem's identification.
@@ -61,36 +64,6 @@ fn both_byte_orders_and_both_resolutions_of_pcap_are_read() {
         decode(&nanoseconds).only_line()["time"],
         "2015-06-08T16:36:58.000436918Z"
     );
-}
-
-/// A pcapng block.
-fn block(kind: u32, body: &[u8]) -> Vec<u8> {
-    let padding = vec![0; body.len().next_multiple_of(4) - body.len()];
-    let length = (12 + body.len() + padding.len()) as u32;
-    let length = length.to_le_bytes();
-    [&kind.to_le_bytes()[..], &length, body, &padding, &length].concat()
-}
-
-fn section_header() -> Vec<u8> {
-    let body = [&[0x4d, 0x3c, 0x2b, 0x1a, 1, 0, 0, 0][..], &[0xff; 8]].concat();
-    block(0x0A0D_0D0A, &body)
-}
-
-fn interface(link: u16, options: &[u8]) -> Vec<u8> {
-    block(1, &[&link.to_le_bytes()[..], &[0; 6], options].concat())
-}
-
-fn enhanced_packet(interface: u32, ticks: u64, frame: &[u8]) -> Vec<u8> {
-    let length = frame.len() as u32;
-    let words = [
-        interface,
-        (ticks >> 32) as u32,
-        ticks as u32,
-        length,
-        length,
-    ];
-    let body: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-    block(6, &[&body, frame].concat())
 }
 
 #[test]

@@ -3,12 +3,13 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use bytes::Bytes;
 use jsidl::model::{Message, Version};
-use jsidl::{Library, dynamic};
+use jsidl::{Diagnostics, Loaded, Loader, dynamic};
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
@@ -53,6 +54,15 @@ struct Service {
 enum Codec {
     Generated(&'static MessageInfo),
     Dynamic(Arc<Message>),
+}
+
+/// What [`Dictionary::load`] did.
+#[derive(Debug)]
+pub struct Added {
+    /// How many services were added.
+    pub services: usize,
+    /// What is wrong with the definitions.
+    pub diagnostics: Diagnostics,
 }
 
 /// What the dictionary knows about octets.
@@ -197,28 +207,46 @@ impl Dictionary {
         }
     }
 
-    /// Adds definitions loaded at run time. A service with the URN and version of one that is
-    /// already here takes its place.
-    pub fn add(&mut self, library: &Library) {
-        let mut added: BTreeMap<u16, Vec<Definition>> = BTreeMap::new();
-        for service in library.services() {
-            let service_name = Service {
-                urn: service.id.urn.clone(),
-                version: service.id.version,
-            };
-            self.forget(&service_name);
-            for message in service.messages() {
-                added.entry(message.code).or_default().push(Definition {
-                    services: vec![service_name.clone()],
-                    codec: Codec::Dynamic(Arc::clone(message)),
-                });
-            }
+    /// Adds the definitions in files and directories, which may refer to one another and to the
+    /// definitions that come with this crate. A service with the URN and version of one that is
+    /// already here takes its place. What has a mistake is left out and named in the diagnostics.
+    pub fn load<P: AsRef<Path>>(&mut self, paths: impl IntoIterator<Item = P>) -> Added {
+        let mut loader = Loader::new();
+        for path in paths {
+            loader.path(path);
         }
-        for (code, mut definitions) in added {
-            definitions.sort_by_key(|d| d.services.first().map(|s| std::cmp::Reverse(s.version)));
-            let known = self.by_code.entry(code).or_default();
-            definitions.append(known);
-            *known = definitions;
+        loader.catalogue();
+        let Loaded {
+            library,
+            diagnostics,
+        } = loader.load();
+        let services: Vec<_> = library.services().filter(|s| !is_built_in(s)).collect();
+        for service in &services {
+            self.add(service);
+        }
+        Added {
+            services: services.len(),
+            diagnostics,
+        }
+    }
+
+    fn add(&mut self, definition: &jsidl::model::Service) {
+        let service = Service {
+            urn: definition.id.urn.clone(),
+            version: definition.id.version,
+        };
+        self.forget(&service);
+        for message in definition.messages() {
+            let known = self.by_code.entry(message.code).or_default();
+            // Before the generated ones, and before older versions.
+            let place = known.partition_point(|other| other.comes_before(service.version));
+            known.insert(
+                place,
+                Definition {
+                    services: vec![service.clone()],
+                    codec: Codec::Dynamic(Arc::clone(message)),
+                },
+            );
         }
     }
 
@@ -282,7 +310,9 @@ impl Dictionary {
         match failure {
             Some((definition, unreadable)) => self.reading(code, 0, definition, Err(unreadable)),
             None => {
-                let problem = format!("no definition here has the message code {code:04X}h");
+                let problem = format!(
+                    "no definition here has the message code {code:04X}h; load one that has it"
+                );
                 Reading::unknown(Some(code), Unreadable::new(problem, 0))
             }
         }
@@ -419,7 +449,20 @@ impl<'d> Reading<'d> {
     }
 }
 
+/// Whether a service is one of those that come with the crate, of which the generated types are
+/// made.
+fn is_built_in(service: &jsidl::model::Service) -> bool {
+    jsidl::catalogue::find(&service.id)
+        .is_some_and(|entry| *service.location.file == *Path::new("catalogue").join(entry.path))
+}
+
 impl Definition {
+    /// Whether this is tried before a definition that was loaded with a service of this version.
+    fn comes_before(&self, version: Version) -> bool {
+        let newest = self.services.iter().map(|service| service.version).max();
+        matches!(self.codec, Codec::Dynamic(_)) && newest >= Some(version)
+    }
+
     fn belongs_to(&self, service: &ServiceName) -> bool {
         self.services.iter().any(|known| service.matches(known))
     }

@@ -16,7 +16,7 @@ mod request;
 mod time;
 
 pub use capture::{Capture, CaptureError, Frame, LinkType};
-pub use dictionary::{Body, Dictionary, Reading, ServiceName, Unreadable};
+pub use dictionary::{Added, Body, Dictionary, Reading, ServiceName, Unreadable};
 pub use hex::{from_hex, to_hex};
 pub use line::{Content, Envelope, Header, Line};
 pub use log::MessageLog;

@@ -232,3 +232,42 @@ pub fn pcap_of(datagrams: &[Vec<u8>]) -> Vec<u8> {
     let packets: Vec<_> = datagrams.iter().map(|d| ip_packet(d)).collect();
     pcap(RAW, &packets)
 }
+
+/// A pcapng block.
+pub fn block(kind: u32, body: &[u8]) -> Vec<u8> {
+    let padding = vec![0; body.len().next_multiple_of(4) - body.len()];
+    let length = (12 + body.len() + padding.len()) as u32;
+    let length = length.to_le_bytes();
+    [&kind.to_le_bytes()[..], &length, body, &padding, &length].concat()
+}
+
+pub fn section_header() -> Vec<u8> {
+    let body = [&[0x4d, 0x3c, 0x2b, 0x1a, 1, 0, 0, 0][..], &[0xff; 8]].concat();
+    block(0x0A0D_0D0A, &body)
+}
+
+pub fn interface(link: u16, options: &[u8]) -> Vec<u8> {
+    block(1, &[&link.to_le_bytes()[..], &[0; 6], options].concat())
+}
+
+pub fn enhanced_packet(interface: u32, ticks: u64, frame: &[u8]) -> Vec<u8> {
+    let length = frame.len() as u32;
+    let words = [
+        interface,
+        (ticks >> 32) as u32,
+        ticks as u32,
+        length,
+        length,
+    ];
+    let body: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    block(6, &[&body, frame].concat())
+}
+
+/// A pcapng file with one interface, and its frames.
+pub fn pcapng(link: u16, frames: &[Vec<u8>]) -> Vec<u8> {
+    let packets = frames
+        .iter()
+        .map(|frame| enhanced_packet(0, 1_433_781_418_436_918, frame));
+    let blocks = [section_header(), interface(link, &[])];
+    blocks.into_iter().chain(packets).flatten().collect()
+}

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use jaus::view::Dictionary;
-use jsidl::{Loaded, Loader};
 
 use crate::failure::Failure;
 
@@ -38,34 +37,22 @@ impl Definitions {
         Ok(dictionary)
     }
 
-    /// Loads all paths together, since files may refer to one another.
     fn add(&self, dictionary: &mut Dictionary) -> Result<(), Failure> {
         if self.jsidl.is_empty() {
             return Ok(());
         }
-        let mut loader = Loader::new();
-        for path in &self.jsidl {
-            loader.path(path);
-        }
-        let Loaded {
-            library,
-            diagnostics,
-        } = loader.load();
-        for diagnostic in diagnostics.errors() {
+        let added = dictionary.load(&self.jsidl);
+        for diagnostic in added.diagnostics.errors() {
             eprintln!("jaus: {diagnostic}");
         }
-        if library.services().next().is_none() {
-            let paths: Vec<_> = self
-                .jsidl
-                .iter()
-                .map(|path| path.display().to_string())
-                .collect();
-            return Err(Failure::new(format!(
-                "no service could be loaded from {}",
-                paths.join(", ")
-            )));
+        if added.services > 0 {
+            return Ok(());
         }
-        dictionary.add(&library);
-        Ok(())
+        let paths = self.jsidl.iter().map(|path| path.display().to_string());
+        let paths: Vec<_> = paths.collect();
+        Err(Failure::new(format!(
+            "no service could be loaded from {}",
+            paths.join(", ")
+        )))
     }
 }

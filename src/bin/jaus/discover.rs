@@ -7,7 +7,7 @@ use jaus::component::{Component, Kind};
 use jaus::node::Node;
 
 use crate::failure::{Failure, Outcome};
-use crate::network::{Network, passing_id};
+use crate::network::Network;
 use crate::output::Output;
 use crate::runtime::{self, Clock};
 use crate::tree;
@@ -45,12 +45,11 @@ const LOOK: Duration = Duration::from_secs(3);
 
 impl Discover {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        let settings = self.network.settings(passing_id())?;
+        let (id, config) = self.network.for_a_moment()?;
         runtime::run(async {
-            let node = Node::start(settings.node.clone()).map_err(Failure::of)?;
-            let component = settings
-                .component(Kind::OtherSubsystem, "jaus discover")
-                .attach(&node, settings.id.component())
+            let node = Node::start(config).map_err(Failure::of)?;
+            let component = Component::builder(Kind::OtherSubsystem, "jaus discover")
+                .attach(&node, id.component())
                 .map_err(Failure::of)?;
             let outcome = if self.watch {
                 self.watch(&component).await

@@ -7,7 +7,8 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use jaus::address::JausId;
-use jaus::component::{Builder, Component, Kind};
+use jaus::component::Kind;
+use jaus::link::udp::PortTaken;
 use jaus::link::{Group, Interfaces};
 use jaus::node::{Config, Peer};
 use serde::Deserialize;
@@ -17,27 +18,21 @@ use crate::failure::Failure;
 #[derive(Args)]
 #[command(next_help_heading = "Network")]
 pub(crate) struct Network {
-    /// Our id, SUBSYSTEM.NODE.COMPONENT or SUBSYSTEM.NODE (then component 1)
+    /// Our id, SUBSYSTEM.NODE.COMPONENT or SUBSYSTEM.NODE (then component 1) [default: 101.1.1 for
+    /// `jaus node`; the other commands take one from subsystem 60000 on]
     #[arg(long, value_name = "ID")]
     id: Option<OwnId>,
-
-    /// What our subsystem is called
-    #[arg(long)]
-    name: Option<String>,
-
-    /// What our subsystem is
-    #[arg(long, value_enum)]
-    kind: Option<SubsystemKind>,
 
     /// Use only this interface, by name or IPv4 address (repeatable) [default: all that are up]
     #[arg(long, value_name = "INTERFACE", conflicts_with = "loopback")]
     interface: Vec<String>,
 
-    /// Stay on this host: no network is needed, and nothing leaves
+    /// Stay on this host: no network is needed, and nothing leaves. Without --port, any free port
     #[arg(long)]
     loopback: bool,
 
-    /// Our UDP port; 0 takes any free one [default: 3794, or any free one if that is taken]
+    /// Our UDP port; 0 takes any free one [default: 3794; if that is taken, `jaus node` says so and
+    /// the other commands take any free one]
     #[arg(long)]
     port: Option<u16>,
 
@@ -57,45 +52,28 @@ pub(crate) struct Network {
 
     /// Take the settings from a TOML file; flags come on top
     ///
-    /// It has the keys id, name and kind as the flags, and those of a node: interfaces, port,
-    /// group, ttl, peers, for example
-    ///   id = "101.1.1"
+    /// For example:
+    ///   id = "101.1.1"                  # who we are: for `jaus node` only
     ///   name = "Rover"
-    ///   interfaces = ["eth0"]
-    ///   peers = ["192.168.7.2"]
+    ///   kind = "vehicle"
+    ///   interfaces = ["eth0"]           # or "all", or "loopback"
+    ///   port = 3794
+    ///   port_taken = "refuse"           # or "use-free"
+    ///   group = "239.255.0.1:3794"      # or "off"
+    ///   ttl = 16
+    ///   peers = ["192.168.7.2", "102.255.255@192.168.7.3:3795"]
     #[arg(long, value_name = "FILE", verbatim_doc_comment)]
     config: Option<PathBuf>,
 }
 
-/// What a command goes on the network with.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Settings {
-    /// Our component's id.
-    pub(crate) id: JausId,
-    /// What our subsystem is, if somebody said.
-    pub(crate) kind: Option<SubsystemKind>,
-    /// What it is called, if somebody said.
+/// Who a node is, as far as a settings file or flags say.
+#[derive(Debug, Default, Deserialize)]
+pub(crate) struct Identity {
+    id: Option<OwnId>,
+    /// What the subsystem is called.
     pub(crate) name: Option<String>,
-    /// The node to run.
-    pub(crate) node: Config,
-}
-
-impl Settings {
-    /// A component with this kind and name, where neither flags nor file say otherwise.
-    pub(crate) fn component(&self, kind: Kind, name: &str) -> Builder {
-        let kind = self.kind.map_or(kind, Kind::from);
-        Component::builder(kind, self.name.as_deref().unwrap_or(name))
-    }
-}
-
-impl From<SubsystemKind> for Kind {
-    fn from(kind: SubsystemKind) -> Self {
-        match kind {
-            SubsystemKind::Vehicle => Self::Vehicle,
-            SubsystemKind::Ocu => Self::OperatorControlUnit,
-            SubsystemKind::Other => Self::OtherSubsystem,
-        }
-    }
+    /// What the subsystem is.
+    pub(crate) kind: Option<SubsystemKind>,
 }
 
 /// Our own id: one component, so no wildcards.
@@ -116,7 +94,8 @@ impl FromStr for OwnId {
             return Ok(Self(id));
         }
         Err(format!(
-            "{id} is not one component: choose a subsystem from 1 to 65534, a node and a component from 1 to 254"
+            "{id} is not one component: choose a subsystem from 1 to 65534, a node and a component \
+             from 1 to 254"
         ))
     }
 }
@@ -129,6 +108,7 @@ impl TryFrom<String> for OwnId {
     }
 }
 
+/// The kinds of subsystems, as flags and files name them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum SubsystemKind {
@@ -140,64 +120,70 @@ pub(crate) enum SubsystemKind {
     Other,
 }
 
-/// The keys of a settings file that are not a node's own.
-#[derive(Debug, Default, Deserialize)]
-struct Presentation {
-    id: Option<OwnId>,
-    name: Option<String>,
-    kind: Option<SubsystemKind>,
+impl From<SubsystemKind> for Kind {
+    fn from(kind: SubsystemKind) -> Self {
+        match kind {
+            SubsystemKind::Vehicle => Self::Vehicle,
+            SubsystemKind::Ocu => Self::OperatorControlUnit,
+            SubsystemKind::Other => Self::OtherSubsystem,
+        }
+    }
 }
 
 impl Network {
-    /// The settings of the file and the flags; `id` stands in where neither names one.
-    pub(crate) fn settings(&self, id: JausId) -> Result<Settings, Failure> {
-        let (presentation, mut node) = match &self.config {
-            Some(path) => read(path)?,
-            None => (
-                Presentation::default(),
-                Config::new(0, 0).or_any_free_port(),
-            ),
-        };
-        let id = match (self.id, presentation.id) {
-            (Some(OwnId(id)), _) | (None, Some(OwnId(id))) => id,
-            (None, None) => id,
-        };
-        (node.subsystem, node.node) = (id.subsystem(), id.node());
-        self.apply_to(&mut node);
-        node.validate()
-            .map_err(|error| Failure::new(error.to_string()))?;
-        Ok(Settings {
-            id,
-            kind: self.kind.or(presentation.kind),
-            name: self.name.clone().or(presentation.name),
-            node,
-        })
+    /// For a node that is meant to be found: its component's id, what the file says about it, and
+    /// the settings. `default` is the id of whoever chooses none.
+    pub(crate) fn for_node(&self, default: JausId) -> Result<(JausId, Identity, Config), Failure> {
+        let (identity, node) = self.settings()?;
+        // A file may also have the node's own keys for its id.
+        let of_node = (node.subsystem, node.node) != (0, 0);
+        let of_node = of_node.then(|| OwnId(JausId::new(node.subsystem, node.node, 1)));
+        let id = self.id.or(identity.id).or(of_node);
+        let id = id.map_or(default, |OwnId(id)| id);
+        Ok((id, identity, self.with_flags(node, id)?))
     }
 
-    /// Lays the flags over what the file says.
-    fn apply_to(&self, node: &mut Config) {
+    /// For a command that runs for a moment beside other nodes: a passing id, whatever the file
+    /// says, and any free port unless a flag names one.
+    pub(crate) fn for_a_moment(&self) -> Result<(JausId, Config), Failure> {
+        let (_, node) = self.settings()?;
+        let id = self.id.map_or_else(passing_id, |OwnId(id)| id);
+        let node = self.with_flags(node.or_any_free_port(), id)?;
+        Ok((id, node))
+    }
+
+    /// What the file says; without one, the usual settings.
+    fn settings(&self) -> Result<(Identity, Config), Failure> {
+        match &self.config {
+            Some(path) => read(path),
+            None => Ok((Identity::default(), Config::new(0, 0))),
+        }
+    }
+
+    /// Lays id and flags over the settings.
+    fn with_flags(&self, mut node: Config, id: JausId) -> Result<Config, Failure> {
+        (node.subsystem, node.node) = (id.subsystem(), id.node());
         if self.loopback {
             node.interfaces = Interfaces::Loopback;
+            node.port = 0;
         } else if !self.interface.is_empty() {
             node.interfaces = Interfaces::Only(self.interface.clone());
         }
         if let Some(port) = self.port {
             // Who names a port wants that one.
             node.port = port;
-            node.port_taken = jaus::link::udp::PortTaken::Refuse;
+            node.port_taken = PortTaken::Refuse;
         }
-        if let Some(group) = self.group {
-            node.group = group;
-        }
-        if let Some(ttl) = self.ttl {
-            node.ttl = ttl;
-        }
+        node.group = self.group.unwrap_or(node.group);
+        node.ttl = self.ttl.unwrap_or(node.ttl);
         node.peers.extend(&self.peer);
+        node.validate().map_err(Failure::of)?;
+        Ok(node)
     }
 }
 
 /// Reads a settings file: our own keys are taken out, the others are the node's.
-fn read(path: &Path) -> Result<(Presentation, Config), Failure> {
+fn read(path: &Path) -> Result<(Identity, Config), Failure> {
     let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
     let wrong = |error: toml::de::Error| Failure::new(format!("{}: {error}", path.display()));
     let mut table: toml::Table = toml::from_str(&text).map_err(wrong)?;
@@ -205,15 +191,15 @@ fn read(path: &Path) -> Result<(Presentation, Config), Failure> {
         .into_iter()
         .filter_map(|key| table.remove_entry(key));
     let own: toml::Table = own.collect();
-    let presentation = own.try_into().map_err(wrong)?;
+    let identity = own.try_into().map_err(wrong)?;
     let node = table.try_into().map_err(wrong)?;
-    Ok((presentation, node))
+    Ok((identity, node))
 }
 
-/// An id for a command that runs for a moment and needs none of its own choice: subsystems from
-/// 60000 on, where nobody numbers vehicles. It differs from run to run, so that two people who use
-/// the tool at the same time do not meet.
-pub(crate) fn passing_id() -> JausId {
+/// An id for a command that needs none of its own choice: subsystems from 60000 on, where nobody
+/// numbers vehicles. It differs from run to run, so that two people who use the tool at the same
+/// time do not meet.
+fn passing_id() -> JausId {
     let random = RandomState::new().build_hasher().finish();
     let [subsystem, node, component, ..] = random.to_le_bytes();
     JausId::new(

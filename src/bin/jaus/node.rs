@@ -9,7 +9,7 @@ use jaus::endpoint::Event;
 use jaus::node::{Events, Node};
 
 use crate::failure::{Failure, Outcome};
-use crate::network::Network;
+use crate::network::{Network, SubsystemKind};
 use crate::output::Output;
 use crate::runtime::{self, Clock};
 use crate::tree;
@@ -33,6 +33,14 @@ pub(crate) struct NodeCommand {
     #[arg(long, value_parser = runtime::seconds)]
     seconds: Option<Duration>,
 
+    /// What our subsystem is called [default: jaus node]
+    #[arg(long)]
+    name: Option<String>,
+
+    /// What our subsystem is [default: other]
+    #[arg(long, value_enum)]
+    kind: Option<SubsystemKind>,
+
     #[command(flatten)]
     network: Network,
 }
@@ -42,13 +50,16 @@ const ID: JausId = JausId::new(101, 1, 1);
 
 impl NodeCommand {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        let settings = self.network.settings(ID)?;
+        let (id, identity, config) = self.network.for_node(ID)?;
+        let kind = self.kind.or(identity.kind);
+        let kind = kind.map_or(Kind::OtherSubsystem, Kind::from);
+        let name = self.name.clone().or(identity.name);
+        let name = name.unwrap_or_else(|| "jaus node".to_owned());
         runtime::run(async {
-            let node = Node::start(settings.node.clone()).map_err(Failure::of)?;
+            let node = Node::start(config).map_err(Failure::of)?;
             let events = node.events();
-            let component = settings
-                .component(Kind::OtherSubsystem, "jaus node")
-                .attach(&node, settings.id.component())
+            let component = Component::builder(kind, name)
+                .attach(&node, id.component())
                 .map_err(Failure::of)?;
             let mut output = Output::new();
             introduce(&node, &component, &mut output)?;

@@ -15,7 +15,7 @@ use tokio::time::{Instant, timeout_at};
 
 use crate::definitions::Definitions;
 use crate::failure::{Failure, Outcome};
-use crate::network::{Network, passing_id};
+use crate::network::Network;
 use crate::output::Output;
 use crate::runtime;
 
@@ -64,10 +64,10 @@ impl Query {
                 self.message
             ))
         })?;
-        let settings = self.network.settings(passing_id())?;
+        let (id, config) = self.network.for_a_moment()?;
         runtime::run(async {
-            let node = Node::start(settings.node).map_err(Failure::of)?;
-            let port = node.attach(settings.id.component()).map_err(Failure::of)?;
+            let node = Node::start(config).map_err(Failure::of)?;
+            let port = node.attach(id.component()).map_err(Failure::of)?;
             let outcome = self.ask(port, &query, report, &dictionary).await;
             node.shutdown().await;
             outcome
