@@ -172,7 +172,7 @@ fn a_peer_that_comes_back_is_found_again() {
 }
 
 #[test]
-fn a_peer_that_restarts_under_another_name_is_asked_for_its_services_at_once() {
+fn a_peer_that_restarts_under_another_name_is_asked_anew_at_once() {
     let mut world = World::new();
     let operator = world.start(plain(OPERATOR, "desk"));
     let first = world.start(plain(VEHICLE, "rover"));
@@ -183,6 +183,22 @@ fn a_peer_that_restarts_under_another_name_is_asked_for_its_services_at_once() {
     world.run(seconds(8));
     let directory = world.stack(operator).directory();
     assert!(directory.component(VEHICLE).unwrap().offers(CAMERA.urn));
+    for level in [Level::Subsystem, Level::Node, Level::Component] {
+        let told = directory.identification(level, VEHICLE).unwrap();
+        assert_eq!(told.name, "rover with a camera");
+    }
+}
+
+#[test]
+fn components_that_disagree_about_their_subsystems_name_do_not_make_it_flicker() {
+    let mut world = World::new();
+    let operator = world.start(plain(OPERATOR, "desk"));
+    world.start(plain(VEHICLE, "rover"));
+    world.start(plain(JausId::new(101, 2, 7), "arm of the rover"));
+    world.run(seconds(10));
+    world.changes(operator);
+    world.run(seconds(600));
+    assert_eq!(world.changes(operator), []);
 }
 
 #[test]

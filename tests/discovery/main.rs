@@ -8,5 +8,6 @@
 
 mod answers;
 mod finding;
+mod rubbish;
 mod traffic;
 mod world;

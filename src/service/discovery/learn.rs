@@ -110,6 +110,11 @@ impl Discovery {
             _ => return,
         };
         self.search.settle(Question::Identify(source, level));
+        let reporter = self.search.reporters.get(&source.subsystem());
+        if level == Level::Subsystem && reporter != Some(&source) {
+            // Every component answers a call. Should they disagree, one has the say.
+            return;
+        }
         let told = Identification {
             kind: Kind::from_code(report.r#type.0),
             name: text(&report.identification),
@@ -118,9 +123,16 @@ impl Discovery {
         if self.directory.identify(level, source, told) {
             self.changes.push_back(Change::Identified(level, source));
             if known {
-                // Another program may have taken the id over.
-                self.search.wonder(now, Question::Services(source));
+                self.doubt(now, source);
             }
+        }
+    }
+
+    /// Asks a component anew who it is and what it offers: another program may have taken its id.
+    fn doubt(&mut self, now: Instant, id: JausId) {
+        self.search.wonder(now, Question::Services(id));
+        for level in [Level::Node, Level::Component] {
+            self.search.wonder(now, Question::Identify(id, level));
         }
     }
 
