@@ -5,7 +5,7 @@ mod cli_support;
 
 use std::fs;
 
-use cli_support::{Running, run};
+use cli_support::{Running, jaus, run};
 
 /// Flags for a multicast group of this test's own, so that no other program of this computer is
 /// met. `test` tells the tests of this file apart.
@@ -201,6 +201,18 @@ fn a_settings_file_does_what_the_flags_do_and_flags_come_on_top() {
         "{introduction}"
     );
     assert!(introduction.contains(&group[4]), "{introduction}");
+}
+
+#[test]
+fn a_log_filter_that_makes_no_sense_is_refused() {
+    let output = jaus()
+        .arg("encode")
+        .env("JAUS_LOG", "jaus=loud")
+        .output()
+        .unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("JAUS_LOG=jaus=loud"), "{message}");
+    assert_eq!(output.status.code(), Some(2));
 }
 
 #[test]

@@ -4,18 +4,13 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
-use std::str::FromStr;
-use std::sync::Arc;
 
 use bytes::Bytes;
-use jsidl::model::{Message, Version};
-use jsidl::{Diagnostics, Loaded, Loader, dynamic};
-use serde::{Deserialize, Serialize};
-use serde_json::Value as Json;
+use jsidl::model::{Id, Service, Version};
+use jsidl::{Diagnostics, Loaded, Loader};
 
+use super::definition::{Body, Definition, ServiceName};
 use super::{Line, Request};
-use crate::codec::view::Value;
-use crate::codec::{MessageInfo, ServiceId};
 use crate::messages;
 
 /// Message definitions by code and by name.
@@ -35,25 +30,6 @@ use crate::messages;
 pub struct Dictionary {
     by_code: BTreeMap<u16, Vec<Definition>>,
     preferred: Vec<ServiceName>,
-}
-
-/// One layout of a message, and the services that define it so.
-#[derive(Debug)]
-struct Definition {
-    services: Vec<Service>,
-    codec: Codec,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct Service {
-    urn: Arc<str>,
-    version: Version,
-}
-
-#[derive(Debug)]
-enum Codec {
-    Generated(&'static MessageInfo),
-    Dynamic(Arc<Message>),
 }
 
 /// What [`Dictionary::load`] did.
@@ -78,17 +54,6 @@ pub struct Reading<'d> {
     pub version: Option<Version>,
     /// The fields.
     pub body: Result<Body, Unreadable>,
-}
-
-/// A message's fields, which serialize as people see them.
-#[derive(Debug, Clone, Serialize)]
-#[serde(untagged)]
-#[non_exhaustive]
-pub enum Body {
-    /// Read by a generated type.
-    Generated(Value),
-    /// Read by a definition loaded at run time.
-    Dynamic(Json),
 }
 
 /// Why octets cannot be read, or JSON cannot be written, as a message.
@@ -117,76 +82,9 @@ impl fmt::Display for Unreadable {
 
 impl std::error::Error for Unreadable {}
 
-/// A service as people name it: `urn:jaus:jss:core:Events`, or with its version
-/// `urn:jaus:jss:core:Events@1.0`.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ServiceName {
-    /// The URN.
-    pub urn: String,
-    /// The version; any, if not given.
-    pub version: Option<Version>,
-}
-
-impl ServiceName {
-    fn matches(&self, service: &Service) -> bool {
-        *self.urn == *service.urn
-            && self
-                .version
-                .is_none_or(|version| version == service.version)
-    }
-}
-
-impl fmt::Display for ServiceName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.urn)?;
-        self.version
-            .map_or(Ok(()), |version| write!(f, "@{version}"))
-    }
-}
-
-impl FromStr for ServiceName {
-    type Err = Unreadable;
-
-    fn from_str(text: &str) -> Result<Self, Unreadable> {
-        let (urn, version) = match text.split_once('@') {
-            Some((urn, version)) => (urn, Some(parse_version(version)?)),
-            None => (text, None),
-        };
-        Ok(Self {
-            urn: urn.to_owned(),
-            version,
-        })
-    }
-}
-
-/// `1.0`
-pub(super) fn parse_version(text: &str) -> Result<Version, Unreadable> {
-    let parsed = text.split_once('.').and_then(|(major, minor)| {
-        Some(Version {
-            major: major.parse().ok()?,
-            minor: minor.parse().ok()?,
-        })
-    });
-    parsed.ok_or_else(|| {
-        Unreadable::new(format!("\"{text}\" is not a version; write it like 1.0"), 0)
-    })
-}
-
 impl Default for Dictionary {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-impl From<&ServiceId> for Service {
-    fn from(id: &ServiceId) -> Self {
-        Self {
-            urn: id.urn.into(),
-            version: Version {
-                major: id.major,
-                minor: id.minor,
-            },
-        }
     }
 }
 
@@ -196,10 +94,8 @@ impl Dictionary {
         let mut by_code: BTreeMap<u16, Vec<Definition>> = BTreeMap::new();
         // The registry has the newest of the types with one code first.
         for info in messages::registry().iter() {
-            by_code.entry(info.code).or_default().push(Definition {
-                services: info.services.iter().map(Service::from).collect(),
-                codec: Codec::Generated(info),
-            });
+            let definition = Definition::generated(info);
+            by_code.entry(info.code).or_default().push(definition);
         }
         Self {
             by_code,
@@ -230,28 +126,18 @@ impl Dictionary {
         }
     }
 
-    fn add(&mut self, definition: &jsidl::model::Service) {
-        let service = Service {
-            urn: definition.id.urn.clone(),
-            version: definition.id.version,
-        };
-        self.forget(&service);
-        for message in definition.messages() {
+    fn add(&mut self, service: &Service) {
+        self.forget(&service.id);
+        for message in service.messages() {
             let known = self.by_code.entry(message.code).or_default();
             // Before the generated ones, and before older versions.
-            let place = known.partition_point(|other| other.comes_before(service.version));
-            known.insert(
-                place,
-                Definition {
-                    services: vec![service.clone()],
-                    codec: Codec::Dynamic(Arc::clone(message)),
-                },
-            );
+            let place = known.partition_point(|other| other.comes_before(service.id.version));
+            known.insert(place, Definition::dynamic(&service.id, message));
         }
     }
 
     /// Drops a service, and the definitions that no other service has.
-    fn forget(&mut self, service: &Service) {
+    fn forget(&mut self, service: &Id) {
         for definitions in self.by_code.values_mut() {
             definitions
                 .iter_mut()
@@ -354,7 +240,7 @@ impl Dictionary {
             .filter(move |definition| !some_preferred || preferred(definition))
     }
 
-    fn is_preferred(&self, service: &Service) -> bool {
+    fn is_preferred(&self, service: &Id) -> bool {
         self.preferred.iter().any(|name| name.matches(service))
     }
 }
@@ -451,66 +337,7 @@ impl<'d> Reading<'d> {
 
 /// Whether a service is one of those that come with the crate, of which the generated types are
 /// made.
-fn is_built_in(service: &jsidl::model::Service) -> bool {
+fn is_built_in(service: &Service) -> bool {
     jsidl::catalogue::find(&service.id)
         .is_some_and(|entry| *service.location.file == *Path::new("catalogue").join(entry.path))
-}
-
-impl Definition {
-    /// Whether this is tried before a definition that was loaded with a service of this version.
-    fn comes_before(&self, version: Version) -> bool {
-        let newest = self.services.iter().map(|service| service.version).max();
-        matches!(self.codec, Codec::Dynamic(_)) && newest >= Some(version)
-    }
-
-    fn belongs_to(&self, service: &ServiceName) -> bool {
-        self.services.iter().any(|known| service.matches(known))
-    }
-
-    fn name(&self) -> &str {
-        match &self.codec {
-            Codec::Generated(info) => info.name,
-            Codec::Dynamic(message) => &message.name,
-        }
-    }
-
-    fn code(&self) -> u16 {
-        match &self.codec {
-            Codec::Generated(info) => info.code,
-            Codec::Dynamic(message) => message.code,
-        }
-    }
-
-    fn decode(&self, octets: &Bytes) -> Result<Body, Unreadable> {
-        match &self.codec {
-            Codec::Generated(info) => {
-                let message = (info.decode)(octets)
-                    .map_err(|error| Unreadable::new(error.to_string(), error.offset()))?;
-                Ok(Body::Generated(message.view()))
-            }
-            Codec::Dynamic(message) => {
-                let value = dynamic::decode(message, octets)
-                    .map_err(|error| Unreadable::new(error.to_string(), error.offset))?;
-                dynamic::to_json(message, &value)
-                    .map(Body::Dynamic)
-                    .map_err(|error| Unreadable::new(error.to_string(), 0))
-            }
-        }
-    }
-
-    fn encode(&self, body: &Json) -> Result<Bytes, String> {
-        match &self.codec {
-            Codec::Generated(info) => {
-                let named = |problem: String| format!("{}: {problem}", info.name);
-                let body = Value::deserialize(body).map_err(|error| named(error.to_string()))?;
-                let message = (info.from_view)(&body).map_err(|error| named(error.to_string()))?;
-                message.encode().map_err(|error| error.to_string())
-            }
-            Codec::Dynamic(message) => {
-                let value = dynamic::from_json(message, body).map_err(|error| error.to_string())?;
-                let octets = dynamic::encode(message, &value).map_err(|error| error.to_string())?;
-                Ok(octets.into())
-            }
-        }
-    }
 }

@@ -4,7 +4,8 @@ use bytes::Bytes;
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
 
-use super::dictionary::{Body, Reading, Unreadable};
+use super::definition::Body;
+use super::dictionary::{Reading, Unreadable};
 use super::hex::to_hex;
 use super::{CaptureError, Timestamp};
 use crate::address::JausId;

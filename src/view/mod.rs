@@ -6,6 +6,7 @@
 //! Nothing below this module knows that it exists.
 
 mod capture;
+mod definition;
 mod dictionary;
 mod hex;
 mod large;
@@ -16,7 +17,8 @@ mod request;
 mod time;
 
 pub use capture::{Capture, CaptureError, Frame, LinkType};
-pub use dictionary::{Added, Body, Dictionary, Reading, ServiceName, Unreadable};
+pub use definition::{Body, ServiceName};
+pub use dictionary::{Added, Dictionary, Reading, Unreadable};
 pub use hex::{from_hex, to_hex};
 pub use line::{Content, Envelope, Header, Line};
 pub use log::MessageLog;

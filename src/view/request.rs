@@ -4,7 +4,8 @@ use std::fmt;
 
 use serde_json::{Map, Value as Json};
 
-use super::dictionary::{ServiceName, Unreadable, parse_version};
+use super::definition::{ServiceName, parse_version};
+use super::dictionary::Unreadable;
 
 /// The keys that a line may have besides those that count: what `jaus decode` adds.
 const PASSED_OVER: [&str; 9] = [

@@ -146,37 +146,41 @@ impl<'s> Watch<'s> {
     fn tell(&mut self, change: Change) -> Result<(), Failure> {
         let directory = self.operator.directory();
         match change {
-            Change::Identified(Level::Subsystem, id) => {
-                if let Some(told) = directory.identification(Level::Subsystem, id) {
-                    let number = id.subsystem();
-                    let words = format!(
-                        "discovers subsystem {number}: it is the {} \"{}\"",
-                        told.kind, told.name
-                    );
-                    self.story.tell(Who::Operator, words)?;
-                }
+            Change::Identified(level @ Level::Subsystem, id) => {
+                let Some(told) = directory.identification(level, id) else {
+                    return Ok(());
+                };
+                let (number, introduction) = (id.subsystem(), tree::introduction(told));
+                let words = format!("discovers subsystem {number}: it is {introduction}");
+                self.story.tell(Who::Operator, words)
             }
             Change::Services(id) => {
-                let component = directory.component(id);
-                let offers = component.and_then(|component| component.services.as_deref());
-                self.story
-                    .services(id, &tree::by_urn(offers.unwrap_or_default()))?;
-                if component.is_some_and(|c| c.offers(velocity_state_sensor::URN)) {
+                let Some(component) = directory.component(id) else {
+                    return Ok(());
+                };
+                let offers = component.services.as_deref().unwrap_or_default();
+                self.story.services(id, &tree::by_urn(offers))?;
+                if component.offers(velocity_state_sensor::URN) && self.vehicle != Some(id) {
                     self.vehicle = Some(id);
-                    let words = format!(
-                        "asks {id} for its heartbeat and its velocity, every second from now on"
-                    );
-                    self.story.tell(Who::Operator, words)?;
+                    self.story.tell(
+                        Who::Operator,
+                        format!(
+                            "asks {id} for its heartbeat and its velocity, every second from now on"
+                        ),
+                    )?;
                 }
+                Ok(())
             }
             Change::Lost(id, _) => {
                 self.vehicle = self.vehicle.filter(|&vehicle| vehicle != id);
                 let words = tree::in_words(change, &directory).unwrap_or_default();
-                self.story.tell(Who::Operator, words)?;
+                self.story.tell(Who::Operator, words)
             }
-            _ => {}
+            Change::SubsystemFound(_)
+            | Change::Found(_)
+            | Change::Identified(..)
+            | Change::SubsystemLost(_) => Ok(()),
         }
-        Ok(())
     }
 
     /// Once a second: asks the vehicle whether it lives, and how fast it is.

@@ -46,6 +46,19 @@ enum Command {
     Encode(encode::Encode),
 }
 
+impl Command {
+    fn run(&self) -> Result<Outcome, Failure> {
+        match self {
+            Self::Demo(demo) => demo.run(),
+            Self::Node(node) => node.run(),
+            Self::Discover(discover) => discover.run(),
+            Self::Query(query) => query.run(),
+            Self::Decode(decode) => decode.run(),
+            Self::Encode(encode) => encode.run(),
+        }
+    }
+}
+
 #[derive(Args)]
 struct Logging {
     /// Say more about what happens inside, on standard error; -vv and -vvv for details
@@ -57,34 +70,34 @@ struct Logging {
 
 impl Logging {
     /// Sends the library's tracing to standard error.
-    fn start(&self) {
+    fn start(&self) -> Result<(), Failure> {
         let level = match self.verbose {
             0 => "error",
             1 => "info",
             2 => "debug",
             _ => "trace",
         };
-        let filter = EnvFilter::try_from_env("JAUS_LOG").unwrap_or_else(|_| EnvFilter::new(level));
+        let filter = match std::env::var(LOG) {
+            Ok(filter) => EnvFilter::try_new(&filter)
+                .map_err(|error| Failure::new(format!("{LOG}={filter}: {error}")))?,
+            Err(_) => EnvFilter::new(level),
+        };
         tracing_subscriber::fmt()
             .with_env_filter(filter)
             .with_writer(std::io::stderr)
             .with_ansi(output::colours_wanted(&std::io::stderr()))
             .with_target(self.verbose > 1)
             .init();
+        Ok(())
     }
 }
 
+/// The environment variable that says what to log.
+const LOG: &str = "JAUS_LOG";
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    cli.logging.start();
-    let outcome = match cli.command {
-        Command::Demo(demo) => demo.run(),
-        Command::Node(node) => node.run(),
-        Command::Discover(discover) => discover.run(),
-        Command::Decode(decode) => decode.run(),
-        Command::Encode(encode) => encode.run(),
-        Command::Query(query) => query.run(),
-    };
+    let outcome = cli.logging.start().and_then(|()| cli.command.run());
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Incomplete) => ExitCode::from(1),

@@ -1,5 +1,6 @@
 //! `jaus node`: a node that is there, and tells what it sees.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use clap::Args;
@@ -84,11 +85,16 @@ impl NodeCommand {
         let end = runtime::end(self.seconds);
         tokio::pin!(end);
         let clock = Clock::start();
+        // A conflict is news with every message of the other; once is enough for people.
+        let mut conflicts = BTreeSet::new();
         loop {
             let words = tokio::select! {
                 () = &mut end => return Ok(Outcome::Done),
                 Some(change) = changes.next() => tree::in_words(change, &component.directory()),
-                Some(event) = events.recv() => in_words(&event),
+                Some(event) = events.recv() => match event {
+                    Event::IdConflict { path, .. } if !conflicts.insert(path.peer) => None,
+                    event => in_words(&event),
+                },
                 else => return Err(Failure::new("the node has stopped")),
             };
             if let Some(words) = words {

@@ -55,6 +55,14 @@ fn naming(identification: Option<&Identification>) -> String {
     }
 }
 
+/// `the vehicle "Rover"`, or `called "Camera"`.
+pub(crate) fn introduction(Identification { kind, name }: &Identification) -> String {
+    match kind {
+        Kind::Vehicle | Kind::OperatorControlUnit => format!("the {kind} \"{name}\""),
+        _ => format!("called \"{name}\""),
+    }
+}
+
 /// A line for each service, its versions aligned in a column.
 fn services(component: &Component) -> Vec<String> {
     let Some(offers) = &component.services else {
@@ -137,13 +145,10 @@ pub(crate) fn in_words(change: Change, directory: &Directory) -> Option<String> 
         Change::Found(id) => format!("{id} has come"),
         Change::Identified(level, id) => {
             let who = level_name(level, id);
-            let told = directory.identification(level, id)?;
-            match told.kind {
-                Kind::Vehicle | Kind::OperatorControlUnit => {
-                    format!("{who} is the {} \"{}\"", told.kind, told.name)
-                }
-                _ => format!("{who} is called \"{}\"", told.name),
-            }
+            format!(
+                "{who} is {}",
+                introduction(directory.identification(level, id)?)
+            )
         }
         Change::Services(id) => {
             let offers = directory.component(id)?.services.as_ref()?;
