@@ -34,6 +34,18 @@ pub(crate) struct Source {
     text: Arc<str>,
     /// Offset of the first octet of every line.
     lines: Vec<u32>,
+    /// Number of characters before every block of octets, so that a column costs the same in a
+    /// text that is one long line.
+    characters: Vec<u32>,
+}
+
+/// Octets that share an entry in [`Source::characters`].
+const BLOCK: usize = 256;
+
+/// Characters that begin in these octets of a UTF-8 text.
+fn characters(octets: &[u8]) -> u32 {
+    let starts = octets.iter().filter(|&octet| octet & 0xC0 != 0x80);
+    u32::try_from(starts.count()).unwrap_or(u32::MAX)
 }
 
 impl Source {
@@ -53,13 +65,19 @@ impl Source {
 
     fn location(&self, offset: u32) -> Location {
         let line = self.lines.partition_point(|&start| start <= offset).max(1);
-        let start = self.lines.get(line - 1).copied().unwrap_or(0) as usize;
-        let before = self.text.get(start..offset as usize).unwrap_or("");
+        let start = self.lines.get(line - 1).copied().unwrap_or(0);
         Location {
             file: Arc::clone(&self.path),
             line: u32::try_from(line).unwrap_or(u32::MAX),
-            column: u32::try_from(before.chars().count() + 1).unwrap_or(u32::MAX),
+            column: self.characters_before(offset) - self.characters_before(start) + 1,
         }
+    }
+
+    fn characters_before(&self, offset: u32) -> u32 {
+        let offset = (offset as usize).min(self.text.len());
+        let block = offset / BLOCK;
+        let known = self.characters.get(block).copied().unwrap_or(0);
+        known + characters(&self.text.as_bytes()[block * BLOCK..offset])
     }
 }
 
@@ -76,12 +94,19 @@ impl Sources {
             .chain(starts)
             .map(|at| u32::try_from(at).unwrap_or(u32::MAX))
             .collect();
+        let blocks = text.as_bytes().chunks(BLOCK);
+        let sums = blocks.scan(0, |sum: &mut u32, block| {
+            *sum += characters(block);
+            Some(*sum)
+        });
+        let characters = std::iter::once(0).chain(sums).collect();
         let index = self.0.len();
         self.0.push(Source {
             id: u32::try_from(index).unwrap_or(u32::MAX),
             path: Arc::from(path),
             text: Arc::from(text),
             lines,
+            characters,
         });
         &self.0[index]
     }
@@ -116,5 +141,18 @@ mod tests {
         assert_eq!(at("über").to_string(), "a.xml:1:1");
         assert_eq!(at("r\r").to_string(), "a.xml:1:4");
         assert_eq!(at("x").to_string(), "a.xml:2:3");
+    }
+
+    #[test]
+    fn columns_are_right_far_into_a_long_line() {
+        let mut sources = Sources::default();
+        let text = format!("\n{}x", "ü".repeat(1000));
+        let source = sources.add(Path::new("a.xml"), &text);
+        assert_eq!(source.location(1).to_string(), "a.xml:2:1");
+        assert_eq!(source.location(1 + 600).to_string(), "a.xml:2:301");
+        assert_eq!(source.location(2001).to_string(), "a.xml:2:1001");
+        assert_eq!(source.location(2002).to_string(), "a.xml:2:1002");
+        let source = sources.add(Path::new("b.xml"), &"x".repeat(2 * BLOCK));
+        assert_eq!(source.location(512).to_string(), "b.xml:1:513");
     }
 }

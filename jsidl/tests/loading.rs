@@ -382,12 +382,12 @@ fn chains_of_references_and_nested_elements_are_stopped() {
 #[test]
 fn long_lineages_are_stopped() {
     let mut set = String::new();
-    for step in 0..2_000 {
+    for step in 0..1_000 {
         set += &service(&format!("S{step}"), &format!("S{}", step + 1), "", "");
     }
-    set += &service("S2000", "", "", "");
+    set += &service("S1000", "", "", "");
     let set = format!(r#"<service_set xmlns="urn:jaus:jsidl:plus">{set}</service_set>"#);
     let loaded = load(&[("s.xml", &set)]);
     assert_eq!(loaded.library.services().count(), 33);
-    assert_eq!(loaded.diagnostics.errors().count(), 2_001 - 33);
+    assert_eq!(loaded.diagnostics.errors().count(), 1_001 - 33);
 }

@@ -69,10 +69,7 @@ impl Resolver<'_> {
             [alias, name] => self.aliased_constants(scope, alias)?.map(|set| (set, name)),
             _ => None,
         };
-        let position = found.and_then(|(set, name)| {
-            let definitions = &self.program.const_sets[set].definitions;
-            Some((set, definitions.iter().position(|d| d.name == *name)?))
-        });
+        let position = found.and_then(|(set, name)| Some((set, self.index.constant(set, name)?)));
         let Some((set, position)) = position else {
             let path = path.join(".");
             self.report.error(

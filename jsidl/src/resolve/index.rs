@@ -9,19 +9,23 @@ use std::path::Path;
 use crate::diagnostic::Report;
 use crate::model::{Id, Version};
 use crate::source::{Sources, Span};
-use crate::syntax::{Program, TypeSetIndex};
+use crate::syntax::{ConstSet, Program, TypeSet, TypeSetIndex};
 
 /// Copies of a set beyond these are not looked at.
 const MOST_COPIES: usize = 64;
 
-/// Everything that has an identity, by position in the [`Program`], and every declaration of a
-/// type set by name.
+/// Everything that has an identity, by position in the [`Program`], and what the sets declare, by
+/// name.
 pub(super) struct Index<'a> {
     pub(super) type_sets: Identities<'a>,
     pub(super) const_sets: Identities<'a>,
     pub(super) services: Identities<'a>,
-    declarations: Vec<HashMap<&'a str, usize>>,
+    declarations: Vec<Names<'a>>,
+    constants: Vec<Names<'a>>,
 }
+
+/// Positions in a set; of several things with one name the first.
+type Names<'a> = HashMap<&'a str, usize>;
 
 /// Things of one kind by URN and version.
 #[derive(Default)]
@@ -32,26 +36,33 @@ impl<'a> Index<'a> {
         let type_sets = program.type_sets.iter().map(|s| (s.id.as_ref(), s.span));
         let const_sets = program.const_sets.iter().map(|s| (s.id.as_ref(), s.span));
         let services = program.services.iter().map(|s| (Some(&s.id), s.span));
-        let declarations = program.type_sets.iter().map(|set| {
-            let mut positions = HashMap::new();
-            for (position, declaration) in set.declarations.iter().enumerate() {
-                positions
-                    .entry(declaration.name.as_str())
-                    .or_insert(position);
-            }
-            positions
-        });
+        let declared = |set: &'a TypeSet| set.declarations.iter().map(|d| d.name.as_str());
+        let defined = |set: &'a ConstSet| set.definitions.iter().map(|d| d.name.as_str());
         Self {
             type_sets: Identities::new(type_sets),
             const_sets: Identities::new(const_sets),
             services: Identities::new(services),
-            declarations: declarations.collect(),
+            declarations: program
+                .type_sets
+                .iter()
+                .map(|s| names(declared(s)))
+                .collect(),
+            constants: program
+                .const_sets
+                .iter()
+                .map(|s| names(defined(s)))
+                .collect(),
         }
     }
 
     /// Position of a declaration in a type set.
     pub(super) fn declaration(&self, set: TypeSetIndex, name: &str) -> Option<usize> {
         self.declarations[set].get(name).copied()
+    }
+
+    /// Position of a constant in a constant set.
+    pub(super) fn constant(&self, set: usize, name: &str) -> Option<usize> {
+        self.constants[set].get(name).copied()
     }
 
     /// Warns of sets that are declared twice where nobody can say which one is nearer.
@@ -132,6 +143,14 @@ impl<'a> Identities<'a> {
             }
         }
     }
+}
+
+fn names<'a>(names: impl Iterator<Item = &'a str>) -> Names<'a> {
+    let mut positions = Names::new();
+    for (position, name) in names.enumerate() {
+        positions.entry(name).or_insert(position);
+    }
+    positions
 }
 
 /// Steps from one file to another through the tree of directories.

@@ -15,6 +15,9 @@ const NAMESPACES: [&str; 2] = ["urn:jaus:jsidl:1.0", "urn:jaus:jsidl:1.1"];
 /// JSIDL+: wraps several services into one file and adds what a diagram editor needs.
 const PLUS: &str = "urn:jaus:jsidl:plus";
 
+/// Longer names and URNs are refused: findings repeat them.
+const LONGEST_NAME: usize = 200;
+
 /// Folds runs of white space into single blanks and trims.
 pub(super) fn fold(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
@@ -177,21 +180,18 @@ impl Reader<'_> {
 
     /// Checks that a text is an identifier.
     pub(super) fn identifier(&mut self, name: Spanned<String>) -> Option<String> {
-        let mut letters = name.value.chars();
-        let sound = letters
-            .next()
-            .is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
-            && letters.all(|c| c.is_ascii_alphanumeric() || c == '_');
-        if sound {
+        let text = &name.value;
+        let advice = if text.len() > LONGEST_NAME {
+            format!("use at most {LONGEST_NAME} characters")
+        } else if !begins_like_a_name(text)
+            || !text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+        {
+            "use letters, digits and underscores, not beginning with a digit".to_owned()
+        } else {
             return Some(name.value);
-        }
-        self.report.error(
-            name.span,
-            format!(
-                "`{}` cannot be a name: use letters, digits and underscores, not beginning with a digit",
-                name.value
-            ),
-        );
+        };
+        let message = format!("`{}` cannot be a name: {advice}", shortened(text));
+        self.report.error(name.span, message);
         None
     }
 
@@ -296,20 +296,19 @@ impl Reader<'_> {
     }
 
     fn urn(&mut self, urn: Spanned<String>) -> Option<String> {
-        let mut letters = urn.value.chars();
-        let sound = letters
-            .next()
-            .is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
-            && letters.all(|c| c.is_ascii_alphanumeric() || "_-:.".contains(c));
+        let text = &urn.value;
+        let sound = text.len() <= LONGEST_NAME
+            && begins_like_a_name(text)
+            && text
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || "_-:.".contains(c));
         if sound {
             return Some(urn.value);
         }
+        let text = shortened(text);
         self.report.error(
             urn.span,
-            format!(
-                "`{}` cannot be an id: write a URN such as `urn:jaus:jss:core:Discovery`",
-                urn.value
-            ),
+            format!("`{text}` cannot be an id: write a URN such as `urn:jaus:jss:core:Discovery`"),
         );
         None
     }
@@ -337,6 +336,18 @@ impl Reader<'_> {
             );
         }
         parsed
+    }
+}
+
+fn begins_like_a_name(text: &str) -> bool {
+    text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+}
+
+/// The beginning of a text that is too long to be repeated.
+fn shortened(text: &str) -> String {
+    match text.char_indices().nth(40) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_owned(),
     }
 }
 

@@ -10,8 +10,9 @@ const DEEPEST: usize = 100;
 /// Attributes of one tag; the language knows at most seven.
 const MOST_ATTRIBUTES: usize = 50;
 
-/// Namespace declarations in a text: the parser copies those of an element to its children.
-const MOST_NAMESPACES: usize = 10_000;
+/// Namespace declarations in a text: the parser compares those of an element with all that are in
+/// force. Published files have at most 20.
+const MOST_NAMESPACES: usize = 2_000;
 
 /// Says where a text exceeds what a definition can need, and what it exceeds.
 pub(super) fn excess(text: &str) -> Option<(usize, String)> {
