@@ -169,6 +169,27 @@ fn a_json_line_that_cannot_be_written_gives_an_error_that_helps() {
 }
 
 #[test]
+fn where_versions_differ_the_line_says_which_one_it_is_and_a_flag_chooses() {
+    // Report Local Vector: version 1.0 of its service has a shorter presence vector than 1.1.
+    let service = "urn:jaus:jss:mobility:LocalVectorDriver";
+    let octets = b"084400\n";
+    let by_itself = run(&["decode", "--hex"], octets);
+    assert_eq!(by_itself.only_line()["version"], "1.0");
+    let again = run(&["encode"], by_itself.stdout.as_bytes());
+    assert_eq!(again.stdout.as_bytes(), octets);
+
+    let old = format!("{service}@1.0");
+    let chosen = run(&["decode", "--hex", "--service", &old], octets).only_line();
+    assert_eq!(
+        (chosen.get("version"), &chosen["service"]),
+        (None, &service.into())
+    );
+    let new = format!("{service}@1.1");
+    let refused = run(&["decode", "--hex", "--service", &new], octets);
+    assert_eq!((refused.only_line().get("body"), refused.status), (None, 1));
+}
+
+#[test]
 fn a_service_that_is_named_must_exist() {
     let run = run(
         &["decode", "--hex", "--service", "urn:jaus:jss:core:Event"],
