@@ -60,9 +60,10 @@ impl FromStr for Group {
         let standard = |ip: Ipv4Addr| SocketAddrV4::new(ip, STANDARD_PORT);
         let address = text.parse().or_else(|_| text.parse().map(standard));
         let group = address
+            .ok()
             .map(Self::At)
-            .map_err(|_| InvalidGroup(text.to_owned()))?;
-        group.validate().map(|()| group)
+            .filter(|group| group.validate().is_ok());
+        group.ok_or_else(|| InvalidGroup(text.to_owned()))
     }
 }
 
@@ -107,7 +108,7 @@ mod tests {
     fn what_is_no_group_is_refused_with_what_would_be() {
         for wrong in ["", "none", "10.0.0.1", "239.255.0.1:0", "239.255.0.1:99999"] {
             let error = wrong.parse::<Group>().unwrap_err().to_string();
-            assert!(error.contains(&format!("`{wrong}")), "{error}");
+            assert!(error.contains(&format!("`{wrong}`")), "{error}");
             assert!(error.contains("224.0.0.0 to 239.255.255.255"), "{error}");
         }
     }

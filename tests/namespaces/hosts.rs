@@ -21,8 +21,6 @@ pub(crate) struct TwoHosts {
 }
 
 impl TwoHosts {
-    const ADDRESSES: [&str; 2] = ["10.213.77.1", "10.213.77.2"];
-
     fn new() -> Result<Self, String> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
@@ -34,17 +32,23 @@ impl TwoHosts {
     }
 
     fn set_up(&self) -> Result<(), String> {
-        let [a, b] = &self.names;
-        ip(&["netns", "add", a])?;
-        ip(&["netns", "add", b])?;
-        ip(&[
-            "link", "add", "jaus0", "netns", a, "type", "veth", "peer", "jaus0", "netns", b,
-        ])?;
-        for (name, address) in self.names.iter().zip(Self::ADDRESSES) {
-            let prefixed = format!("{address}/24");
-            ip(&["-n", name, "address", "add", &prefixed, "dev", "jaus0"])?;
+        for name in &self.names {
+            ip(&["netns", "add", name])?;
             ip(&["-n", name, "link", "set", "lo", "up"])?;
-            ip(&["-n", name, "link", "set", "jaus0", "up"])?;
+        }
+        self.connect("jaus0", "10.213.77")
+    }
+
+    /// Lays a cable between the hosts, with addresses .1 and .2 of the network.
+    pub(crate) fn connect(&self, cable: &str, network: &str) -> Result<(), String> {
+        let [a, b] = &self.names;
+        ip(&[
+            "link", "add", cable, "netns", a, "type", "veth", "peer", cable, "netns", b,
+        ])?;
+        for (number, name) in (1..).zip(&self.names) {
+            let address = format!("{network}.{number}/24");
+            ip(&["-n", name, "address", "add", &address, "dev", cable])?;
+            ip(&["-n", name, "link", "set", cable, "up"])?;
         }
         Ok(())
     }

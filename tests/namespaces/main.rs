@@ -123,6 +123,19 @@ fn nodes_on_two_hosts_discover_each_other_within_a_second_and_notice_a_death() {
     });
 }
 
+#[test]
+fn what_comes_through_two_cables_is_delivered_once() {
+    on_two_hosts("what_comes_through_two_cables_is_delivered_once", |hosts| {
+        hosts.connect("jaus1", "10.213.78").unwrap();
+        let listener = hosts.start(0, "listener");
+        listener.says("listening on 2 links");
+        let _announcer = hosts.start(1, "announcer");
+        for number in 0..roles::ANNOUNCEMENTS {
+            assert_eq!(listener.says("heard").parse(), Ok(number));
+        }
+    });
+}
+
 /// Not a test of its own: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
@@ -140,6 +153,8 @@ fn a_process_that_plays_a_node() {
             "caller" => roles::call().await,
             "sink" => roles::sink().await,
             "flood" => roles::flood().await,
+            "listener" => roles::listen().await,
+            "announcer" => roles::announce().await,
             "vehicle" => roles::vehicle().await,
             "operator" => roles::operator().await,
             other => panic!("unknown role {other}"),

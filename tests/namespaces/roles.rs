@@ -82,6 +82,32 @@ pub(crate) async fn flood() {
     std::future::pending::<()>().await;
 }
 
+/// Messages that an announcer sends.
+pub(crate) const ANNOUNCEMENTS: u8 = 10;
+
+/// Prints the number of every announcement that it hears.
+pub(crate) async fn listen() {
+    let node = Node::start(Config::new(101, 1)).unwrap();
+    let mut port = node.attach(33).unwrap();
+    println!("\nlistening on {} links", node.links().len());
+    while let Some(message) = port.recv().await {
+        println!("heard {}", message.payload[2]);
+    }
+}
+
+/// Announces a number to everyone, and then the next.
+pub(crate) async fn announce() {
+    let node = Node::start(Config::new(102, 1)).unwrap();
+    let port = node.attach(1).unwrap();
+    for number in 0..ANNOUNCEMENTS {
+        let payload = Bytes::copy_from_slice(&[0x02, 0x42, number]);
+        port.send(Outgoing::new(port.id(), JausId::EVERYONE, payload))
+            .unwrap();
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    std::future::pending::<()>().await;
+}
+
 /// A vehicle that offers the core services, until it is killed.
 pub(crate) async fn vehicle() {
     let node = Node::start(Config::new(101, 1)).unwrap();
