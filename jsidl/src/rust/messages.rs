@@ -169,10 +169,7 @@ fn composite(out: &mut Writer, ident: &str, fields: &[Field<'_>], presence: Opti
 
 fn module(out: &mut Writer, plan: &Plan<'_>, definitions: &[Definition<'_>]) {
     out.gap();
-    out.push(format!(
-        "/// The types inside [`{0}`](super::{0}).",
-        plan.ident
-    ));
+    out.push(format!("/// The types inside [`{}`].", plan.ident));
     out.push(format!("pub mod {} {{", plan.module));
     let root = if plan.version.is_some() {
         "super::super::"

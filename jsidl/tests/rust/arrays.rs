@@ -193,7 +193,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportArrays`](super::ReportArrays).
+/// The types inside [`ReportArrays`].
 pub mod report_arrays {
     use super::codec;
 
@@ -290,7 +290,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportArrayList`](super::ReportArrayList).
+/// The types inside [`ReportArrayList`].
 pub mod report_array_list {
     use super::codec;
 

@@ -166,7 +166,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportTime`](super::ReportTime).
+/// The types inside [`ReportTime`].
 pub mod report_time {
     use super::codec;
 

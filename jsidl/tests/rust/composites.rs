@@ -183,7 +183,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportTree`](super::ReportTree).
+/// The types inside [`ReportTree`].
 pub mod report_tree {
     use super::codec;
 
@@ -485,7 +485,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportListOfLists`](super::ReportListOfLists).
+/// The types inside [`ReportListOfLists`].
 pub mod report_list_of_lists {
     use super::codec;
 
@@ -608,7 +608,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`SetChoice`](super::SetChoice).
+/// The types inside [`SetChoice`].
 pub mod set_choice {
     use super::codec;
 
@@ -1223,7 +1223,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportEmptyVariant`](super::ReportEmptyVariant).
+/// The types inside [`ReportEmptyVariant`].
 pub mod report_empty_variant {
     use super::codec;
 
@@ -1428,7 +1428,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportOptional`](super::ReportOptional).
+/// The types inside [`ReportOptional`].
 pub mod report_optional {
     use super::codec;
 

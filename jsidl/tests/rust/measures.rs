@@ -119,7 +119,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`SetPosition`](super::SetPosition).
+/// The types inside [`SetPosition`].
 pub mod set_position {
     use super::codec;
 

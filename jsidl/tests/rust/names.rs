@@ -272,7 +272,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`Option_`](super::Option_).
+/// The types inside [`Option_`].
 pub mod option_2 {
     use super::codec;
 
@@ -540,7 +540,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`Vec_`](super::Vec_).
+/// The types inside [`Vec_`].
 pub mod vec {
     use super::codec;
 
@@ -994,7 +994,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`Codec`](super::Codec).
+/// The types inside [`Codec`].
 pub mod codec_2 {
     use super::codec;
 
@@ -1219,7 +1219,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportSame`](super::ReportSame).
+/// The types inside [`ReportSame`].
 pub mod report_same {
     use super::codec;
 
@@ -1551,7 +1551,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`SameRecAgain`](super::SameRecAgain).
+/// The types inside [`SameRecAgain`].
 pub mod same_rec_again {
     #[doc(inline)]
     pub use super::report_same::SameRec2 as SameRec;

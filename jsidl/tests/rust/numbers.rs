@@ -403,7 +403,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`SetScaled`](super::SetScaled).
+/// The types inside [`SetScaled`].
 pub mod set_scaled {
     use super::codec;
 
@@ -589,7 +589,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`SetScaledOptional`](super::SetScaledOptional).
+/// The types inside [`SetScaledOptional`].
 pub mod set_scaled_optional {
     use super::codec;
     #[doc(inline)]
@@ -700,7 +700,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportNamed`](super::ReportNamed).
+/// The types inside [`ReportNamed`].
 pub mod report_named {
     use super::codec;
 

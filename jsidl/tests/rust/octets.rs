@@ -244,7 +244,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`SetBlobs`](super::SetBlobs).
+/// The types inside [`SetBlobs`].
 pub mod set_blobs {
     use super::codec;
 

@@ -120,7 +120,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportSections`](super::ReportSections).
+/// The types inside [`ReportSections`].
 pub mod report_sections {
     use super::codec;
 

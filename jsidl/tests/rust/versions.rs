@@ -154,7 +154,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportState`](super::ReportState).
+/// The types inside [`ReportState`].
 pub mod report_state {
     use super::codec;
 
@@ -246,7 +246,7 @@ codec::if_arbitrary! {
     }
 }
 
-/// The types inside [`ReportMode`](super::ReportMode).
+/// The types inside [`ReportMode`].
 pub mod report_mode {
     #[doc(inline)]
     pub use super::report_state::Mode;
@@ -351,7 +351,7 @@ pub mod v1_0 {
         }
     }
 
-    /// The types inside [`ReportState`](super::ReportState).
+    /// The types inside [`ReportState`].
     pub mod report_state {
         use super::codec;
 
