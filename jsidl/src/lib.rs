@@ -1,4 +1,20 @@
 //! JSIDL (AS5684), the language in which JAUS services are defined.
+//!
+//! A [`Loader`] reads definitions and resolves them into a [`Library`] of [`model`] types, with
+//! [`Diagnostics`] for everything that is wrong. From the model, [`rust`] and [`build`] write typed
+//! messages, and [`dynamic`] encodes and decodes without any generated code. The [`catalogue`]
+//! holds the definitions that come with the crate.
+//!
+//! ```
+//! let mut loader = jsidl::Loader::new();
+//! loader.catalogue();
+//! let jsidl::Loaded { library, diagnostics } = loader.load();
+//! assert!(!diagnostics.has_errors(), "{diagnostics}");
+//!
+//! let (service, message) = library.by_code(0x4B00).next().expect("the core set is there");
+//! assert_eq!(service.id.to_string(), "urn:jaus:jss:core:Discovery 1.0");
+//! assert_eq!(message.name, "ReportIdentification");
+//! ```
 #![forbid(unsafe_code)]
 
 pub mod build;

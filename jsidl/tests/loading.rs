@@ -356,6 +356,23 @@ fn references_that_double_again_and_again_are_stopped() {
     );
 }
 
+/// A copy costs what its text costs.
+#[test]
+fn long_texts_that_are_referred_to_again_and_again_are_stopped() {
+    let long = FIELD.replace(
+        "name=",
+        &format!("interpretation=\"{}\" name=", "x".repeat(1 << 20)),
+    );
+    let reference = r#"<declared_fixed_field name="B" declared_type_ref="A"/>"#;
+    let records = (0..1000).map(|n| format!(r#"<record name="R{n}">{reference}</record>"#));
+    let types = long + &records.collect::<String>();
+    let found = load(&[("s.xml", &service("S", "", &types, ""))]).diagnostics;
+    assert!(
+        found.to_string().contains("more than 200000 fields"),
+        "{found}"
+    );
+}
+
 #[test]
 fn chains_of_references_and_nested_elements_are_stopped() {
     let mut types = String::new();

@@ -15,7 +15,8 @@ const LARGEST: u32 = 1 << 20;
 /// # Errors
 /// A sentence, if the message does not begin with its code.
 pub(crate) fn header(header: Option<&Item>) -> Result<Option<Item>, String> {
-    let advice = "a message begins with its code, so the header must be a `record` whose first field is an `unsigned short integer`";
+    let advice = "a message begins with its code, so the header must be a `record` whose first \
+         field is an `unsigned short integer`";
     let Some(item) = header else {
         return Err(format!("the header is empty: {advice}"));
     };
@@ -74,14 +75,14 @@ pub(crate) fn group(
         let Some(first) = members.iter().position(|member| member.optional) else {
             return true;
         };
-        report
-            .error(
-                nodes[first].span,
-                format!(
-                    "`{}` is optional, but the {kind} `{name}` has no `presence_vector`: add one, or set `optional=\"false\"`",
-                    members[first].name
-                ),
-            );
+        report.error(
+            nodes[first].span,
+            format!(
+                "`{}` is optional, but the {kind} `{name}` has no `presence_vector`: add \
+                 one, or set `optional=\"false\"`",
+                members[first].name
+            ),
+        );
         return false;
     };
     let bits = presence.value.size() * 8;
@@ -95,7 +96,10 @@ pub(crate) fn group(
     } else if optional > bits {
         report.error(
             presence.span,
-            format!("the {kind} `{name}` has {optional} optional members, but its `presence_vector` has only {bits} bits: use a wider `field_type_unsigned`"),
+            format!(
+                "the {kind} `{name}` has {optional} optional members, but its \
+                 `presence_vector` has only {bits} bits: use a wider `field_type_unsigned`"
+            ),
         );
     }
     (1..=bits).contains(&optional)
@@ -128,7 +132,10 @@ pub(crate) fn count_limit(
     if limit.is_none() {
         report.error(
             span,
-            format!("`{attribute}` is {value}, but the count can be 0 to {most}: change it, or use another `field_type_unsigned`"),
+            format!(
+                "`{attribute}` is {value}, but the count can be 0 to {most}: change it, or \
+                 use another `field_type_unsigned`"
+            ),
         );
     }
     limit
@@ -161,14 +168,22 @@ pub(crate) fn tag(
     if range.min > 0 {
         report.error(
             tag.span,
-            format!("`min_count` is {}, but the first alternative of a variant has the tag 0: set it to 0", range.min),
+            format!(
+                "`min_count` is {}, but the first alternative of a variant has the tag 0: \
+                 set it to 0",
+                range.min
+            ),
         );
         return false;
     }
     if needed > codes {
         report.error(
             tag.span,
-            format!("the variant has {needed} alternatives, but its tag ends at {}: raise `max_count` or use a wider type", range.max),
+            format!(
+                "the variant has {needed} alternatives, but its tag ends at {}: raise \
+                 `max_count` or use a wider type",
+                range.max
+            ),
         );
         return false;
     }
@@ -198,7 +213,10 @@ pub(crate) fn array(report: &mut Report, span: Span, dimensions: &[u32]) -> bool
     if !small {
         report.error(
             span,
-            format!("the array has more than {LARGEST} elements: use a `list` or a `variable_length_field` for bulk data"),
+            format!(
+                "the array has more than {LARGEST} elements: use a `list` or a \
+                 `variable_length_field` for bulk data"
+            ),
         );
     }
     small

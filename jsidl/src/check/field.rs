@@ -26,14 +26,16 @@ pub(crate) fn scale(report: &mut Report, span: Span, scale: Scale, number: Numbe
     let Number::Unsigned(unsigned) = number else {
         report.error(
             span,
-            "a `scale_range` needs an unsigned integer: change the `field_type`, or remove the range",
+            "a `scale_range` needs an unsigned integer: change the `field_type`, or remove the \
+             range",
         );
         return None;
     };
     if unsigned == Unsigned::U64 {
         report.error(
             span,
-            "a real number cannot tell the steps of a scaled `unsigned long integer` apart: use `unsigned integer`",
+            "a real number cannot tell the steps of a scaled `unsigned long integer` apart: use \
+             `unsigned integer`",
         );
         return None;
     }
@@ -205,7 +207,10 @@ pub(crate) fn bits(
     if !inside {
         report.error(
             field.from.span,
-            format!("the bits {from} to {to} of `{name}` do not lie within the `bit_field`, whose bits are 0 to {last}"),
+            format!(
+                "the bits {from} to {to} of `{name}` do not lie within the `bit_field`, \
+                 whose bits are 0 to {last}"
+            ),
         );
         return None;
     }

@@ -38,7 +38,8 @@ pub(crate) fn same_service(
         report.warning(
             definition.span,
             format!(
-                "`{}` is declared with other messages at {}, which counts because it was loaded first",
+                "`{}` is declared with other messages at {}, which counts because it was loaded \
+                 first",
                 definition.id, first.location
             ),
         );
@@ -69,7 +70,10 @@ pub(crate) fn ambiguous_codes(
         };
         report.warning(
             place,
-            format!("`{name}` has the code {code:04X}, which is also that of {other}: a receiver cannot tell them apart, so change one `message_id`"),
+            format!(
+                "`{name}` has the code {code:04X}, which is also that of {other}: a \
+                 receiver cannot tell them apart, so change one `message_id`"
+            ),
         );
     }
 }
@@ -83,7 +87,10 @@ pub(crate) fn ambiguous_names(report: &mut Report, service: &Service, places: &[
         if other != code {
             report.warning(
                 place,
-                format!("`{name}` is also the name of the message {other:04X} in this service: rename one"),
+                format!(
+                    "`{name}` is also the name of the message {other:04X} in this service: \
+                     rename one"
+                ),
             );
         }
     }

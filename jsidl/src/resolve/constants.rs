@@ -74,7 +74,10 @@ impl Resolver<'_> {
             let path = path.join(".");
             self.report.error(
                 span,
-                format!("the constant `{path}` is not declared: declare it in a `declared_const_set` and refer to that with `declared_const_set_ref`"),
+                format!(
+                    "the constant `{path}` is not declared: declare it in a \
+                     `declared_const_set` and refer to that with `declared_const_set_ref`"
+                ),
             );
             return None;
         };
@@ -154,7 +157,10 @@ impl Resolver<'_> {
         if !fits {
             self.report.error(
                 span,
-                format!("the value of the constant is not an integer from {least} to {greatest}, as its `const_type` says"),
+                format!(
+                    "the value of the constant is not an integer from {least} to \
+                     {greatest}, as its `const_type` says"
+                ),
             );
         }
         fits

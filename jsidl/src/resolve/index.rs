@@ -137,7 +137,8 @@ impl<'a> Identities<'a> {
                     continue;
                 };
                 let message = format!(
-                    "the {what} `{urn} {version}` is declared twice in this directory, and the first one counts: remove one, or give it another id or version"
+                    "the {what} `{urn} {version}` is declared twice in this directory, and the \
+                     first one counts: remove one, or give it another id or version"
                 );
                 report.warning(*span, message).note(first, "the other one");
             }

@@ -4,7 +4,9 @@ use std::rc::Rc;
 
 use super::{Resolved, Resolver, Whole};
 use crate::check;
-use crate::model::{Array, Group, GroupKind, Item, List, Shape, Unsigned, Variant};
+use crate::model::{
+    Array, Group, GroupKind, Item, List, Meaning, Scalar, Shape, Unsigned, ValueSet, Variant,
+};
 use crate::source::{Span, Spanned};
 use crate::syntax::{CountField, Dimension, Kind, Node, Target, TypeSetIndex};
 
@@ -70,7 +72,10 @@ impl Resolver<'_> {
             let limit = super::MOST_ITEMS;
             self.report.error(
                 span,
-                format!("the references of these definitions add up to more than {limit} fields: load fewer of them at once"),
+                format!(
+                    "the references of these definitions add up to more than {limit} \
+                     fields: load fewer of them at once"
+                ),
             );
         }
         self.items_left.map(drop)
@@ -204,37 +209,60 @@ impl Resolver<'_> {
     }
 }
 
-/// Number of items in an item, and how deep they are nested.
+/// What it costs to copy an item, in fields of usual size, and how deep it is nested.
 pub(super) fn measure(item: &Item) -> (usize, usize) {
     let inner: &mut dyn Iterator<Item = &Item> = match &item.shape {
         Shape::Group(group) => &mut group.members.iter(),
         Shape::Variant(variant) => &mut variant.alternatives.iter(),
         Shape::List(list) => &mut std::iter::once(list.element.as_ref()),
         Shape::Array(array) => &mut std::iter::once(array.element.as_ref()),
-        // Enumerations cost about as much as fields.
-        Shape::Scalar(scalar) => return (1 + entries(&scalar.meaning), 1),
-        Shape::Bits(bits) => {
-            let values = bits
-                .fields
-                .iter()
-                .map(|f| 1 + f.values.values.len() + f.values.ranges.len());
-            return (1 + values.sum::<usize>(), 1);
-        }
-        Shape::Measure { choices } => return (1 + choices.len(), 1),
-        Shape::FormattedBlob { formats, .. } => return (1 + formats.len(), 1),
-        Shape::FixedString { .. } | Shape::VariableString { .. } | Shape::Blob { .. } => {
-            return (1, 1);
-        }
+        _ => &mut std::iter::empty(),
     };
+    let own = 1 + text(&item.interpretation) + entries(&item.shape);
     let (items, height) = inner
         .map(measure)
-        .fold((0, 0), |(items, height), (i, h)| (items + i, height.max(h)));
-    (items + 1, height + 1)
+        .fold((own, 0), |(items, height), (i, h)| {
+            (items + i, height.max(h))
+        });
+    (items, height + 1)
 }
 
-fn entries(meaning: &crate::model::Meaning) -> usize {
-    match meaning {
-        crate::model::Meaning::Values(set) => set.values.len() + set.ranges.len(),
+/// What the enumerations of a field cost.
+fn entries(shape: &Shape) -> usize {
+    match shape {
+        Shape::Scalar(scalar) => scalar_entries(scalar),
+        Shape::Bits(bits) => {
+            let fields = bits.fields.iter();
+            fields
+                .map(|f| 1 + text(&f.interpretation) + values(&f.values))
+                .sum()
+        }
+        Shape::Measure { choices } => {
+            let choices = choices.iter();
+            choices.map(|c| 1 + scalar_entries(&c.scalar)).sum()
+        }
+        Shape::FormattedBlob { formats, .. } => formats.iter().map(|f| 1 + text(&f.name)).sum(),
+        Shape::Blob { format, .. } => text(format),
         _ => 0,
     }
+}
+
+fn scalar_entries(scalar: &Scalar) -> usize {
+    let values = match &scalar.meaning {
+        Meaning::Values(set) => values(set),
+        Meaning::Plain | Meaning::Scaled(_) => 0,
+    };
+    text(&scalar.units) + values
+}
+
+fn values(set: &ValueSet) -> usize {
+    let ranges = set.ranges.iter().map(|r| 1 + text(&r.interpretation));
+    let values = set.values.iter();
+    let values = values.map(|v| 1 + text(&v.name) + text(&v.interpretation));
+    ranges.chain(values).sum()
+}
+
+/// What a text costs: nothing if it is short.
+pub(super) fn text(text: &str) -> usize {
+    text.len() / 256
 }

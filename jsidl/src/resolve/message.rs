@@ -3,7 +3,7 @@
 use std::rc::Rc;
 use std::sync::Arc;
 
-use super::item::measure;
+use super::item::{measure, text};
 use super::{Resolved, Resolver, Whole};
 use crate::check;
 use crate::model::{Item, Message};
@@ -90,7 +90,7 @@ impl Resolver<'_> {
         // Nothing is measured when nothing is left: that takes time as well.
         self.spend(1, reference.span)?;
         let items = message.body.as_ref().map_or(0, |body| measure(body).0);
-        self.spend(items, reference.span)?;
+        self.spend(items + text(&message.description), reference.span)?;
         let mut renamed = Message::clone(&message);
         renamed.name.clone_from(&reference.name);
         Some(Arc::new(renamed))

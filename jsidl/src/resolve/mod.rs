@@ -94,7 +94,7 @@ enum Resolved {
     Event,
 }
 
-/// An item with what it costs to copy it.
+/// An item with what it costs to copy it, see [`item::measure`].
 #[derive(Debug)]
 struct Whole {
     item: Item,

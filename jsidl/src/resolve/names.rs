@@ -20,7 +20,10 @@ impl<'a> Resolver<'a> {
             self.report
                 .error(
                     target.path.span,
-                    format!("`{path}` is a `{actual}`: refer to it with `declared_{actual}`, or name a `{wanted}`"),
+                    format!(
+                        "`{path}` is a `{actual}`: refer to it with `declared_{actual}`, or \
+                         name a `{wanted}`"
+                    ),
                 )
                 .note(declaration.span, "declared here");
             return None;
@@ -116,7 +119,10 @@ impl<'a> Resolver<'a> {
             self.report
                 .error(
                     span,
-                    format!("`{path}` is not declared: there is no `declared_type_set_ref` named `{alias}`"),
+                    format!(
+                        "`{path}` is not declared: there is no `declared_type_set_ref` \
+                         named `{alias}`"
+                    ),
                 )
                 .note(own.span, "the type set in which it was looked for");
             return None;
@@ -141,7 +147,10 @@ impl<'a> Resolver<'a> {
             self.report
                 .warning(
                     own.span,
-                    format!("the alias `{alias}` is used, but only declared by a set that this one refers to: add a `declared_type_set_ref` for it here"),
+                    format!(
+                        "the alias `{alias}` is used, but only declared by a set that this \
+                         one refers to: add a `declared_type_set_ref` for it here"
+                    ),
                 )
                 .note(reference.span, "declared here");
         }

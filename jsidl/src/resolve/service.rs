@@ -171,7 +171,11 @@ impl Resolver<'_> {
         }
         self.report.error(
             own.span,
-            format!("`{}` is left out: it inherits from more than {LONGEST_LINEAGE} services, or from a circle of them", heir.id),
+            format!(
+                "`{}` is left out: it inherits from more than {LONGEST_LINEAGE} services, \
+                 or from a circle of them",
+                heir.id
+            ),
         );
         false
     }

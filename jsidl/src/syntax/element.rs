@@ -68,7 +68,8 @@ impl Reader<'_> {
                     Belongs::Foreign => {
                         let name = child.tag_name().name();
                         self.report.error(at, format!(
-                            "`{name}` is not an element of JSIDL: its namespace must be `{}` or `{}`",
+                            "`{name}` is not an element of JSIDL: its namespace must be `{}` or \
+                             `{}`",
                             NAMESPACES[0], NAMESPACES[1],
                         ));
                     }

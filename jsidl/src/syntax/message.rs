@@ -94,7 +94,8 @@ impl Reader<'_> {
             self.report.error(
                 text.span,
                 format!(
-                    "`{digits}` cannot be a message id: write two octets as four hexadecimal digits, for example `2B00`"
+                    "`{digits}` cannot be a message id: write two octets as four hexadecimal \
+                     digits, for example `2B00`"
                 ),
             );
         }

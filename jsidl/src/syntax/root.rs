@@ -201,7 +201,9 @@ impl Reader<'_> {
                 _ => self.misplaced(
                     child,
                     "service_def",
-                    "`description`, `assumptions`, `references`, `declared_const_set`, `declared_type_set`, `message_set`, `internal_events_set` and `protocol_behavior`",
+                    "`description`, `assumptions`, `references`, `declared_const_set`, \
+                     `declared_type_set`, `message_set`, `internal_events_set` and \
+                     `protocol_behavior`",
                 ),
             }
         }
