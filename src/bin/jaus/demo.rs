@@ -34,6 +34,8 @@ const VEHICLE: JausId = JausId::new(101, 1, 33);
 const OPERATOR: JausId = JausId::new(42, 1, 1);
 /// Where the words of a line begin: behind time and name.
 const INDENT: usize = 21;
+/// Velocity_X, by its bit in the presence vector of a query and its report.
+const FORWARD: u16 = 1;
 /// How long discovery may take before the demo says that something is wrong.
 const USUAL: Duration = Duration::from_secs(5);
 
@@ -60,7 +62,7 @@ impl Demo {
     }
 }
 
-/// A vehicle that drives slow curves and tells its velocity to whoever asks.
+/// A vehicle that goes now faster, now slower, and tells its velocity to whoever asks.
 fn start_vehicle(story: &mut Story) -> Result<(Node, Component), Failure> {
     let config = Config::loopback(VEHICLE.subsystem(), VEHICLE.node());
     let node = Node::start(config).map_err(Failure::of)?;
@@ -85,12 +87,15 @@ fn start_operator(story: &mut Story) -> Result<(Node, Component), Failure> {
     Ok((node, operator))
 }
 
-/// What the vehicle's sensor reports: between half a metre and one and a half a second.
-fn velocity(driven: Duration, _query: &QueryVelocityState) -> ReportVelocityState {
+/// What the vehicle's sensor reports: between half a metre and one and a half a second. Of what a
+/// query may ask for it knows only the forward velocity.
+fn velocity(driven: Duration, query: &QueryVelocityState) -> ReportVelocityState {
     let mut report = ReportVelocityState::default();
-    let metres_per_second = 1.0 + (driven.as_secs_f64() / 3.0).sin() / 2.0;
-    // Far within the range of the field, so that it cannot fail.
-    let _ = report.set_velocity_x_m_per_s(metres_per_second);
+    if query.presence_vector & FORWARD != 0 {
+        let metres_per_second = 1.0 + (driven.as_secs_f64() / 3.0).sin() / 2.0;
+        // Far within the range of the field, so that it cannot fail.
+        let _ = report.set_velocity_x_m_per_s(metres_per_second);
+    }
     report
 }
 
@@ -213,7 +218,9 @@ impl<'s> Watch<'s> {
         let asked = Instant::now();
         let _: ReportHeartbeatPulse = self.operator.query(vehicle, &QueryHeartbeatPulse).await?;
         let delay = asked.elapsed();
-        let query = QueryVelocityState { presence_vector: 1 };
+        let query = QueryVelocityState {
+            presence_vector: FORWARD,
+        };
         let report: ReportVelocityState = self.operator.query(vehicle, &query).await?;
         Ok((delay, report.velocity_x_m_per_s().unwrap_or_default()))
     }
