@@ -58,6 +58,9 @@ impl Handlers {
 
     /// Takes every message of type `M` with its sender's header; the outbox is for whatever is
     /// to be said to it.
+    ///
+    /// Commands come from anyone: there is no Access Control yet that would ask who is in
+    /// control.
     #[must_use]
     pub fn receive<M: Message>(
         mut self,
