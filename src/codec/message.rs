@@ -6,14 +6,13 @@ use std::fmt::Debug;
 
 use bytes::Bytes;
 
-use super::error::DecodeErrorKind;
-use super::{Composite, DecodeError, EncodeError, Fixed, Reader, Writer};
+use super::{DecodeError, EncodeError, Reader, Writer};
 
 /// A message as its definition describes it. Generated, never written by hand.
 ///
 /// The encoded form begins with the two octets of the message code; transport headers are not
 /// part of it.
-pub trait Message: Composite + View + Clone + Debug + PartialEq + Send + Sync + 'static {
+pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'static {
     /// The message code, for example `0x4B00`.
     const CODE: u16;
     /// The name in the definition, for example `ReportIdentification`.
@@ -21,12 +20,27 @@ pub trait Message: Composite + View + Clone + Debug + PartialEq + Send + Sync + 
     /// Whether only the controlling client may send it.
     const IS_COMMAND: bool;
 
+    /// The octets that this message takes, its code included.
+    fn encoded_len(&self) -> usize;
+
+    /// Appends the message, its code first.
+    ///
+    /// # Errors
+    /// As [`encode`](Self::encode), without the message's name.
+    fn write(&self, output: &mut Writer<'_>) -> Result<(), EncodeError>;
+
+    /// Reads a message from its code on.
+    ///
+    /// # Errors
+    /// As [`decode`](Self::decode), without the message's name.
+    fn read(input: &mut Reader<'_>) -> Result<Self, DecodeError>;
+
     /// The message as octets.
     ///
     /// # Errors
     /// If a count or a length is outside the limits of the definition.
     fn encode(&self) -> Result<Bytes, EncodeError> {
-        let mut buffer = Vec::with_capacity(u16::SIZE + self.encoded_len());
+        let mut buffer = Vec::with_capacity(self.encoded_len());
         self.encode_into(&mut buffer)?;
         Ok(buffer.into())
     }
@@ -38,9 +52,7 @@ pub trait Message: Composite + View + Clone + Debug + PartialEq + Send + Sync + 
     #[inline]
     fn encode_into(&self, buffer: &mut Vec<u8>) -> Result<(), EncodeError> {
         let start = buffer.len();
-        let mut output = Writer::new(buffer);
-        output.fixed(Self::CODE);
-        match self.write(&mut output) {
+        match self.write(&mut Writer::new(buffer)) {
             Ok(()) => Ok(()),
             Err(error) => {
                 buffer.truncate(start);
@@ -56,27 +68,13 @@ pub trait Message: Composite + View + Clone + Debug + PartialEq + Send + Sync + 
     #[inline]
     fn decode(octets: &Bytes) -> Result<Self, DecodeError> {
         let mut input = Reader::new(octets);
-        read_all(&mut input).map_err(|error| error.of(Self::NAME, Self::CODE))
-    }
-}
-
-#[inline]
-fn read_all<M: Message>(input: &mut Reader<'_>) -> Result<M, DecodeError> {
-    let found = input.fixed::<u16>()?;
-    if found != M::CODE {
-        let kind = DecodeErrorKind::Code {
-            found,
-            expected: M::CODE,
-        };
-        return Err(DecodeError::new(kind, 0));
-    }
-    let message = M::read(input)?;
-    match input.remaining() {
-        0 => Ok(message),
-        octets => Err(DecodeError::new(
-            DecodeErrorKind::Trailing { octets },
-            input.offset(),
-        )),
+        // One variable for the result from beginning to end: it is built where it is to be.
+        let mut result = Self::read(&mut input);
+        if result.is_err() || input.remaining() != 0 {
+            let error = result.err().unwrap_or_else(|| input.trailing());
+            result = Err(error.of(Self::NAME, Self::CODE));
+        }
+        result
     }
 }
 
@@ -86,7 +84,7 @@ use super::view::View;
 /// Stands for `view::View`, which needs the feature `serde`.
 #[cfg(not(feature = "serde"))]
 #[doc(hidden)]
-pub trait View {}
+pub trait View: Sized {}
 
 #[cfg(not(feature = "serde"))]
 impl<T> View for T {}

@@ -7,7 +7,7 @@ use super::{Count, Fixed, FormattedBlob, Text};
 
 /// A cursor over a received message: a slice for the fields, and the shared octets themselves for
 /// strings and raw octets, which are not copied.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Reader<'a> {
     shared: &'a Bytes,
     rest: &'a [u8],
@@ -33,6 +33,31 @@ impl<'a> Reader<'a> {
     #[inline]
     pub fn remaining(&self) -> usize {
         self.rest.len()
+    }
+
+    /// Reads the code with which a message begins.
+    ///
+    /// # Errors
+    /// If it is another one.
+    #[inline]
+    pub fn code(&mut self, expected: u16) -> Result<(), DecodeError> {
+        match self.fixed::<u16>()? {
+            found if found == expected => Ok(()),
+            found => Err(DecodeError::new(
+                DecodeErrorKind::Code { found, expected },
+                0,
+            )),
+        }
+    }
+
+    /// The error for what is left behind a message.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn trailing(&self) -> DecodeError {
+        let kind = DecodeErrorKind::Trailing {
+            octets: self.remaining(),
+        };
+        DecodeError::new(kind, self.offset())
     }
 
     /// Reads several fixed fields under one check.
@@ -101,7 +126,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// Those of `read`.
-    #[inline]
+    #[inline(always)]
     pub fn member<T>(
         &mut self,
         name: &'static str,
@@ -175,7 +200,7 @@ impl<'a> Reader<'a> {
 
     /// Reads a count and checks it against its limits and against what is left, given that each
     /// thing counted takes at least `least` octets.
-    #[inline]
+    #[inline(always)]
     fn count<C: Count>(&mut self, min: u64, max: u64, least: usize) -> Result<usize, DecodeError> {
         let offset = self.offset();
         let found = self.fixed::<C>()?.to_u64();
@@ -226,14 +251,14 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// A count beyond its limits or the input.
-    #[inline]
+    #[inline(always)]
     pub fn blob<C: Count>(&mut self, min: u64, max: u64) -> Result<Bytes, DecodeError> {
         let length = self.count::<C>(min, max, 1)?;
         Ok(self.share(length))
     }
 
     /// Shares the next octets, of which there are enough.
-    #[inline]
+    #[inline(always)]
     fn share(&mut self, length: usize) -> Bytes {
         let start = self.offset();
         self.rest = &self.rest[length..];
@@ -244,7 +269,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// As [`blob`](Self::blob).
-    #[inline]
+    #[inline(always)]
     pub fn formatted<C: Count, F: Fixed>(
         &mut self,
         min: u64,
@@ -260,7 +285,7 @@ impl<'a> Reader<'a> {
     ///
     /// # Errors
     /// As [`blob`](Self::blob).
-    #[inline]
+    #[inline(always)]
     pub fn text<C: Count>(&mut self, min: u64, max: u64) -> Result<Text, DecodeError> {
         self.blob::<C>(min, max).map(Text::from)
     }

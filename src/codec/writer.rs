@@ -26,18 +26,29 @@ impl<'a> Writer<'a> {
         self.buffer.len() - self.start
     }
 
-    /// Writes octets as they are.
+    /// Makes room for several fixed values under one check.
     #[inline(always)]
-    pub fn run<const N: usize>(&mut self, octets: &[u8; N]) {
-        self.buffer.extend_from_slice(octets);
+    pub fn run<const N: usize>(&mut self) -> &mut [u8; N] {
+        self.buffer.extend_from_slice(&[0; N]);
+        match self.buffer.last_chunk_mut() {
+            Some(run) => run,
+            None => unreachable!("so many octets have just been appended"),
+        }
     }
 
     /// Writes one fixed value.
     #[inline]
     pub fn fixed<T: Fixed>(&mut self, value: T) {
-        let start = self.buffer.len();
-        self.buffer.resize(start + T::SIZE, 0);
-        value.put(&mut self.buffer[start..], 0);
+        // The size is a constant: for a number this is one check and one store.
+        if T::SIZE <= 16 {
+            let mut octets = [0; 16];
+            value.put(&mut octets, 0);
+            self.buffer.extend_from_slice(&octets[..T::SIZE]);
+        } else {
+            let start = self.buffer.len();
+            self.buffer.resize(start + T::SIZE, 0);
+            value.put(&mut self.buffer[start..], 0);
+        }
     }
 
     /// Writes a fixed value if there is one.

@@ -2,37 +2,70 @@
 
 use super::encode::all_bits;
 use super::ident::local;
-use super::structs::optional;
+use super::structs::{Body, optional};
 use super::types::{Field, Type, unsigned_type};
 use super::writer::Writer;
-use crate::model::{Count, Unsigned};
+use crate::model::Count;
 
 /// Writes `fn read` of a struct.
-pub(super) fn group(out: &mut Writer, fields: &[Field<'_>], presence: Option<Unsigned>) {
-    if fields.is_empty() {
-        out.push("fn read(_: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {");
-        out.push("Ok(Self)\n}");
-        return;
-    }
-    let taken: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
-    let names = Locals {
-        input: local("input", &taken),
-        present: local("present", &taken),
-        run: local("run", &taken),
+pub(super) fn group(out: &mut Writer, body: &Body<'_>) {
+    let fields = body.fields;
+    let names = Locals::beside(fields);
+    let input = match (fields.is_empty(), body.message) {
+        (true, false) => "_",
+        _ => &names.input,
     };
-    let input = &names.input;
+    if body.inlined() {
+        out.push("#[inline]");
+    }
     out.push(format!(
         "fn read({input}: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {{"
     ));
-    if let Some(unsigned) = presence {
+    if body.message {
+        out.push(format!("{input}.code(Self::CODE)?;"));
+    }
+    if fields.is_empty() {
+        out.push("Ok(Self)\n}");
+        return;
+    }
+    if let Some(unsigned) = body.presence {
         let (all, ty) = (all_bits(fields), unsigned_type(unsigned));
         let present = &names.present;
         out.push(format!(
             "let {present} = {input}.presence::<{ty}>({all:#x})?;"
         ));
-        full(out, fields, &names);
+        if body.has_fast_path() {
+            full(out, fields, &names);
+            out.push(format!("Self::read_some({input}, {present})\n}}"));
+            return;
+        }
     }
     members(out, fields, &names);
+    construct(out, fields);
+}
+
+/// Writes `fn read_some` of a struct with a fast path: what is left of `read` when a member is
+/// absent, kept apart so that the fast path stays small.
+pub(super) fn some(out: &mut Writer, fields: &[Field<'_>]) {
+    let names = Locals::beside(fields);
+    let Locals {
+        input,
+        present,
+        place,
+        ..
+    } = &names;
+    out.push("#[inline(never)]");
+    out.push(format!(
+        "fn read_some({place}: &mut codec::Reader<'_>, {present}: u64) -> Result<Self, codec::DecodeError> {{"
+    ));
+    out.push(format!("let mut {input} = {place}.clone();"));
+    members(out, fields, &names);
+    out.push(format!("*{place} = {input};"));
+    construct(out, fields);
+}
+
+/// Builds the struct from variables of the names of its fields.
+fn construct(out: &mut Writer, fields: &[Field<'_>]) {
     let idents: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
     out.push("Ok(Self {");
     out.push(idents.join(",\n") + ",");
@@ -42,21 +75,27 @@ pub(super) fn group(out: &mut Writer, fields: &[Field<'_>], presence: Option<Uns
 /// Local variables, named unlike any field.
 struct Locals {
     input: String,
+    place: String,
     present: String,
     run: String,
 }
 
+impl Locals {
+    fn beside(fields: &[Field<'_>]) -> Self {
+        let taken: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
+        Self {
+            input: local("input", &taken),
+            place: local("place", &taken),
+            present: local("present", &taken),
+            run: local("run", &taken),
+        }
+    }
+}
+
 /// The fast path: all optional members are there, and everything has one size.
 fn full(out: &mut Writer, fields: &[Field<'_>], names: &Locals) {
-    if fields.iter().any(|field| field.ty.size().is_none()) {
-        return;
-    }
-    let run = &names.run;
-    out.push(format!(
-        "if {} == {:#x} {{",
-        names.present,
-        all_bits(fields)
-    ));
+    let (run, present, all) = (&names.run, &names.present, all_bits(fields));
+    out.push(format!("if {present} == {all:#x} {{"));
     take_run(out, fields, names);
     out.push("return Ok(Self {");
     let mut at = 0;

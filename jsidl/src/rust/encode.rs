@@ -1,22 +1,34 @@
 //! How values become octets: `encoded_len` and `write`.
 
 use super::ident::local;
-use super::structs::optional;
+use super::structs::{Body, optional};
 use super::types::{Field, Type, unsigned_type};
 use super::writer::Writer;
 use crate::model::{Count, Number, Unsigned};
 
+/// The code at the beginning of a message, as a value of fixed size.
+const CODE: (&str, Type) = (
+    "<Self as codec::Message>::CODE",
+    Type::Number(Number::Unsigned(Unsigned::U16)),
+);
+
 /// Writes `fn encoded_len` and `fn write` of a struct.
-pub(super) fn group(out: &mut Writer, fields: &[Field<'_>], presence: Option<Unsigned>) {
-    encoded_len(out, fields, presence);
+pub(super) fn group(out: &mut Writer, body: &Body<'_>) {
+    encoded_len(out, body);
     out.gap();
-    write(out, fields, presence);
+    if body.inlined() {
+        out.push("#[inline]");
+    }
+    write(out, body);
 }
 
-fn encoded_len(out: &mut Writer, fields: &[Field<'_>], presence: Option<Unsigned>) {
-    let mut constant = presence.map_or(0, Unsigned::size);
+fn encoded_len(out: &mut Writer, body: &Body<'_>) {
+    let Body {
+        fields, presence, ..
+    } = body;
+    let mut constant = body.code_size() + presence.map_or(0, Unsigned::size);
     let mut terms = Vec::new();
-    for field in fields {
+    for field in *fields {
         let value = format!("self.{}", field.ident);
         match (optional(field), constant_len(&field.ty)) {
             (false, Some(size)) => constant += size,
@@ -114,80 +126,95 @@ fn measure(ty: &Type) -> String {
     }
 }
 
-fn write(out: &mut Writer, fields: &[Field<'_>], presence: Option<Unsigned>) {
-    let output = if fields.is_empty() { "_" } else { "output" };
+fn write(out: &mut Writer, body: &Body<'_>) {
+    let nothing = body.fields.is_empty() && !body.message;
+    let output = if nothing { "_" } else { "output" };
     out.push(format!(
         "fn write(&self, {output}: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {{"
     ));
-    if let Some(unsigned) = presence {
-        full(out, fields, unsigned);
-        let ty = unsigned_type(unsigned);
-        let bits = fields
-            .iter()
-            .filter(|field| optional(field))
-            .enumerate()
-            .map(|(bit, field)| {
-                let shift = if bit == 0 {
-                    String::new()
-                } else {
-                    format!(" << {bit}")
-                };
-                format!("{ty}::from(self.{}.is_some()){shift}", field.ident)
-            });
-        out.push("output.fixed(");
-        out.push(bits.collect::<Vec<_>>().join("\n| "));
-        out.push(");");
-    }
-    let mut rest = fields;
-    while let Some((field, after)) = rest.split_first() {
-        let run = rest
-            .iter()
-            .take_while(|f| !optional(f) && f.ty.size().is_some())
-            .count();
-        if run > 1 {
-            let values = rest[..run]
-                .iter()
-                .map(|field| (format!("self.{}", field.ident), &field.ty));
-            put_run(out, values);
-            rest = &rest[run..];
-        } else {
-            member(out, field);
-            rest = after;
+    match body.presence {
+        Some(presence) if body.has_fast_path() => {
+            full(out, body, presence);
+            out.push("self.write_some(output);");
         }
+        _ => members(out, body),
     }
     out.push("Ok(())\n}");
 }
 
-/// The fast path: all optional members are there, and everything has one size.
-fn full(out: &mut Writer, fields: &[Field<'_>], presence: Unsigned) {
-    if fields.iter().any(|field| field.ty.size().is_none()) {
-        return;
+/// Writes `fn write_some` of a struct with a fast path: what is left of `write` when a member is
+/// absent, kept apart so that the fast path stays small.
+pub(super) fn some(out: &mut Writer, body: &Body<'_>) {
+    out.push("#[inline(never)]");
+    out.push("fn write_some(&self, output: &mut codec::Writer<'_>) {");
+    members(out, body);
+    out.push("}");
+}
+
+fn members(out: &mut Writer, body: &Body<'_>) {
+    let mut before = Vec::new();
+    if body.message {
+        before.push((CODE.0.to_owned(), &CODE.1));
     }
-    let taken: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
-    out.push("if let &Self {");
-    for field in fields {
-        let ident = binding(field, &taken);
-        let pattern = if optional(field) {
-            format!("Some({ident})")
-        } else {
-            ident.clone()
+    let vector;
+    if let Some(presence) = body.presence {
+        let ty = unsigned_type(presence);
+        let bits = body
+            .fields
+            .iter()
+            .filter(|field| optional(field))
+            .enumerate()
+            .map(|(bit, field)| match bit {
+                0 => format!("{ty}::from(self.{}.is_some())", field.ident),
+                _ => format!("{ty}::from(self.{}.is_some()) << {bit}", field.ident),
+            });
+        out.push("let present =");
+        out.push(bits.collect::<Vec<_>>().join("\n| ") + ";");
+        vector = Type::Number(Number::Unsigned(presence));
+        before.push(("present".to_owned(), &vector));
+    }
+    let mut rest = body.fields;
+    loop {
+        let run = rest
+            .iter()
+            .take_while(|f| !optional(f) && f.ty.size().is_some())
+            .count();
+        let values = rest[..run]
+            .iter()
+            .map(|field| (format!("self.{}", field.ident), &field.ty));
+        put_run(out, before.drain(..).chain(values));
+        let Some((field, after)) = rest[run..].split_first() else {
+            return;
         };
-        let short = pattern == field.ident;
-        out.push(if short {
-            format!("{pattern},")
-        } else {
-            format!("{}: {pattern},", field.ident)
+        member(out, field);
+        rest = after;
+    }
+}
+
+/// The fast path: all optional members are there, and everything has one size.
+fn full(out: &mut Writer, body: &Body<'_>, presence: Unsigned) {
+    let Body { fields, .. } = body;
+    let taken: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
+    out.push("if let Self {");
+    for field in *fields {
+        let binding = binding(field, &taken);
+        let ident = &field.ident;
+        out.push(match optional(field) {
+            true => format!("{ident}: Some({binding}),"),
+            false if binding == *ident => format!("{ident},"),
+            false => format!("{ident}: {binding},"),
         });
     }
     out.push("} = self");
     out.push("{");
     let all = all_bits(fields);
+    let code = body.message.then(|| (CODE.0.to_owned(), &CODE.1));
     let vector = Type::Number(Number::Unsigned(presence));
     let present = (format!("{all:#x}_{}", unsigned_type(presence)), &vector);
     let values = fields
         .iter()
-        .map(|field| (binding(field, &taken), &field.ty));
-    put_run(out, std::iter::once(present).chain(values));
+        .map(|field| (format!("*{}", binding(field, &taken)), &field.ty));
+    put_run(out, code.into_iter().chain([present]).chain(values));
     out.push("return Ok(());\n}");
 }
 
@@ -211,14 +238,18 @@ pub(super) fn all_bits(fields: &[Field<'_>]) -> u64 {
 /// Several values of fixed size as one block of octets.
 fn put_run<'t>(out: &mut Writer, values: impl IntoIterator<Item = (String, &'t Type)>) {
     let values: Vec<_> = values.into_iter().collect();
+    match &values[..] {
+        [] => return,
+        [(value, _)] => return out.push(format!("output.fixed({value});")),
+        _ => {}
+    }
     let size: usize = values.iter().filter_map(|(_, ty)| ty.size()).sum();
-    out.push(format!("let mut run = [0; {size}];"));
+    out.push(format!("let run = output.run::<{size}>();"));
     let mut at = 0;
     for (value, ty) in values {
-        out.push(format!("codec::Fixed::put({value}, &mut run, {at});"));
+        out.push(format!("codec::Fixed::put({value}, run, {at});"));
         at += ty.size().unwrap_or(0);
     }
-    out.push("output.run(&run);");
 }
 
 fn member(out: &mut Writer, field: &Field<'_>) {

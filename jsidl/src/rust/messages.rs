@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::structs::Body;
 use super::types::{Definition, Field, Kind, Nested};
 use super::writer::Writer;
 use super::{choices, decode, docs, encode, newtypes, random, structs, view};
@@ -77,11 +78,16 @@ pub(super) fn message<'m>(
     out.push(format!("impl codec::Message for {ident} {{"));
     out.push(format!("const CODE: u16 = 0x{:04X};", message.code));
     out.push(format!("const NAME: &'static str = {:?};", message.name));
-    out.push(format!(
-        "const IS_COMMAND: bool = {};\n}}",
-        message.is_command
-    ));
-    composite(out, ident, fields, presence);
+    out.push(format!("const IS_COMMAND: bool = {};", message.is_command));
+    codec(
+        out,
+        ident,
+        &Body {
+            fields,
+            presence,
+            message: true,
+        },
+    );
     match &content {
         Content::Flat(fields, _) => view::group(out, ident, fields),
         Content::Single(fields) => view::transparent(out, ident, &fields[0]),
@@ -151,20 +157,21 @@ fn content<'m>(
     }
 }
 
-fn composite(out: &mut Writer, ident: &str, fields: &[Field<'_>], presence: Option<Unsigned>) {
-    let required = fields.iter().filter(|field| !structs::optional(field));
-    let least = required.map(|field| field.ty.least()).sum::<usize>();
+/// Completes an `impl` of the codec.
+fn codec(out: &mut Writer, ident: &str, body: &Body<'_>) {
     out.gap();
-    out.push(format!("impl codec::Composite for {ident} {{"));
-    out.push(format!(
-        "const MIN_LEN: usize = {};",
-        least + presence.map_or(0, Unsigned::size)
-    ));
+    encode::group(out, body);
     out.gap();
-    encode::group(out, fields, presence);
-    out.gap();
-    decode::group(out, fields, presence);
+    decode::group(out, body);
     out.push("}");
+    if body.has_fast_path() {
+        out.gap();
+        out.push(format!("impl {ident} {{"));
+        encode::some(out, body);
+        out.gap();
+        decode::some(out, body.fields);
+        out.push("}");
+    }
 }
 
 fn module(out: &mut Writer, plan: &Plan<'_>, definitions: &[Definition<'_>]) {
@@ -249,7 +256,15 @@ fn structure(out: &mut Writer, ident: &str, item: &Item, group: &Group, fields: 
     if fixed {
         structs::fixed(out, ident, fields);
     } else {
-        composite(out, ident, fields, group.presence);
+        let body = Body {
+            fields,
+            presence: group.presence,
+            message: false,
+        };
+        out.gap();
+        out.push(format!("impl codec::Composite for {ident} {{"));
+        out.push(format!("const MIN_LEN: usize = {};", body.least()));
+        codec(out, ident, &body);
     }
     view::group(out, ident, fields);
     random::group(out, ident, fields);

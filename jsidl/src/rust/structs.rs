@@ -4,6 +4,7 @@ use super::docs;
 use super::ident::{Names, unit_suffix};
 use super::types::{Field, Type};
 use super::writer::Writer;
+use crate::model::Unsigned;
 
 /// Writes a struct with its accessors; the documentation stands already.
 pub(super) fn declare(
@@ -42,6 +43,37 @@ pub(super) fn declare(
 
 pub(super) fn optional(field: &Field<'_>) -> bool {
     field.item.optional
+}
+
+/// What the octets of a struct are made of.
+pub(super) struct Body<'a> {
+    pub(super) fields: &'a [Field<'a>],
+    pub(super) presence: Option<Unsigned>,
+    /// Whether it is a message, which begins with its code.
+    pub(super) message: bool,
+}
+
+impl Body<'_> {
+    /// Whether everything together is a block of one size once all optional members are there.
+    pub(super) fn has_fast_path(&self) -> bool {
+        self.presence.is_some() && self.fields.iter().all(|field| field.ty.size().is_some())
+    }
+
+    /// Whether the codec is small, or part of a loop.
+    pub(super) fn inlined(&self) -> bool {
+        !self.message || self.has_fast_path()
+    }
+
+    pub(super) fn code_size(&self) -> usize {
+        if self.message { 2 } else { 0 }
+    }
+
+    /// The least number of octets.
+    pub(super) fn least(&self) -> usize {
+        let required = self.fields.iter().filter(|field| !optional(field));
+        let members = required.map(|field| field.ty.least()).sum::<usize>();
+        self.code_size() + self.presence.map_or(0, Unsigned::size) + members
+    }
 }
 
 fn rust_type(field: &Field<'_>, prefix: &str) -> String {

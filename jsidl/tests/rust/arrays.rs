@@ -88,23 +88,21 @@ impl codec::Message for ReportArrays {
     const CODE: u16 = 0xF051;
     const NAME: &'static str = "ReportArrays";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportArrays {
-    const MIN_LEN: usize = 383;
 
     fn encoded_len(&self) -> usize {
-        377
+        379
         + self.names.iter().map(|value| 1 + value.len()).sum::<usize>()
         + self.grid.as_flattened().iter().map(|value| 1 + value.len()).sum::<usize>()
         + 4 * usize::from(self.maybe.is_some())
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(
-            u8::from(self.maybe.is_some())
-        );
-        output.fixed(self.vector);
+        let present =
+        u8::from(self.maybe.is_some());
+        let run = output.run::<15>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
+        codec::Fixed::put(self.vector, run, 3);
         output.member("Matrix", |output| { for i1 in 0..3 { for i0 in 0..2 { { output.fixed(self.matrix[i0][i1]); Ok(()) }?; } } Ok(()) })?;
         output.member("Cube", |output| { for i2 in 0..4 { for i1 in 0..3 { for i0 in 0..2 { { output.fixed(self.cube[i0][i1][i2]); Ok(()) }?; } } } Ok(()) })?;
         output.fixed(self.many);
@@ -117,6 +115,7 @@ impl codec::Composite for ReportArrays {
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let present = input.presence::<u8>(0x1)?;
         let vector = input.member("Vector", codec::Reader::fixed)?;
         let matrix = input.member("Matrix", |input| { let mut array: [[_; 3]; 2] = ::std::array::from_fn(|_| ::std::array::from_fn(|_| Default::default())); for i1 in 0..3 { for i0 in 0..2 { array[i0][i1] = input.fixed()?; } } Ok(array) })?;
@@ -245,21 +244,20 @@ impl codec::Message for ReportArrayList {
     const CODE: u16 = 0xF052;
     const NAME: &'static str = "ReportArrayList";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportArrayList {
-    const MIN_LEN: usize = 1;
 
     fn encoded_len(&self) -> usize {
-        1 + 6 * self.rows.len()
+        2
+        + 1 + 6 * self.rows.len()
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
         output.member("Rows", |output| output.list::<u8, _>(&self.rows, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let rows = input.member("Rows", |input| input.list::<u8, _>(0, 255, 6, codec::Reader::fixed))?;
         Ok(Self {
             rows,

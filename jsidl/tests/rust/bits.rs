@@ -59,48 +59,39 @@ impl codec::Message for ReportTime {
     const CODE: u16 = 0xF011;
     const NAME: &'static str = "ReportTime";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportTime {
-    const MIN_LEN: usize = 5;
 
     fn encoded_len(&self) -> usize {
-        5
+        7
         + usize::from(self.flags.is_some())
         + 8 * usize::from(self.wide.is_some())
         + 2 * usize::from(self.whole.is_some())
     }
 
+    #[inline]
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        if let &Self {
+        if let Self {
             time_stamp,
             flags: Some(flags),
             wide: Some(wide),
             whole: Some(whole),
         } = self
         {
-            let mut run = [0; 16];
-            codec::Fixed::put(0x7_u8, &mut run, 0);
-            codec::Fixed::put(time_stamp, &mut run, 1);
-            codec::Fixed::put(flags, &mut run, 5);
-            codec::Fixed::put(wide, &mut run, 6);
-            codec::Fixed::put(whole, &mut run, 14);
-            output.run(&run);
+            let run = output.run::<18>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(0x7_u8, run, 2);
+            codec::Fixed::put(*time_stamp, run, 3);
+            codec::Fixed::put(*flags, run, 7);
+            codec::Fixed::put(*wide, run, 8);
+            codec::Fixed::put(*whole, run, 16);
             return Ok(());
         }
-        output.fixed(
-            u8::from(self.flags.is_some())
-            | u8::from(self.wide.is_some()) << 1
-            | u8::from(self.whole.is_some()) << 2
-        );
-        output.fixed(self.time_stamp);
-        output.optional(self.flags);
-        output.optional(self.wide);
-        output.optional(self.whole);
+        self.write_some(output);
         Ok(())
     }
 
+    #[inline]
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let present = input.presence::<u8>(0x7)?;
         if present == 0x7 {
             let run = input.run::<15>(&[
@@ -116,10 +107,34 @@ impl codec::Composite for ReportTime {
                 whole: Some(codec::Fixed::get(run, 13)),
             });
         }
+        Self::read_some(input, present)
+    }
+}
+
+impl ReportTime {
+    #[inline(never)]
+    fn write_some(&self, output: &mut codec::Writer<'_>) {
+        let present =
+        u8::from(self.flags.is_some())
+        | u8::from(self.wide.is_some()) << 1
+        | u8::from(self.whole.is_some()) << 2;
+        let run = output.run::<7>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
+        codec::Fixed::put(self.time_stamp, run, 3);
+        output.optional(self.flags);
+        output.optional(self.wide);
+        output.optional(self.whole);
+    }
+
+    #[inline(never)]
+    fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+        let mut input = place.clone();
         let time_stamp = input.member("TimeStamp", codec::Reader::fixed)?;
         let flags = input.optional(present & 0x1 != 0, "Flags", codec::Reader::fixed)?;
         let wide = input.optional(present & 0x2 != 0, "Wide", codec::Reader::fixed)?;
         let whole = input.optional(present & 0x4 != 0, "Whole", codec::Reader::fixed)?;
+        *place = input;
         Ok(Self {
             time_stamp,
             flags,

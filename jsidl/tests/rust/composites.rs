@@ -68,20 +68,18 @@ impl codec::Message for QueryNothing {
     const CODE: u16 = 0xF030;
     const NAME: &'static str = "QueryNothing";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for QueryNothing {
-    const MIN_LEN: usize = 0;
 
     fn encoded_len(&self) -> usize {
-        0
+        2
     }
 
-    fn write(&self, _: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
         Ok(())
     }
 
-    fn read(_: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         Ok(Self)
     }
 }
@@ -126,23 +124,22 @@ impl codec::Message for ReportTree {
     const CODE: u16 = 0xF031;
     const NAME: &'static str = "ReportTree";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportTree {
-    const MIN_LEN: usize = 3;
 
     fn encoded_len(&self) -> usize {
-        1
+        3
         + 2 + self.nodes.iter().map(codec::Composite::encoded_len).sum::<usize>()
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(self.request_id_rec);
+        let run = output.run::<3>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.request_id_rec, run, 2);
         output.member("Nodes", |output| output.list::<u16, _>(&self.nodes, 0, 65535, |value, output| codec::Composite::write(value, output)))?;
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let request_id_rec = input.member("RequestIDRec", codec::Reader::fixed)?;
         let nodes = input.member("Nodes", |input| input.list::<u16, _>(0, 65535, 3, codec::Composite::read))?;
         Ok(Self {
@@ -313,12 +310,14 @@ pub mod report_tree {
             + 1 + self.name.len()
         }
 
+        #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
             output.fixed(self.component_id);
             output.member("Name", |output| output.text::<u8>(&self.name, 0, 255))?;
             Ok(())
         }
 
+        #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
             let component_id = input.member("ComponentID", codec::Reader::fixed)?;
             let name = input.member("Name", |input| input.text::<u8>(0, 255))?;
@@ -377,12 +376,14 @@ pub mod report_tree {
             + 1 + self.components.iter().map(codec::Composite::encoded_len).sum::<usize>()
         }
 
+        #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
             output.fixed(self.node_rec);
             output.member("Components", |output| output.list::<u8, _>(&self.components, 0, 255, |value, output| codec::Composite::write(value, output)))?;
             Ok(())
         }
 
+        #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
             let node_rec = input.member("NodeRec", codec::Reader::fixed)?;
             let components = input.member("Components", |input| input.list::<u8, _>(0, 255, 2, codec::Composite::read))?;
@@ -440,21 +441,20 @@ impl codec::Message for ReportListOfLists {
     const CODE: u16 = 0xF032;
     const NAME: &'static str = "ReportListOfLists";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportListOfLists {
-    const MIN_LEN: usize = 2;
 
     fn encoded_len(&self) -> usize {
-        2 + self.outer.iter().map(|value| 1 + 4 * value.len()).sum::<usize>()
+        2
+        + 2 + self.outer.iter().map(|value| 1 + 4 * value.len()).sum::<usize>()
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
         output.member("Outer", |output| output.list::<u16, _>(&self.outer, 0, 100, |value, output| output.list::<u8, _>(value, 1, 4, |value, output| { output.fixed(*value); Ok(()) })))?;
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let outer = input.member("Outer", |input| input.list::<u16, _>(0, 100, 5, |input| input.list::<u8, _>(1, 4, 4, codec::Reader::fixed)))?;
         Ok(Self {
             outer,
@@ -563,21 +563,20 @@ impl codec::Message for SetChoice {
     const CODE: u16 = 0xF033;
     const NAME: &'static str = "SetChoice";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for SetChoice {
-    const MIN_LEN: usize = 2;
 
     fn encoded_len(&self) -> usize {
-        codec::Composite::encoded_len(&self.choice)
+        2
+        + codec::Composite::encoded_len(&self.choice)
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
         output.member("Choice", |output| codec::Composite::write(&self.choice, output))?;
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let choice = input.member("Choice", codec::Composite::read)?;
         Ok(Self {
             choice,
@@ -677,11 +676,13 @@ pub mod set_choice {
             1 + self.text.len()
         }
 
+        #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
             output.member("Text", |output| output.text::<u8>(&self.text, 0, 255))?;
             Ok(())
         }
 
+        #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
             let text = input.member("Text", |input| input.text::<u8>(0, 255))?;
             Ok(Self {
@@ -733,24 +734,22 @@ pub mod set_choice {
             + usize::from(self.maybe.is_some())
         }
 
+        #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            if let &Self {
+            if let Self {
                 maybe: Some(maybe),
             } = self
             {
-                let mut run = [0; 2];
-                codec::Fixed::put(0x1_u8, &mut run, 0);
-                codec::Fixed::put(maybe, &mut run, 1);
-                output.run(&run);
+                let run = output.run::<2>();
+                codec::Fixed::put(0x1_u8, run, 0);
+                codec::Fixed::put(*maybe, run, 1);
                 return Ok(());
             }
-            output.fixed(
-                u8::from(self.maybe.is_some())
-            );
-            output.optional(self.maybe);
+            self.write_some(output);
             Ok(())
         }
 
+        #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
             let present = input.presence::<u8>(0x1)?;
             if present == 0x1 {
@@ -761,7 +760,24 @@ pub mod set_choice {
                     maybe: Some(codec::Fixed::get(run, 0)),
                 });
             }
+            Self::read_some(input, present)
+        }
+    }
+
+    impl EmptyPresenceRec {
+        #[inline(never)]
+        fn write_some(&self, output: &mut codec::Writer<'_>) {
+            let present =
+            u8::from(self.maybe.is_some());
+            output.fixed(present);
+            output.optional(self.maybe);
+        }
+
+        #[inline(never)]
+        fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+            let mut input = place.clone();
             let maybe = input.optional(present & 0x1 != 0, "Maybe", codec::Reader::fixed)?;
+            *place = input;
             Ok(Self {
                 maybe,
             })
@@ -1166,23 +1182,21 @@ impl codec::Message for ReportEmptyVariant {
     const CODE: u16 = 0xF034;
     const NAME: &'static str = "ReportEmptyVariant";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportEmptyVariant {
-    const MIN_LEN: usize = 2;
 
     fn encoded_len(&self) -> usize {
-        1
+        3
         + codec::Composite::encoded_len(&self.nothing)
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
         output.member("Nothing", |output| codec::Composite::write(&self.nothing, output))?;
         output.fixed(self.after_rec);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let nothing = input.member("Nothing", codec::Composite::read)?;
         let after_rec = input.member("AfterRec", codec::Reader::fixed)?;
         Ok(Self {
@@ -1345,25 +1359,23 @@ impl codec::Message for ReportOptional {
     const CODE: u16 = 0xF035;
     const NAME: &'static str = "ReportOptional";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportOptional {
-    const MIN_LEN: usize = 6;
 
     fn encoded_len(&self) -> usize {
-        6
+        8
         + self.maybe_rec.as_ref().map_or(0, codec::Composite::encoded_len)
         + self.maybe_list.as_ref().map_or(0, |value| 1 + value.len())
         + self.maybe_variant.as_ref().map_or(0, codec::Composite::encoded_len)
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(
-            u32::from(self.maybe_rec.is_some())
-            | u32::from(self.maybe_list.is_some()) << 1
-            | u32::from(self.maybe_variant.is_some()) << 2
-        );
-        output.fixed(self.always_rec);
+        let present =
+        u32::from(self.maybe_rec.is_some())
+        | u32::from(self.maybe_list.is_some()) << 1
+        | u32::from(self.maybe_variant.is_some()) << 2;
+        let run = output.run::<8>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
+        codec::Fixed::put(self.always_rec, run, 6);
         if let Some(value) = &self.maybe_rec {
             output.member("MaybeRec", |output| codec::Composite::write(value, output))?;
         }
@@ -1377,6 +1389,7 @@ impl codec::Composite for ReportOptional {
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let present = input.presence::<u32>(0x7)?;
         let always_rec = input.member("AlwaysRec", codec::Reader::fixed)?;
         let maybe_rec = input.optional(present & 0x1 != 0, "MaybeRec", codec::Composite::read)?;
@@ -1500,27 +1513,24 @@ pub mod report_optional {
             + usize::from(self.c.is_some())
         }
 
+        #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            if let &Self {
+            if let Self {
                 b,
                 c: Some(c),
             } = self
             {
-                let mut run = [0; 4];
-                codec::Fixed::put(0x1_u8, &mut run, 0);
-                codec::Fixed::put(b, &mut run, 1);
-                codec::Fixed::put(c, &mut run, 3);
-                output.run(&run);
+                let run = output.run::<4>();
+                codec::Fixed::put(0x1_u8, run, 0);
+                codec::Fixed::put(*b, run, 1);
+                codec::Fixed::put(*c, run, 3);
                 return Ok(());
             }
-            output.fixed(
-                u8::from(self.c.is_some())
-            );
-            output.fixed(self.b);
-            output.optional(self.c);
+            self.write_some(output);
             Ok(())
         }
 
+        #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
             let present = input.presence::<u8>(0x1)?;
             if present == 0x1 {
@@ -1533,8 +1543,27 @@ pub mod report_optional {
                     c: Some(codec::Fixed::get(run, 2)),
                 });
             }
+            Self::read_some(input, present)
+        }
+    }
+
+    impl MaybeRec {
+        #[inline(never)]
+        fn write_some(&self, output: &mut codec::Writer<'_>) {
+            let present =
+            u8::from(self.c.is_some());
+            let run = output.run::<3>();
+            codec::Fixed::put(present, run, 0);
+            codec::Fixed::put(self.b, run, 1);
+            output.optional(self.c);
+        }
+
+        #[inline(never)]
+        fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+            let mut input = place.clone();
             let b = input.member("B", codec::Reader::fixed)?;
             let c = input.optional(present & 0x1 != 0, "C", codec::Reader::fixed)?;
+            *place = input;
             Ok(Self {
                 b,
                 c,
@@ -1847,13 +1876,9 @@ impl codec::Message for ReportManyOptional {
     const CODE: u16 = 0xF036;
     const NAME: &'static str = "ReportManyOptional";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportManyOptional {
-    const MIN_LEN: usize = 2;
 
     fn encoded_len(&self) -> usize {
-        2
+        4
         + 2 * usize::from(self.m0.is_some())
         + usize::from(self.m1.is_some())
         + 2 * usize::from(self.m2.is_some())
@@ -1868,8 +1893,9 @@ impl codec::Composite for ReportManyOptional {
         + usize::from(self.m11.is_some())
     }
 
+    #[inline]
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        if let &Self {
+        if let Self {
             m0: Some(m0),
             m1: Some(m1),
             m2: Some(m2),
@@ -1884,53 +1910,30 @@ impl codec::Composite for ReportManyOptional {
             m11: Some(m11),
         } = self
         {
-            let mut run = [0; 20];
-            codec::Fixed::put(0xfff_u16, &mut run, 0);
-            codec::Fixed::put(m0, &mut run, 2);
-            codec::Fixed::put(m1, &mut run, 4);
-            codec::Fixed::put(m2, &mut run, 5);
-            codec::Fixed::put(m3, &mut run, 7);
-            codec::Fixed::put(m4, &mut run, 8);
-            codec::Fixed::put(m5, &mut run, 10);
-            codec::Fixed::put(m6, &mut run, 11);
-            codec::Fixed::put(m7, &mut run, 13);
-            codec::Fixed::put(m8, &mut run, 14);
-            codec::Fixed::put(m9, &mut run, 16);
-            codec::Fixed::put(m10, &mut run, 17);
-            codec::Fixed::put(m11, &mut run, 19);
-            output.run(&run);
+            let run = output.run::<22>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(0xfff_u16, run, 2);
+            codec::Fixed::put(*m0, run, 4);
+            codec::Fixed::put(*m1, run, 6);
+            codec::Fixed::put(*m2, run, 7);
+            codec::Fixed::put(*m3, run, 9);
+            codec::Fixed::put(*m4, run, 10);
+            codec::Fixed::put(*m5, run, 12);
+            codec::Fixed::put(*m6, run, 13);
+            codec::Fixed::put(*m7, run, 15);
+            codec::Fixed::put(*m8, run, 16);
+            codec::Fixed::put(*m9, run, 18);
+            codec::Fixed::put(*m10, run, 19);
+            codec::Fixed::put(*m11, run, 21);
             return Ok(());
         }
-        output.fixed(
-            u16::from(self.m0.is_some())
-            | u16::from(self.m1.is_some()) << 1
-            | u16::from(self.m2.is_some()) << 2
-            | u16::from(self.m3.is_some()) << 3
-            | u16::from(self.m4.is_some()) << 4
-            | u16::from(self.m5.is_some()) << 5
-            | u16::from(self.m6.is_some()) << 6
-            | u16::from(self.m7.is_some()) << 7
-            | u16::from(self.m8.is_some()) << 8
-            | u16::from(self.m9.is_some()) << 9
-            | u16::from(self.m10.is_some()) << 10
-            | u16::from(self.m11.is_some()) << 11
-        );
-        output.optional(self.m0);
-        output.optional(self.m1);
-        output.optional(self.m2);
-        output.optional(self.m3);
-        output.optional(self.m4);
-        output.optional(self.m5);
-        output.optional(self.m6);
-        output.optional(self.m7);
-        output.optional(self.m8);
-        output.optional(self.m9);
-        output.optional(self.m10);
-        output.optional(self.m11);
+        self.write_some(output);
         Ok(())
     }
 
+    #[inline]
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let present = input.presence::<u16>(0xfff)?;
         if present == 0xfff {
             let run = input.run::<18>(&[
@@ -1962,6 +1965,46 @@ impl codec::Composite for ReportManyOptional {
                 m11: Some(codec::Fixed::get(run, 17)),
             });
         }
+        Self::read_some(input, present)
+    }
+}
+
+impl ReportManyOptional {
+    #[inline(never)]
+    fn write_some(&self, output: &mut codec::Writer<'_>) {
+        let present =
+        u16::from(self.m0.is_some())
+        | u16::from(self.m1.is_some()) << 1
+        | u16::from(self.m2.is_some()) << 2
+        | u16::from(self.m3.is_some()) << 3
+        | u16::from(self.m4.is_some()) << 4
+        | u16::from(self.m5.is_some()) << 5
+        | u16::from(self.m6.is_some()) << 6
+        | u16::from(self.m7.is_some()) << 7
+        | u16::from(self.m8.is_some()) << 8
+        | u16::from(self.m9.is_some()) << 9
+        | u16::from(self.m10.is_some()) << 10
+        | u16::from(self.m11.is_some()) << 11;
+        let run = output.run::<4>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
+        output.optional(self.m0);
+        output.optional(self.m1);
+        output.optional(self.m2);
+        output.optional(self.m3);
+        output.optional(self.m4);
+        output.optional(self.m5);
+        output.optional(self.m6);
+        output.optional(self.m7);
+        output.optional(self.m8);
+        output.optional(self.m9);
+        output.optional(self.m10);
+        output.optional(self.m11);
+    }
+
+    #[inline(never)]
+    fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+        let mut input = place.clone();
         let m0 = input.optional(present & 0x1 != 0, "M0", codec::Reader::fixed)?;
         let m1 = input.optional(present & 0x2 != 0, "M1", codec::Reader::fixed)?;
         let m2 = input.optional(present & 0x4 != 0, "M2", codec::Reader::fixed)?;
@@ -1974,6 +2017,7 @@ impl codec::Composite for ReportManyOptional {
         let m9 = input.optional(present & 0x200 != 0, "M9", codec::Reader::fixed)?;
         let m10 = input.optional(present & 0x400 != 0, "M10", codec::Reader::fixed)?;
         let m11 = input.optional(present & 0x800 != 0, "M11", codec::Reader::fixed)?;
+        *place = input;
         Ok(Self {
             m0,
             m1,

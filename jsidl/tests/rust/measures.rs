@@ -55,21 +55,19 @@ impl codec::Message for SetPosition {
     const CODE: u16 = 0xF041;
     const NAME: &'static str = "SetPosition";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for SetPosition {
-    const MIN_LEN: usize = 6;
 
     fn encoded_len(&self) -> usize {
-        1
+        3
         + codec::Composite::encoded_len(&self.position)
         + self.reading.as_ref().map_or(0, codec::Composite::encoded_len)
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(
-            u8::from(self.reading.is_some())
-        );
+        let present =
+        u8::from(self.reading.is_some());
+        let run = output.run::<3>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
         output.member("Position", |output| codec::Composite::write(&self.position, output))?;
         if let Some(value) = &self.reading {
             output.member("Reading", |output| codec::Composite::write(value, output))?;
@@ -78,6 +76,7 @@ impl codec::Composite for SetPosition {
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let present = input.presence::<u8>(0x1)?;
         let position = input.member("Position", codec::Composite::read)?;
         let reading = input.optional(present & 0x1 != 0, "Reading", codec::Composite::read)?;

@@ -106,19 +106,16 @@ impl codec::Message for Option_ {
     const CODE: u16 = 0xF061;
     const NAME: &'static str = "Option";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for Option_ {
-    const MIN_LEN: usize = 11;
 
     fn encoded_len(&self) -> usize {
-        11
+        13
         + 2 * usize::from(self.present.is_some())
         + 2 * usize::from(self.value.is_some())
     }
 
+    #[inline]
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        if let &Self {
+        if let Self {
             r#type,
             self_,
             self_2,
@@ -130,39 +127,27 @@ impl codec::Composite for Option_ {
             value: Some(value),
         } = self
         {
-            let mut run = [0; 15];
-            codec::Fixed::put(0x3_u8, &mut run, 0);
-            codec::Fixed::put(r#type, &mut run, 1);
-            codec::Fixed::put(self_, &mut run, 2);
-            codec::Fixed::put(self_2, &mut run, 3);
-            codec::Fixed::put(super_, &mut run, 4);
-            codec::Fixed::put(input, &mut run, 5);
-            codec::Fixed::put(output_, &mut run, 7);
-            codec::Fixed::put(run_, &mut run, 9);
-            codec::Fixed::put(present, &mut run, 11);
-            codec::Fixed::put(value, &mut run, 13);
-            output.run(&run);
+            let run = output.run::<17>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(0x3_u8, run, 2);
+            codec::Fixed::put(*r#type, run, 3);
+            codec::Fixed::put(*self_, run, 4);
+            codec::Fixed::put(*self_2, run, 5);
+            codec::Fixed::put(*super_, run, 6);
+            codec::Fixed::put(*input, run, 7);
+            codec::Fixed::put(*output_, run, 9);
+            codec::Fixed::put(*run_, run, 11);
+            codec::Fixed::put(*present, run, 13);
+            codec::Fixed::put(*value, run, 15);
             return Ok(());
         }
-        output.fixed(
-            u8::from(self.present.is_some())
-            | u8::from(self.value.is_some()) << 1
-        );
-        let mut run = [0; 10];
-        codec::Fixed::put(self.r#type, &mut run, 0);
-        codec::Fixed::put(self.self_, &mut run, 1);
-        codec::Fixed::put(self.self_2, &mut run, 2);
-        codec::Fixed::put(self.super_, &mut run, 3);
-        codec::Fixed::put(self.input, &mut run, 4);
-        codec::Fixed::put(self.output, &mut run, 6);
-        codec::Fixed::put(self.run, &mut run, 8);
-        output.run(&run);
-        output.optional(self.present);
-        output.optional(self.value);
+        self.write_some(output);
         Ok(())
     }
 
+    #[inline]
     fn read(input_: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input_.code(Self::CODE)?;
         let present_ = input_.presence::<u8>(0x3)?;
         if present_ == 0x3 {
             let run_ = input_.run::<14>(&[
@@ -188,6 +173,33 @@ impl codec::Composite for Option_ {
                 value: Some(codec::Fixed::get(run_, 12)),
             });
         }
+        Self::read_some(input_, present_)
+    }
+}
+
+impl Option_ {
+    #[inline(never)]
+    fn write_some(&self, output: &mut codec::Writer<'_>) {
+        let present =
+        u8::from(self.present.is_some())
+        | u8::from(self.value.is_some()) << 1;
+        let run = output.run::<13>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
+        codec::Fixed::put(self.r#type, run, 3);
+        codec::Fixed::put(self.self_, run, 4);
+        codec::Fixed::put(self.self_2, run, 5);
+        codec::Fixed::put(self.super_, run, 6);
+        codec::Fixed::put(self.input, run, 7);
+        codec::Fixed::put(self.output, run, 9);
+        codec::Fixed::put(self.run, run, 11);
+        output.optional(self.present);
+        output.optional(self.value);
+    }
+
+    #[inline(never)]
+    fn read_some(place: &mut codec::Reader<'_>, present_: u64) -> Result<Self, codec::DecodeError> {
+        let mut input_ = place.clone();
         let run_ = input_.run::<10>(&[
             ("type", 1),
             ("self", 1),
@@ -206,6 +218,7 @@ impl codec::Composite for Option_ {
         let run = codec::Fixed::get(run_, 8);
         let present = input_.optional(present_ & 0x1 != 0, "present", codec::Reader::fixed)?;
         let value = input_.optional(present_ & 0x2 != 0, "value", codec::Reader::fixed)?;
+        *place = input_;
         Ok(Self {
             r#type,
             self_,
@@ -324,13 +337,9 @@ impl codec::Message for Result_ {
     const CODE: u16 = 0xF062;
     const NAME: &'static str = "Result";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for Result_ {
-    const MIN_LEN: usize = 1;
 
     fn encoded_len(&self) -> usize {
-        1
+        3
         + usize::from(self.input.is_some())
         + usize::from(self.present.is_some())
         + usize::from(self.run.is_some())
@@ -339,8 +348,9 @@ impl codec::Composite for Result_ {
         + usize::from(self.output.is_some())
     }
 
+    #[inline]
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        if let &Self {
+        if let Self {
             input: Some(input),
             present: Some(present),
             run: Some(run_),
@@ -349,35 +359,24 @@ impl codec::Composite for Result_ {
             output: Some(output_),
         } = self
         {
-            let mut run = [0; 7];
-            codec::Fixed::put(0x3f_u8, &mut run, 0);
-            codec::Fixed::put(input, &mut run, 1);
-            codec::Fixed::put(present, &mut run, 2);
-            codec::Fixed::put(run_, &mut run, 3);
-            codec::Fixed::put(object, &mut run, 4);
-            codec::Fixed::put(random, &mut run, 5);
-            codec::Fixed::put(output_, &mut run, 6);
-            output.run(&run);
+            let run = output.run::<9>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(0x3f_u8, run, 2);
+            codec::Fixed::put(*input, run, 3);
+            codec::Fixed::put(*present, run, 4);
+            codec::Fixed::put(*run_, run, 5);
+            codec::Fixed::put(*object, run, 6);
+            codec::Fixed::put(*random, run, 7);
+            codec::Fixed::put(*output_, run, 8);
             return Ok(());
         }
-        output.fixed(
-            u8::from(self.input.is_some())
-            | u8::from(self.present.is_some()) << 1
-            | u8::from(self.run.is_some()) << 2
-            | u8::from(self.object.is_some()) << 3
-            | u8::from(self.random.is_some()) << 4
-            | u8::from(self.output.is_some()) << 5
-        );
-        output.optional(self.input);
-        output.optional(self.present);
-        output.optional(self.run);
-        output.optional(self.object);
-        output.optional(self.random);
-        output.optional(self.output);
+        self.write_some(output);
         Ok(())
     }
 
+    #[inline]
     fn read(input_: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input_.code(Self::CODE)?;
         let present_ = input_.presence::<u8>(0x3f)?;
         if present_ == 0x3f {
             let run_ = input_.run::<6>(&[
@@ -397,12 +396,41 @@ impl codec::Composite for Result_ {
                 output: Some(codec::Fixed::get(run_, 5)),
             });
         }
+        Self::read_some(input_, present_)
+    }
+}
+
+impl Result_ {
+    #[inline(never)]
+    fn write_some(&self, output: &mut codec::Writer<'_>) {
+        let present =
+        u8::from(self.input.is_some())
+        | u8::from(self.present.is_some()) << 1
+        | u8::from(self.run.is_some()) << 2
+        | u8::from(self.object.is_some()) << 3
+        | u8::from(self.random.is_some()) << 4
+        | u8::from(self.output.is_some()) << 5;
+        let run = output.run::<3>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
+        output.optional(self.input);
+        output.optional(self.present);
+        output.optional(self.run);
+        output.optional(self.object);
+        output.optional(self.random);
+        output.optional(self.output);
+    }
+
+    #[inline(never)]
+    fn read_some(place: &mut codec::Reader<'_>, present_: u64) -> Result<Self, codec::DecodeError> {
+        let mut input_ = place.clone();
         let input = input_.optional(present_ & 0x1 != 0, "input", codec::Reader::fixed)?;
         let present = input_.optional(present_ & 0x2 != 0, "present", codec::Reader::fixed)?;
         let run = input_.optional(present_ & 0x4 != 0, "run", codec::Reader::fixed)?;
         let object = input_.optional(present_ & 0x8 != 0, "object", codec::Reader::fixed)?;
         let random = input_.optional(present_ & 0x10 != 0, "random", codec::Reader::fixed)?;
         let output = input_.optional(present_ & 0x20 != 0, "output", codec::Reader::fixed)?;
+        *place = input_;
         Ok(Self {
             input,
             present,
@@ -476,25 +504,24 @@ impl codec::Message for Vec_ {
     const CODE: u16 = 0xF063;
     const NAME: &'static str = "Vec";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for Vec_ {
-    const MIN_LEN: usize = 4;
 
     fn encoded_len(&self) -> usize {
-        1
+        3
         + 1 + self.none.iter().map(codec::Composite::encoded_len).sum::<usize>()
         + codec::Composite::encoded_len(&self.r#box)
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(self.some);
+        let run = output.run::<3>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.some, run, 2);
         output.member("None", |output| output.list::<u8, _>(&self.none, 0, 255, |value, output| codec::Composite::write(value, output)))?;
         output.member("Box", |output| codec::Composite::write(&self.r#box, output))?;
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let some = input.member("Some", codec::Reader::fixed)?;
         let none = input.member("None", |input| input.list::<u8, _>(0, 255, 1, codec::Composite::read))?;
         let r#box = input.member("Box", codec::Composite::read)?;
@@ -631,11 +658,13 @@ pub mod vec {
             1 + self.string.len()
         }
 
+        #[inline]
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
             output.member("String", |output| output.text::<u8>(&self.string, 0, 255))?;
             Ok(())
         }
 
+        #[inline]
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
             let string = input.member("String", |input| input.text::<u8>(0, 255))?;
             Ok(Self {
@@ -911,27 +940,24 @@ impl codec::Message for Codec {
     const CODE: u16 = 0xF064;
     const NAME: &'static str = "codec";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for Codec {
-    const MIN_LEN: usize = 5;
 
     fn encoded_len(&self) -> usize {
-        5
+        7
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let mut run = [0; 5];
-        codec::Fixed::put(self.position_rms, &mut run, 0);
-        codec::Fixed::put(self.position_rms_2, &mut run, 1);
-        codec::Fixed::put(self.position_rms_3, &mut run, 2);
-        codec::Fixed::put(self._9lives, &mut run, 3);
-        codec::Fixed::put(self.code, &mut run, 4);
-        output.run(&run);
+        let run = output.run::<7>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.position_rms, run, 2);
+        codec::Fixed::put(self.position_rms_2, run, 3);
+        codec::Fixed::put(self.position_rms_3, run, 4);
+        codec::Fixed::put(self._9lives, run, 5);
+        codec::Fixed::put(self.code, run, 6);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let run = input.run::<5>(&[
             ("Position_RMS", 1),
             ("PositionRMS", 1),
@@ -1036,20 +1062,18 @@ impl codec::Message for Move {
     const CODE: u16 = 0xF065;
     const NAME: &'static str = "move";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for Move {
-    const MIN_LEN: usize = 0;
 
     fn encoded_len(&self) -> usize {
-        0
+        2
     }
 
-    fn write(&self, _: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
         Ok(())
     }
 
-    fn read(_: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         Ok(Self)
     }
 }
@@ -1089,20 +1113,18 @@ impl codec::Message for Move2 {
     const CODE: u16 = 0xF066;
     const NAME: &'static str = "Move";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for Move2 {
-    const MIN_LEN: usize = 0;
 
     fn encoded_len(&self) -> usize {
-        0
+        2
     }
 
-    fn write(&self, _: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
         Ok(())
     }
 
-    fn read(_: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         Ok(Self)
     }
 }
@@ -1149,25 +1171,22 @@ impl codec::Message for ReportSame {
     const CODE: u16 = 0xF067;
     const NAME: &'static str = "ReportSame";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportSame {
-    const MIN_LEN: usize = 4;
 
     fn encoded_len(&self) -> usize {
-        4
+        6
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let mut run = [0; 4];
-        codec::Fixed::put(self.first_seq, &mut run, 0);
-        codec::Fixed::put(self.second_seq, &mut run, 1);
-        codec::Fixed::put(self.third_seq, &mut run, 3);
-        output.run(&run);
+        let run = output.run::<6>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.first_seq, run, 2);
+        codec::Fixed::put(self.second_seq, run, 3);
+        codec::Fixed::put(self.third_seq, run, 5);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let run = input.run::<4>(&[
             ("FirstSeq.SameRec.A", 1),
             ("SecondSeq.SameRec.A", 1),
@@ -1501,21 +1520,20 @@ impl codec::Message for SameRecAgain {
     const CODE: u16 = 0xF068;
     const NAME: &'static str = "SameRecAgain";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for SameRecAgain {
-    const MIN_LEN: usize = 2;
 
     fn encoded_len(&self) -> usize {
-        2
+        4
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(self.same_rec);
+        let run = output.run::<4>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.same_rec, run, 2);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let same_rec = input.member("SameRec", codec::Reader::fixed)?;
         Ok(Self {
             same_rec,

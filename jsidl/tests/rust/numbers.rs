@@ -82,32 +82,29 @@ impl codec::Message for ReportNumbers {
     const CODE: u16 = 0xF001;
     const NAME: &'static str = "ReportNumbers";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportNumbers {
-    const MIN_LEN: usize = 42;
 
     fn encoded_len(&self) -> usize {
-        42
+        44
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let mut run = [0; 42];
-        codec::Fixed::put(self.byte, &mut run, 0);
-        codec::Fixed::put(self.short, &mut run, 1);
-        codec::Fixed::put(self.integer, &mut run, 3);
-        codec::Fixed::put(self.long, &mut run, 7);
-        codec::Fixed::put(self.unsigned_byte, &mut run, 15);
-        codec::Fixed::put(self.unsigned_short, &mut run, 16);
-        codec::Fixed::put(self.unsigned_integer, &mut run, 18);
-        codec::Fixed::put(self.unsigned_long, &mut run, 22);
-        codec::Fixed::put(self.float, &mut run, 30);
-        codec::Fixed::put(self.long_float, &mut run, 34);
-        output.run(&run);
+        let run = output.run::<44>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.byte, run, 2);
+        codec::Fixed::put(self.short, run, 3);
+        codec::Fixed::put(self.integer, run, 5);
+        codec::Fixed::put(self.long, run, 9);
+        codec::Fixed::put(self.unsigned_byte, run, 17);
+        codec::Fixed::put(self.unsigned_short, run, 18);
+        codec::Fixed::put(self.unsigned_integer, run, 20);
+        codec::Fixed::put(self.unsigned_long, run, 24);
+        codec::Fixed::put(self.float, run, 32);
+        codec::Fixed::put(self.long_float, run, 36);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let run = input.run::<42>(&[
             ("Byte", 1),
             ("Short", 2),
@@ -313,28 +310,25 @@ impl codec::Message for SetScaled {
     const CODE: u16 = 0xF002;
     const NAME: &'static str = "SetScaled";
     const IS_COMMAND: bool = true;
-}
-
-impl codec::Composite for SetScaled {
-    const MIN_LEN: usize = 13;
 
     fn encoded_len(&self) -> usize {
-        13
+        15
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let mut run = [0; 13];
-        codec::Fixed::put(self.percent, &mut run, 0);
-        codec::Fixed::put(self.angle, &mut run, 1);
-        codec::Fixed::put(self.latitude, &mut run, 3);
-        codec::Fixed::put(self.fine, &mut run, 7);
-        codec::Fixed::put(self.below, &mut run, 11);
-        codec::Fixed::put(self.above, &mut run, 12);
-        output.run(&run);
+        let run = output.run::<15>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.percent, run, 2);
+        codec::Fixed::put(self.angle, run, 3);
+        codec::Fixed::put(self.latitude, run, 5);
+        codec::Fixed::put(self.fine, run, 9);
+        codec::Fixed::put(self.below, run, 13);
+        codec::Fixed::put(self.above, run, 14);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let run = input.run::<13>(&[
             ("Percent", 1),
             ("Angle", 2),
@@ -494,43 +488,36 @@ impl codec::Message for SetScaledOptional {
     const CODE: u16 = 0xF003;
     const NAME: &'static str = "SetScaledOptional";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for SetScaledOptional {
-    const MIN_LEN: usize = 2;
 
     fn encoded_len(&self) -> usize {
-        2
+        4
         + 4 * usize::from(self.latitude.is_some())
         + 2 * usize::from(self.heading.is_some())
     }
 
+    #[inline]
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        if let &Self {
+        if let Self {
             latitude: Some(latitude),
             request,
             heading: Some(heading),
         } = self
         {
-            let mut run = [0; 8];
-            codec::Fixed::put(0x3_u8, &mut run, 0);
-            codec::Fixed::put(latitude, &mut run, 1);
-            codec::Fixed::put(request, &mut run, 5);
-            codec::Fixed::put(heading, &mut run, 6);
-            output.run(&run);
+            let run = output.run::<10>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(0x3_u8, run, 2);
+            codec::Fixed::put(*latitude, run, 3);
+            codec::Fixed::put(*request, run, 7);
+            codec::Fixed::put(*heading, run, 8);
             return Ok(());
         }
-        output.fixed(
-            u8::from(self.latitude.is_some())
-            | u8::from(self.heading.is_some()) << 1
-        );
-        output.optional(self.latitude);
-        output.fixed(self.request);
-        output.optional(self.heading);
+        self.write_some(output);
         Ok(())
     }
 
+    #[inline]
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let present = input.presence::<u8>(0x3)?;
         if present == 0x3 {
             let run = input.run::<7>(&[
@@ -544,9 +531,31 @@ impl codec::Composite for SetScaledOptional {
                 heading: Some(codec::Fixed::get(run, 5)),
             });
         }
+        Self::read_some(input, present)
+    }
+}
+
+impl SetScaledOptional {
+    #[inline(never)]
+    fn write_some(&self, output: &mut codec::Writer<'_>) {
+        let present =
+        u8::from(self.latitude.is_some())
+        | u8::from(self.heading.is_some()) << 1;
+        let run = output.run::<3>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
+        output.optional(self.latitude);
+        output.fixed(self.request);
+        output.optional(self.heading);
+    }
+
+    #[inline(never)]
+    fn read_some(place: &mut codec::Reader<'_>, present: u64) -> Result<Self, codec::DecodeError> {
+        let mut input = place.clone();
         let latitude = input.optional(present & 0x1 != 0, "Latitude", codec::Reader::fixed)?;
         let request = input.member("Request", codec::Reader::fixed)?;
         let heading = input.optional(present & 0x2 != 0, "Heading", codec::Reader::fixed)?;
+        *place = input;
         Ok(Self {
             latitude,
             request,
@@ -624,26 +633,23 @@ impl codec::Message for ReportNamed {
     const CODE: u16 = 0xF004;
     const NAME: &'static str = "ReportNamed";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportNamed {
-    const MIN_LEN: usize = 6;
 
     fn encoded_len(&self) -> usize {
-        6
+        8
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let mut run = [0; 6];
-        codec::Fixed::put(self.state, &mut run, 0);
-        codec::Fixed::put(self.signed, &mut run, 1);
-        codec::Fixed::put(self.range, &mut run, 3);
-        codec::Fixed::put(self.both, &mut run, 5);
-        output.run(&run);
+        let run = output.run::<8>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.state, run, 2);
+        codec::Fixed::put(self.signed, run, 3);
+        codec::Fixed::put(self.range, run, 5);
+        codec::Fixed::put(self.both, run, 7);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let run = input.run::<6>(&[
             ("State", 1),
             ("Signed", 2),

@@ -62,23 +62,21 @@ impl codec::Message for SetTexts {
     const CODE: u16 = 0xF021;
     const NAME: &'static str = "SetTexts";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for SetTexts {
-    const MIN_LEN: usize = 14;
 
     fn encoded_len(&self) -> usize {
-        13
+        15
         + 1 + self.comment.len()
         + self.long.as_ref().map_or(0, |value| 2 + value.len())
         + 3 * usize::from(self.code.is_some())
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(
-            u8::from(self.long.is_some())
-            | u8::from(self.code.is_some()) << 1
-        );
+        let present =
+        u8::from(self.long.is_some())
+        | u8::from(self.code.is_some()) << 1;
+        let run = output.run::<3>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
         output.member("Name", |output| output.fixed_text(&self.name, 12))?;
         output.member("Comment", |output| output.text::<u8>(&self.comment, 0, 80))?;
         if let Some(value) = &self.long {
@@ -91,6 +89,7 @@ impl codec::Composite for SetTexts {
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let present = input.presence::<u8>(0x3)?;
         let name = input.member("Name", |input| input.fixed_text(12))?;
         let comment = input.member("Comment", |input| input.text::<u8>(0, 80))?;
@@ -163,13 +162,9 @@ impl codec::Message for SetBlobs {
     const CODE: u16 = 0xF022;
     const NAME: &'static str = "SetBlobs";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for SetBlobs {
-    const MIN_LEN: usize = 13;
 
     fn encoded_len(&self) -> usize {
-        2
+        4
         + 4 + self.message.len()
         + self.raw.as_ref().map_or(0, |value| 2 + value.len())
         + 5 + self.image.data.len()
@@ -177,10 +172,12 @@ impl codec::Composite for SetBlobs {
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(
-            u16::from(self.raw.is_some())
-            | u16::from(self.extra.is_some()) << 1
-        );
+        let present =
+        u16::from(self.raw.is_some())
+        | u16::from(self.extra.is_some()) << 1;
+        let run = output.run::<4>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(present, run, 2);
         output.member("Message", |output| output.blob::<u32>(&self.message, 2, 2147483647))?;
         if let Some(value) = &self.raw {
             output.member("Raw", |output| output.blob::<u16>(value, 0, 65535))?;
@@ -193,6 +190,7 @@ impl codec::Composite for SetBlobs {
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let present = input.presence::<u16>(0x3)?;
         let message = input.member("Message", |input| input.blob::<u32>(2, 2147483647))?;
         let raw = input.optional(present & 0x1 != 0, "Raw", |input| input.blob::<u16>(0, 65535))?;

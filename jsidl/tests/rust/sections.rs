@@ -57,24 +57,23 @@ impl codec::Message for ReportSections {
     const CODE: u16 = 0xF071;
     const NAME: &'static str = "ReportSections";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportSections {
-    const MIN_LEN: usize = 4;
 
     fn encoded_len(&self) -> usize {
-        3
+        5
         + 1 + self.body.len()
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(self.header);
+        let run = output.run::<3>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.header, run, 2);
         output.member("body", |output| output.list::<u8, _>(&self.body, 0, 255, |value, output| { output.fixed(*value); Ok(()) }))?;
         output.fixed(self.footer);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let header = input.member("header", codec::Reader::fixed)?;
         let body = input.member("body", |input| input.list::<u8, _>(0, 255, 1, codec::Reader::fixed))?;
         let footer = input.member("footer", codec::Reader::fixed)?;

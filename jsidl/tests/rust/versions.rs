@@ -92,24 +92,21 @@ impl codec::Message for ReportState {
     const CODE: u16 = 0xF081;
     const NAME: &'static str = "ReportState";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportState {
-    const MIN_LEN: usize = 5;
 
     fn encoded_len(&self) -> usize {
-        5
+        7
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        let mut run = [0; 5];
-        codec::Fixed::put(self.speed, &mut run, 0);
-        codec::Fixed::put(self.mode, &mut run, 4);
-        output.run(&run);
+        let run = output.run::<7>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.speed, run, 2);
+        codec::Fixed::put(self.mode, run, 6);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let run = input.run::<5>(&[
             ("Speed", 4),
             ("Mode", 1),
@@ -196,21 +193,20 @@ impl codec::Message for ReportMode {
     const CODE: u16 = 0xF082;
     const NAME: &'static str = "ReportMode";
     const IS_COMMAND: bool = false;
-}
-
-impl codec::Composite for ReportMode {
-    const MIN_LEN: usize = 1;
 
     fn encoded_len(&self) -> usize {
-        1
+        3
     }
 
     fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-        output.fixed(self.mode);
+        let run = output.run::<3>();
+        codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+        codec::Fixed::put(self.mode, run, 2);
         Ok(())
     }
 
     fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
         let mode = input.member("Mode", codec::Reader::fixed)?;
         Ok(Self {
             mode,
@@ -289,24 +285,21 @@ pub mod v1_0 {
         const CODE: u16 = 0xF081;
         const NAME: &'static str = "ReportState";
         const IS_COMMAND: bool = false;
-    }
-
-    impl codec::Composite for ReportState {
-        const MIN_LEN: usize = 3;
 
         fn encoded_len(&self) -> usize {
-            3
+            5
         }
 
         fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
-            let mut run = [0; 3];
-            codec::Fixed::put(self.speed, &mut run, 0);
-            codec::Fixed::put(self.mode, &mut run, 2);
-            output.run(&run);
+            let run = output.run::<5>();
+            codec::Fixed::put(<Self as codec::Message>::CODE, run, 0);
+            codec::Fixed::put(self.speed, run, 2);
+            codec::Fixed::put(self.mode, run, 4);
             Ok(())
         }
 
         fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+            input.code(Self::CODE)?;
             let run = input.run::<3>(&[
                 ("Speed", 2),
                 ("Mode", 1),

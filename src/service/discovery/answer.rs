@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::Discovery;
 use crate::address::JausId;
-use crate::codec::{Composite, Text};
+use crate::codec::{Composite, Message, Text};
 use crate::endpoint::Received;
 use crate::messages::core::{
     QueryConfiguration, QueryIdentification, QueryServiceList, QueryServices, ReportConfiguration,

@@ -1,0 +1,161 @@
+//! Encoding and decoding of seven telling messages, beside a hand-written minimum and a copy of
+//! the octets in the same run.
+//!
+//! | | |
+//! |---|---|
+//! | pose32 | ReportGlobalPose, all nine optional fields |
+//! | pose16 | the same with four of them |
+//! | wrench26 | SetWrenchEffort, all twelve optional fields |
+//! | services | ReportServices: 4 components of 6 services each, lists and strings |
+//! | elements | SetElement: 32 elements with 20 octets of data each |
+//! | time10 | ReportTime: two bit fields |
+//! | event64k | Event with 64 KiB of report |
+//!
+//! A figure is the *least* time per operation over short batches: what the code takes while nobody
+//! else wants the processor. `encode` appends to a buffer that is there already; `bytes` makes new
+//! shared octets.
+#![allow(missing_docs, clippy::unwrap_used, reason = "a bench")]
+
+mod hand;
+mod samples;
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use criterion::measurement::WallTime;
+use criterion::{Bencher, BenchmarkGroup, Criterion, criterion_group, criterion_main};
+use jaus::codec::Message;
+
+/// Runs in batches and counts each of them as long as the shortest.
+fn least<T>(bencher: &mut Bencher<'_>, mut operation: impl FnMut() -> T) {
+    #[expect(clippy::disallowed_methods, reason = "a bench reads the clock")]
+    let now = Instant::now;
+    bencher.iter_custom(|iterations| {
+        let batch = iterations.clamp(1, 512);
+        let mut shortest = Duration::MAX;
+        for _ in 0..iterations.div_ceil(batch).max(16) {
+            let start = now();
+            for _ in 0..batch {
+                black_box(operation());
+            }
+            shortest = shortest.min(now() - start);
+        }
+        shortest.mul_f64(iterations as f64 / batch as f64)
+    });
+}
+
+/// The codec of a message, and the limit.
+fn codec<M: Message>(group: &mut BenchmarkGroup<'_, WallTime>, message: &M) {
+    let octets = message.encode().unwrap();
+    let mut buffer = Vec::with_capacity(octets.len());
+    group.bench_function("encode", |bencher| {
+        least(bencher, || {
+            buffer.clear();
+            black_box(message).encode_into(&mut buffer).unwrap();
+            black_box(&buffer);
+        });
+    });
+    group.bench_function("bytes", |bencher| {
+        least(bencher, || black_box(&black_box(message).encode()).is_ok());
+    });
+    group.bench_function("decode", |bencher| {
+        least(bencher, || {
+            black_box(&M::decode(black_box(&octets))).is_ok()
+        });
+    });
+    group.bench_function("memcpy", |bencher| {
+        least(bencher, || {
+            buffer.clear();
+            buffer.extend_from_slice(black_box(&octets));
+            black_box(&buffer);
+        });
+    });
+    assert_eq!(M::decode(&octets).unwrap(), *message);
+}
+
+/// A hand-written minimum that must do the same.
+fn by_hand<M: Message, H>(
+    group: &mut BenchmarkGroup<'_, WallTime>,
+    message: &M,
+    decode: impl Fn(&Bytes) -> H,
+    encode: impl Fn(&H, &mut Vec<u8>),
+) {
+    let octets = message.encode().unwrap();
+    let value = decode(&octets);
+    let mut buffer = Vec::with_capacity(octets.len());
+    encode(&value, &mut buffer);
+    assert_eq!(buffer, octets);
+    group.bench_function("encode by hand", |bencher| {
+        least(bencher, || {
+            buffer.clear();
+            encode(black_box(&value), &mut buffer);
+            black_box(&buffer);
+        });
+    });
+    group.bench_function("decode by hand", |bencher| {
+        least(bencher, || {
+            black_box(&decode(black_box(&octets)));
+        });
+    });
+}
+
+fn benches(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("pose32");
+    codec(&mut group, &samples::pose32());
+    by_hand(
+        &mut group,
+        &samples::pose32(),
+        hand::Pose::decode,
+        hand::Pose::encode,
+    );
+    group.finish();
+
+    let mut group = criterion.benchmark_group("pose16");
+    codec(&mut group, &samples::pose16());
+    group.finish();
+
+    let mut group = criterion.benchmark_group("wrench26");
+    codec(&mut group, &samples::wrench());
+    group.finish();
+
+    let mut group = criterion.benchmark_group("services");
+    codec(&mut group, &samples::services());
+    by_hand(
+        &mut group,
+        &samples::services(),
+        hand::services::decode,
+        |nodes, buffer| {
+            hand::services::encode(nodes, buffer);
+        },
+    );
+    group.finish();
+
+    let mut group = criterion.benchmark_group("elements");
+    codec(&mut group, &samples::elements());
+    by_hand(
+        &mut group,
+        &samples::elements(),
+        hand::Elements::decode,
+        hand::Elements::encode,
+    );
+    group.finish();
+
+    let mut group = criterion.benchmark_group("time10");
+    codec(&mut group, &samples::time());
+    group.finish();
+
+    let mut group = criterion.benchmark_group("event64k");
+    codec(&mut group, &samples::event());
+    group.finish();
+}
+
+criterion_group! {
+    name = all;
+    config = Criterion::default()
+        .warm_up_time(Duration::from_millis(100))
+        .measurement_time(Duration::from_millis(400))
+        .sample_size(10);
+    targets = benches
+}
+criterion_main!(all);
