@@ -6,7 +6,7 @@ use super::dictionary::Dictionary;
 use super::large::LargeMessages;
 use super::line::{Content, Envelope, Header, Line};
 use super::{Datagram, Timestamp};
-use crate::wire::{DataControl, Frame, Version, judp};
+use crate::wire::{self, DataControl, Frame, Version, judp};
 
 /// Reads datagrams one after the other and gives a [`Line`] for every message.
 ///
@@ -44,42 +44,40 @@ impl<'d> MessageLog<'d> {
 
     /// The messages of a datagram, or why there is none.
     pub fn read(&mut self, time: Option<Timestamp>, datagram: &Datagram<'_>) -> Vec<Line<'d>> {
-        let octets = Bytes::copy_from_slice(&datagram.payload);
-        let mut frames = match judp::frames(octets.clone()) {
-            Ok(frames) => frames,
-            Err(error) => {
-                let envelope = Envelope { time, header: None };
-                return vec![Line::of_error(Some(envelope), &error, error.offset as u64)];
-            }
-        };
         let mut lines = Vec::new();
-        let mut node = None;
+        let octets = Bytes::copy_from_slice(&datagram.payload);
+        if let Err(error) = self.messages(time, octets, &mut lines) {
+            let envelope = Envelope { time, header: None };
+            let sentence = match datagram.missing {
+                0 => error.to_string(),
+                missing => format!("{error}; the capture left out {missing} octets"),
+            };
+            let offset = error.offset as u64;
+            lines.push(Line::of_error(Some(envelope), &sentence, offset));
+        }
+        lines
+    }
+
+    /// Adds the lines of a datagram's messages.
+    fn messages(
+        &mut self,
+        time: Option<Timestamp>,
+        octets: Bytes,
+        lines: &mut Vec<Line<'d>>,
+    ) -> Result<(), wire::Error> {
+        let mut frames = judp::frames(octets)?;
+        let mut sender = None;
         loop {
-            let offset = frames.offset();
-            match frames.next() {
-                Some(Ok(frame)) => {
-                    let sender = frame.source.whole_node();
-                    if *node.get_or_insert(sender) != sender {
-                        self.stale_octets += (octets.len() - offset) as u64;
-                        return lines;
-                    }
-                    self.message(time, &frame, &mut lines);
-                }
-                Some(Err(error)) => {
-                    let envelope = Envelope { time, header: None };
-                    let offset = error.offset as u64;
-                    let error = match datagram.missing {
-                        0 => error.to_string(),
-                        missing => format!("{error}; the capture left out {missing} octets"),
-                    };
-                    lines.push(Line::of_error(Some(envelope), &error, offset));
-                    return lines;
-                }
-                None => {
-                    self.stale_octets += frames.remaining() as u64;
-                    return lines;
-                }
-            }
+            let rest = frames.remaining();
+            let frame = frames.next().transpose()?.filter(|frame| {
+                let node = frame.source.whole_node();
+                *sender.get_or_insert(node) == node
+            });
+            let Some(frame) = frame else {
+                self.stale_octets += rest as u64;
+                return Ok(());
+            };
+            self.message(time, &frame, lines);
         }
     }
 
