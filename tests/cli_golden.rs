@@ -205,7 +205,30 @@ fn a_service_that_is_named_must_exist() {
 
 #[test]
 fn definitions_that_cannot_be_loaded_are_refused() {
-    let run = run(&["decode", "--hex", "--jsidl", "no/such/folder"], b"");
-    assert!(run.stderr.contains("no/such/folder"), "{}", run.stderr);
-    assert_eq!(run.status, 2);
+    let missing = run(&["decode", "--hex", "--jsidl", "no/such/folder"], b"");
+    assert!(
+        missing.stderr.contains("no/such/folder"),
+        "{}",
+        missing.stderr
+    );
+    assert_eq!(missing.status, 2);
+
+    let file = std::env::temp_dir().join(format!("jaus-cli-{}.xml", std::process::id()));
+    let text =
+        "<service_def xmlns=\"urn:jaus:jsidl:1.0\" name=\"X\" id=\"urn:x\" version=\"1.0\"/>";
+    std::fs::write(&file, text).unwrap();
+    let path = file.to_str().unwrap();
+    let wrong = run(&["decode", "--hex", "--jsidl", path], b"");
+    std::fs::remove_file(&file).unwrap();
+    assert!(
+        wrong.stderr.contains(&format!("{path}:1:1: error:")),
+        "{}",
+        wrong.stderr
+    );
+    assert!(
+        wrong.stderr.contains("no message definition"),
+        "{}",
+        wrong.stderr
+    );
+    assert_eq!(wrong.status, 2);
 }

@@ -35,8 +35,8 @@ pub struct Dictionary {
 /// What [`Dictionary::load`] did.
 #[derive(Debug)]
 pub struct Added {
-    /// How many services were added.
-    pub services: usize,
+    /// How many messages were added, those counted twice that a service both receives and sends.
+    pub messages: usize,
     /// What is wrong with the definitions.
     pub diagnostics: Diagnostics,
 }
@@ -121,7 +121,7 @@ impl Dictionary {
             self.add(service);
         }
         Added {
-            services: services.len(),
+            messages: services.iter().flat_map(|s| s.messages()).count(),
             diagnostics,
         }
     }

@@ -11,8 +11,8 @@ use crate::failure::Failure;
 pub(crate) struct Definitions {
     /// Add the service definitions of a JSIDL file or directory (repeatable)
     ///
-    /// They come before the built-in ones. Mistakes in them are listed on standard error; services
-    /// without a mistake are used.
+    /// They come before the built-in ones. Mistakes in them are listed on standard error; what has
+    /// none is used.
     #[arg(long, value_name = "PATH")]
     jsidl: Vec<PathBuf>,
 
@@ -45,13 +45,13 @@ impl Definitions {
         for diagnostic in added.diagnostics.errors() {
             eprintln!("jaus: {diagnostic}");
         }
-        if added.services > 0 {
+        if added.messages > 0 {
             return Ok(());
         }
         let paths = self.jsidl.iter().map(|path| path.display().to_string());
         let paths: Vec<_> = paths.collect();
         Err(Failure::new(format!(
-            "no service could be loaded from {}",
+            "no message definition could be loaded from {}",
             paths.join(", ")
         )))
     }
