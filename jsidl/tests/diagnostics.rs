@@ -975,7 +975,7 @@ t.xml:4:33: error: `word` is not a value of `const_type`: use `byte`, `short int
 fn several_mistakes_in_one_file_are_all_reported() {
     check(
         &text(
-            r#"<service_def name="S" id="urn:s" version="1.0" xmlns="urn:jaus:jsidl:1.0" xmlns:n="urn:jaus:jsidl:1.1">
+            r#"<service_def name="S" id="urn:s" version="one" xmlns="urn:jaus:jsidl:1.0" xmlns:n="urn:jaus:jsidl:1.1">
 <declared_type_set name="T">
 <fixed_field name="F" field_type="unsigned byte" field_units="one">
 <scale_range real_lower_limit="2" real_upper_limit="1" integer_function="round"/>
@@ -989,6 +989,7 @@ fn several_mistakes_in_one_file_are_all_reported() {
 <declared_message_def name="B" declared_type_ref="T.B"/></input_set></message_set></service_def>"#,
         ),
         r#"
+t.xml:1:43: error: `one` cannot be a version: write two numbers from 0 to 255, for example `1.0`
 t.xml:4:1: error: the limits of the scale are 2 and 1: the lower one must be less than the upper one
 t.xml:6:20: error: `A` is optional, but the record `R` has no `presence_vector`: add one, or set `optional="false"`
 t.xml:8:1: error: `message_set` lacks the element `output_set`: add it

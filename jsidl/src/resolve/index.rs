@@ -35,7 +35,8 @@ impl<'a> Index<'a> {
     pub(super) fn new(program: &'a Program) -> Self {
         let type_sets = program.type_sets.iter().map(|s| (s.id.as_ref(), s.span));
         let const_sets = program.const_sets.iter().map(|s| (s.id.as_ref(), s.span));
-        let services = program.services.iter().map(|s| (Some(&s.id), s.span));
+        let services = program.services.iter();
+        let services = services.map(|s| (Some(&s.id).filter(|_| s.sound), s.span));
         let declared = |set: &'a TypeSet| set.declarations.iter().map(|d| d.name.as_str());
         let defined = |set: &'a ConstSet| set.definitions.iter().map(|d| d.name.as_str());
         Self {

@@ -20,7 +20,7 @@ use crate::check;
 use crate::diagnostic::Report;
 use crate::expr::Value;
 use crate::library::Library;
-use crate::model::{Item, Location, Message};
+use crate::model::{Id, Item, Location, Message};
 use crate::source::{Sources, Span};
 use crate::syntax::{Program, TypeSetIndex};
 
@@ -38,6 +38,7 @@ const MOST_ITEMS: usize = 200_000;
 
 /// Resolves everything that was read. What is sound comes back, what is not is in the report.
 pub(crate) fn resolve(program: &Program, sources: &Sources, report: &mut Report) -> Library {
+    let lost = program.services.iter().filter(|service| !service.sound);
     let mut resolver = Resolver {
         program,
         sources,
@@ -49,6 +50,7 @@ pub(crate) fn resolve(program: &Program, sources: &Sources, report: &mut Report)
             .map(|set| vec![Memo::Unseen; set.declarations.len()])
             .collect(),
         constants: HashMap::new(),
+        lost: lost.map(|service| &service.id).collect(),
         complained: HashSet::new(),
         nesting: 0,
         items_left: Some(MOST_ITEMS),
@@ -67,6 +69,8 @@ struct Resolver<'a> {
     declarations: Vec<Vec<Memo<Resolved>>>,
     /// By constant set and position in it.
     constants: HashMap<(usize, usize), Memo<Value>>,
+    /// Services that are there but cannot be kept.
+    lost: HashSet<&'a Id>,
     /// Places about which something has been said that is to be said once.
     complained: HashSet<Span>,
     nesting: usize,

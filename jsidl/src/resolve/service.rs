@@ -20,7 +20,7 @@ impl Resolver<'_> {
         let mut kept = Vec::new();
         for definition in &self.program.services {
             let (service, places) = self.service(definition);
-            if !self.lineage_is_sound(definition) {
+            if !definition.sound || !self.lineage_is_sound(definition) {
                 continue;
             }
             if let Some(first) = library.service(&service.id) {
@@ -136,8 +136,7 @@ impl Resolver<'_> {
         let names = references.map(|r| (r.name.as_str(), r.span));
         check::unique(self.report, "references", names);
         for client in &definition.client_of {
-            let lost = self.program.lost_services.contains(&client.id);
-            if !lost && self.index.services.first(&client.id).is_none() {
+            if !self.lost.contains(&client.id) && self.index.services.first(&client.id).is_none() {
                 let id = &client.id;
                 self.report.warning(
                     client.span,
@@ -188,7 +187,7 @@ impl Resolver<'_> {
         service: &ServiceDef,
         base: &SetRef,
     ) {
-        let message = if self.program.lost_services.contains(&base.id) {
+        let message = if self.lost.contains(&base.id) {
             format!(
                 "`{}` is left out: it inherits from `{}`, which has errors",
                 heir.id, base.id

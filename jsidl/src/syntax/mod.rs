@@ -10,8 +10,6 @@ mod limits;
 mod message;
 mod root;
 
-use std::collections::HashSet;
-
 use crate::expr::Expression;
 use crate::model::{GroupKind, Id, Number, Rounding, Unsigned};
 use crate::source::{Span, Spanned};
@@ -25,8 +23,6 @@ pub(crate) struct Program {
     pub(crate) services: Vec<ServiceDef>,
     pub(crate) type_sets: Vec<TypeSet>,
     pub(crate) const_sets: Vec<ConstSet>,
-    /// Services that could not be kept; the mistakes have been reported.
-    pub(crate) lost_services: HashSet<Id>,
 }
 
 /// Index of a type set in [`Program::type_sets`].
@@ -46,6 +42,9 @@ pub(crate) struct ServiceDef {
     pub(crate) inputs: Vec<Declaration>,
     pub(crate) outputs: Vec<Declaration>,
     pub(crate) events: Vec<Declaration>,
+    /// Whether it can be identified and says what it refers to. If not, it is looked at for
+    /// further mistakes and then left out.
+    pub(crate) sound: bool,
 }
 
 /// A local name for something that is identified by URN and version: `inherits_from`,

@@ -7,6 +7,7 @@ use super::limits;
 use super::message::DeclarationPlace;
 use super::{ConstDef, ConstSet, Construct, Declaration, Program, ServiceDef, SetRef, TypeSet};
 use crate::diagnostic::Report;
+use crate::model::{Id, Version};
 use crate::source::{Source, Span};
 
 /// Sets that one set may refer to; published ones refer to at most 10.
@@ -139,7 +140,7 @@ impl Reader<'_> {
             }
             (Belongs::Jsidl, "service_def") => {
                 let service = self.service(xml, program);
-                program.services.extend(service);
+                program.services.push(service);
             }
             (Belongs::Jsidl, "declared_type_set") => {
                 let id = self.id(xml);
@@ -179,7 +180,7 @@ impl Reader<'_> {
         }
     }
 
-    fn service(&mut self, xml: Xml<'_, '_>, program: &mut Program) -> Option<ServiceDef> {
+    fn service(&mut self, xml: Xml<'_, '_>, program: &mut Program) -> ServiceDef {
         self.only(
             xml,
             &["name", "id", "version", "deprecated", "interpretation"],
@@ -187,6 +188,34 @@ impl Reader<'_> {
         let before = self.report.errors();
         let name = self.name(xml);
         let id = self.id(xml);
+        let parts = self.service_parts(xml);
+        let (inherits_from, client_of) = match parts.references {
+            Some(references) => self.references(references),
+            None => (None, Vec::new()),
+        };
+        let sound = self.report.errors() == before;
+        let types = self.inner_types(xml, &parts, program);
+        let [inputs, outputs] = self.message_set(xml, parts.messages);
+        let events = parts.events.map(|events| {
+            self.only(events, &[]);
+            self.declarations(events, &EVENT_SET)
+        });
+        ServiceDef {
+            span: self.span(xml),
+            id: id.unwrap_or_else(stand_in),
+            name: name.unwrap_or_default(),
+            description: parts.description,
+            inherits_from,
+            client_of,
+            types,
+            inputs,
+            outputs,
+            events: events.unwrap_or_default(),
+            sound,
+        }
+    }
+
+    fn service_parts<'a, 'x>(&mut self, xml: Xml<'a, 'x>) -> ServiceParts<'a, 'x> {
         let mut parts = ServiceParts::default();
         for child in self.children(xml) {
             match child.tag_name().name() {
@@ -207,34 +236,7 @@ impl Reader<'_> {
                 ),
             }
         }
-        let (inherits_from, client_of) = match parts.references {
-            Some(references) => self.references(references),
-            None => (None, Vec::new()),
-        };
-        let identity_is_sound = self.report.errors() == before;
-        let types = self.inner_types(xml, &parts, program);
-        let [inputs, outputs] = self.message_set(xml, parts.messages);
-        let events = parts.events.map(|events| {
-            self.only(events, &[]);
-            self.declarations(events, &EVENT_SET)
-        });
-        // The messages have been looked at for their mistakes even if the service is lost.
-        if !identity_is_sound {
-            program.lost_services.extend(id);
-            return None;
-        }
-        Some(ServiceDef {
-            span: self.span(xml),
-            name: name?,
-            id: id?,
-            description: parts.description,
-            inherits_from,
-            client_of,
-            types,
-            inputs,
-            outputs,
-            events: events.unwrap_or_default(),
-        })
+        parts
     }
 
     /// Reads the sets inside a service; the type set sees the constants as its own.
@@ -394,6 +396,14 @@ impl Reader<'_> {
             number: number?,
             value: value?,
         })
+    }
+}
+
+/// In place of an identity that could not be read.
+fn stand_in() -> Id {
+    Id {
+        urn: "(unreadable)".into(),
+        version: Version { major: 0, minor: 0 },
     }
 }
 
