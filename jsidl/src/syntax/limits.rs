@@ -14,14 +14,16 @@ const MOST_ATTRIBUTES: usize = 50;
 /// force. Published files have at most 20.
 const MOST_NAMESPACES: usize = 2_000;
 
-/// Says where a text exceeds what a definition can need, and what it exceeds.
+/// Says where a text exceeds what a definition can need, and what to do about it.
 pub(super) fn excess(text: &str) -> Option<(usize, String)> {
     if text.len() as u64 > LARGEST {
-        let message = format!("the text is larger than {} MiB", LARGEST >> 20);
+        let message = format!("the text is larger than {} MiB: split it", LARGEST >> 20);
         return Some((0, message));
     }
     if let Some((at, _)) = text.match_indices("xmlns").nth(MOST_NAMESPACES) {
-        let message = format!("there are more than {MOST_NAMESPACES} namespace declarations");
+        let message = format!(
+            "there are more than {MOST_NAMESPACES} namespace declarations: put them at the root"
+        );
         return Some((at, message));
     }
     let mut depth = 0_usize;
@@ -35,7 +37,9 @@ pub(super) fn excess(text: &str) -> Option<(usize, String)> {
         }
         let tag = Tag::scan(rest);
         if tag.attributes > MOST_ATTRIBUTES {
-            let message = format!("the element has more than {MOST_ATTRIBUTES} attributes");
+            let message = format!(
+                "the element has more than {MOST_ATTRIBUTES} attributes: JSIDL knows at most seven"
+            );
             return Some((start, message));
         }
         match tag.kind {
@@ -44,7 +48,7 @@ pub(super) fn excess(text: &str) -> Option<(usize, String)> {
             TagKind::Empty => {}
         }
         if depth > DEEPEST {
-            let message = format!("elements are nested more than {DEEPEST} deep");
+            let message = format!("elements are nested more than {DEEPEST} deep: flatten them");
             return Some((start, message));
         }
         at = start + tag.length;

@@ -70,6 +70,19 @@ pub(crate) struct TypeSet {
     pub(crate) declarations: Vec<Declaration>,
 }
 
+impl TypeSet {
+    fn empty(span: Span) -> Self {
+        Self {
+            span,
+            id: None,
+            type_sets: Vec::new(),
+            const_sets: Vec::new(),
+            constants: None,
+            declarations: Vec::new(),
+        }
+    }
+}
+
 /// `declared_const_set`
 #[derive(Debug)]
 pub(crate) struct ConstSet {

@@ -10,22 +10,6 @@ use crate::diagnostic::Report;
 use crate::model::{Id, Version};
 use crate::source::{Source, Span};
 
-/// Sets that one set may refer to; published ones refer to at most 10.
-const MOST_REFERENCES: usize = 200;
-
-impl TypeSet {
-    fn empty(span: Span) -> Self {
-        Self {
-            span,
-            id: None,
-            type_sets: Vec::new(),
-            const_sets: Vec::new(),
-            constants: None,
-            declarations: Vec::new(),
-        }
-    }
-}
-
 /// What to think of an XML file that has nothing to do with the language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Strictness {
@@ -44,7 +28,7 @@ pub(crate) fn read(
 ) {
     let text = source.text();
     if let Some((at, what)) = limits::excess(text) {
-        report.error(source.span(at), format!("{what}: split the file"));
+        report.error(source.span(at), what);
         return;
     }
     // A node takes at least three octets of text, so the size limit bounds the nodes as well.
@@ -103,6 +87,9 @@ const ROOTS: [&str; 4] = [
     "declared_const_set",
     "service_set",
 ];
+
+/// Sets that one set may refer to; published ones refer to at most 10.
+const MOST_REFERENCES: usize = 200;
 
 const TYPE_SET: DeclarationPlace = DeclarationPlace {
     parent: "declared_type_set",
