@@ -64,7 +64,6 @@ impl Scale {
 
     /// The integer for a real number, exactly rounded; `None` for what is outside the range or not
     /// a number.
-    #[inline]
     pub fn raw(&self, value: f64) -> Option<u64> {
         if !(self.lower <= value && value <= self.upper) {
             return None;
@@ -297,14 +296,17 @@ macro_rules! __codec_scaled {
         $crate::codec::if_serde! {
             impl $crate::codec::view::View for $name {
                 fn view(&self) -> $crate::codec::view::Value {
-                    let scale = <Self as $crate::codec::Scaled>::SCALE;
-                    $crate::codec::view::Value::Real(scale.shortest(u64::from(self.0)))
+                    let scale = &<Self as $crate::codec::Scaled>::SCALE;
+                    $crate::codec::view::scaled(scale, u64::from(self.0))
                 }
 
                 fn from_view(
                     value: &$crate::codec::view::Value,
                 ) -> Result<Self, $crate::codec::view::Error> {
-                    Ok(Self::new(value.number()?)?)
+                    let scale = &<Self as $crate::codec::Scaled>::SCALE;
+                    let out_of_range = $crate::codec::OutOfRange::of::<Self>;
+                    let raw = $crate::codec::view::raw_scaled(value, scale, out_of_range)?;
+                    Ok(Self(raw as $raw))
                 }
             }
         }

@@ -15,12 +15,11 @@ pub(super) fn group(out: &mut Writer, ident: &str, fields: &[Field<'_>]) {
         "let object = "
     };
     begin(out, ident);
-    out.push("codec::view::Value::object([");
+    out.push(format!("codec::view::Value::object({})", fields.len()));
     for field in fields {
         let value = format!("codec::view::View::view(&self.{})", field.ident);
-        out.push(format!("({:?}, {value}),", field.item.name));
+        out.push(format!(".with({:?}, {value})", field.item.name));
     }
-    out.push("])");
     middle(out);
     out.push(format!(
         "{object}codec::view::Object::new(value, &{names:?})?;"

@@ -143,17 +143,16 @@ impl codec::Message for ReportArrays {
 codec::if_serde! {
     impl codec::view::View for ReportArrays {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Vector", codec::view::View::view(&self.vector)),
-                ("Matrix", codec::view::View::view(&self.matrix)),
-                ("Cube", codec::view::View::view(&self.cube)),
-                ("Many", codec::view::View::view(&self.many)),
-                ("Names", codec::view::View::view(&self.names)),
-                ("Grid", codec::view::View::view(&self.grid)),
-                ("Stamps", codec::view::View::view(&self.stamps)),
-                ("Maybe", codec::view::View::view(&self.maybe)),
-                ("Codes", codec::view::View::view(&self.codes)),
-            ])
+            codec::view::Value::object(9)
+            .with("Vector", codec::view::View::view(&self.vector))
+            .with("Matrix", codec::view::View::view(&self.matrix))
+            .with("Cube", codec::view::View::view(&self.cube))
+            .with("Many", codec::view::View::view(&self.many))
+            .with("Names", codec::view::View::view(&self.names))
+            .with("Grid", codec::view::View::view(&self.grid))
+            .with("Stamps", codec::view::View::view(&self.stamps))
+            .with("Maybe", codec::view::View::view(&self.maybe))
+            .with("Codes", codec::view::View::view(&self.codes))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -318,9 +317,8 @@ pub mod report_array_list {
     codec::if_serde! {
         impl codec::view::View for RowRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Row", codec::view::View::view(&self.row)),
-                ])
+                codec::view::Value::object(1)
+                .with("Row", codec::view::View::view(&self.row))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {

@@ -147,12 +147,11 @@ impl ReportTime {
 codec::if_serde! {
     impl codec::view::View for ReportTime {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("TimeStamp", codec::view::View::view(&self.time_stamp)),
-                ("Flags", codec::view::View::view(&self.flags)),
-                ("Wide", codec::view::View::view(&self.wide)),
-                ("Whole", codec::view::View::view(&self.whole)),
-            ])
+            codec::view::Value::object(4)
+            .with("TimeStamp", codec::view::View::view(&self.time_stamp))
+            .with("Flags", codec::view::View::view(&self.flags))
+            .with("Wide", codec::view::View::view(&self.wide))
+            .with("Whole", codec::view::View::view(&self.whole))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {

@@ -87,8 +87,7 @@ impl codec::Message for QueryNothing {
 codec::if_serde! {
     impl codec::view::View for QueryNothing {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-            ])
+            codec::view::Value::object(0)
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -152,10 +151,9 @@ impl codec::Message for ReportTree {
 codec::if_serde! {
     impl codec::view::View for ReportTree {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("RequestIDRec", codec::view::View::view(&self.request_id_rec)),
-                ("Nodes", codec::view::View::view(&self.nodes)),
-            ])
+            codec::view::Value::object(2)
+            .with("RequestIDRec", codec::view::View::view(&self.request_id_rec))
+            .with("Nodes", codec::view::View::view(&self.nodes))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -210,9 +208,8 @@ pub mod report_tree {
     codec::if_serde! {
         impl codec::view::View for RequestIdRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("RequestID", codec::view::View::view(&self.request_id)),
-                ])
+                codec::view::Value::object(1)
+                .with("RequestID", codec::view::View::view(&self.request_id))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -265,10 +262,9 @@ pub mod report_tree {
     codec::if_serde! {
         impl codec::view::View for NodeRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("NodeID", codec::view::View::view(&self.node_id)),
-                    ("Kind", codec::view::View::view(&self.kind)),
-                ])
+                codec::view::Value::object(2)
+                .with("NodeID", codec::view::View::view(&self.node_id))
+                .with("Kind", codec::view::View::view(&self.kind))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -331,10 +327,9 @@ pub mod report_tree {
     codec::if_serde! {
         impl codec::view::View for ComponentRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("ComponentID", codec::view::View::view(&self.component_id)),
-                    ("Name", codec::view::View::view(&self.name)),
-                ])
+                codec::view::Value::object(2)
+                .with("ComponentID", codec::view::View::view(&self.component_id))
+                .with("Name", codec::view::View::view(&self.name))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -397,10 +392,9 @@ pub mod report_tree {
     codec::if_serde! {
         impl codec::view::View for NodeSeq {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("NodeRec", codec::view::View::view(&self.node_rec)),
-                    ("Components", codec::view::View::view(&self.components)),
-                ])
+                codec::view::Value::object(2)
+                .with("NodeRec", codec::view::View::view(&self.node_rec))
+                .with("Components", codec::view::View::view(&self.components))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -519,10 +513,9 @@ pub mod report_list_of_lists {
     codec::if_serde! {
         impl codec::view::View for PointRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("X", codec::view::View::view(&self.x)),
-                    ("Y", codec::view::View::view(&self.y)),
-                ])
+                codec::view::Value::object(2)
+                .with("X", codec::view::View::view(&self.x))
+                .with("Y", codec::view::View::view(&self.y))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -637,9 +630,8 @@ pub mod set_choice {
     codec::if_serde! {
         impl codec::view::View for NumberRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Number", codec::view::View::view(&self.number)),
-                ])
+                codec::view::Value::object(1)
+                .with("Number", codec::view::View::view(&self.number))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -694,9 +686,8 @@ pub mod set_choice {
     codec::if_serde! {
         impl codec::view::View for TextRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Text", codec::view::View::view(&self.text)),
-                ])
+                codec::view::Value::object(1)
+                .with("Text", codec::view::View::view(&self.text))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -787,9 +778,8 @@ pub mod set_choice {
     codec::if_serde! {
         impl codec::view::View for EmptyPresenceRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Maybe", codec::view::View::view(&self.maybe)),
-                ])
+                codec::view::Value::object(1)
+                .with("Maybe", codec::view::View::view(&self.maybe))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -921,9 +911,8 @@ pub mod set_choice {
     codec::if_serde! {
         impl codec::view::View for FirstRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("A", codec::view::View::view(&self.a)),
-                ])
+                codec::view::Value::object(1)
+                .with("A", codec::view::View::view(&self.a))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -972,9 +961,8 @@ pub mod set_choice {
     codec::if_serde! {
         impl codec::view::View for SecondRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("B", codec::view::View::view(&self.b)),
-                ])
+                codec::view::Value::object(1)
+                .with("B", codec::view::View::view(&self.b))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1027,10 +1015,9 @@ pub mod set_choice {
     codec::if_serde! {
         impl codec::view::View for PairSeq {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("FirstRec", codec::view::View::view(&self.first_rec)),
-                    ("SecondRec", codec::view::View::view(&self.second_rec)),
-                ])
+                codec::view::Value::object(2)
+                .with("FirstRec", codec::view::View::view(&self.first_rec))
+                .with("SecondRec", codec::view::View::view(&self.second_rec))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1209,10 +1196,9 @@ impl codec::Message for ReportEmptyVariant {
 codec::if_serde! {
     impl codec::view::View for ReportEmptyVariant {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Nothing", codec::view::View::view(&self.nothing)),
-                ("AfterRec", codec::view::View::view(&self.after_rec)),
-            ])
+            codec::view::Value::object(2)
+            .with("Nothing", codec::view::View::view(&self.nothing))
+            .with("AfterRec", codec::view::View::view(&self.after_rec))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1266,8 +1252,7 @@ pub mod report_empty_variant {
     codec::if_serde! {
         impl codec::view::View for Nothing {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                ])
+                codec::view::Value::object(0)
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1312,9 +1297,8 @@ pub mod report_empty_variant {
     codec::if_serde! {
         impl codec::view::View for AfterRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("After", codec::view::View::view(&self.after)),
-                ])
+                codec::view::Value::object(1)
+                .with("After", codec::view::View::view(&self.after))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1407,12 +1391,11 @@ impl codec::Message for ReportOptional {
 codec::if_serde! {
     impl codec::view::View for ReportOptional {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("AlwaysRec", codec::view::View::view(&self.always_rec)),
-                ("MaybeRec", codec::view::View::view(&self.maybe_rec)),
-                ("MaybeList", codec::view::View::view(&self.maybe_list)),
-                ("MaybeVariant", codec::view::View::view(&self.maybe_variant)),
-            ])
+            codec::view::Value::object(4)
+            .with("AlwaysRec", codec::view::View::view(&self.always_rec))
+            .with("MaybeRec", codec::view::View::view(&self.maybe_rec))
+            .with("MaybeList", codec::view::View::view(&self.maybe_list))
+            .with("MaybeVariant", codec::view::View::view(&self.maybe_variant))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1471,9 +1454,8 @@ pub mod report_optional {
     codec::if_serde! {
         impl codec::view::View for AlwaysRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("A", codec::view::View::view(&self.a)),
-                ])
+                codec::view::Value::object(1)
+                .with("A", codec::view::View::view(&self.a))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1574,10 +1556,9 @@ pub mod report_optional {
     codec::if_serde! {
         impl codec::view::View for MaybeRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("B", codec::view::View::view(&self.b)),
-                    ("C", codec::view::View::view(&self.c)),
-                ])
+                codec::view::Value::object(2)
+                .with("B", codec::view::View::view(&self.b))
+                .with("C", codec::view::View::view(&self.c))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1628,9 +1609,8 @@ pub mod report_optional {
     codec::if_serde! {
         impl codec::view::View for ItemRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("D", codec::view::View::view(&self.d)),
-                ])
+                codec::view::Value::object(1)
+                .with("D", codec::view::View::view(&self.d))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1679,9 +1659,8 @@ pub mod report_optional {
     codec::if_serde! {
         impl codec::view::View for LeftRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("E", codec::view::View::view(&self.e)),
-                ])
+                codec::view::Value::object(1)
+                .with("E", codec::view::View::view(&self.e))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1730,9 +1709,8 @@ pub mod report_optional {
     codec::if_serde! {
         impl codec::view::View for RightRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("F", codec::view::View::view(&self.f)),
-                ])
+                codec::view::Value::object(1)
+                .with("F", codec::view::View::view(&self.f))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -2038,20 +2016,19 @@ impl ReportManyOptional {
 codec::if_serde! {
     impl codec::view::View for ReportManyOptional {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("M0", codec::view::View::view(&self.m0)),
-                ("M1", codec::view::View::view(&self.m1)),
-                ("M2", codec::view::View::view(&self.m2)),
-                ("M3", codec::view::View::view(&self.m3)),
-                ("M4", codec::view::View::view(&self.m4)),
-                ("M5", codec::view::View::view(&self.m5)),
-                ("M6", codec::view::View::view(&self.m6)),
-                ("M7", codec::view::View::view(&self.m7)),
-                ("M8", codec::view::View::view(&self.m8)),
-                ("M9", codec::view::View::view(&self.m9)),
-                ("M10", codec::view::View::view(&self.m10)),
-                ("M11", codec::view::View::view(&self.m11)),
-            ])
+            codec::view::Value::object(12)
+            .with("M0", codec::view::View::view(&self.m0))
+            .with("M1", codec::view::View::view(&self.m1))
+            .with("M2", codec::view::View::view(&self.m2))
+            .with("M3", codec::view::View::view(&self.m3))
+            .with("M4", codec::view::View::view(&self.m4))
+            .with("M5", codec::view::View::view(&self.m5))
+            .with("M6", codec::view::View::view(&self.m6))
+            .with("M7", codec::view::View::view(&self.m7))
+            .with("M8", codec::view::View::view(&self.m8))
+            .with("M9", codec::view::View::view(&self.m9))
+            .with("M10", codec::view::View::view(&self.m10))
+            .with("M11", codec::view::View::view(&self.m11))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {

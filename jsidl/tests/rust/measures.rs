@@ -90,10 +90,9 @@ impl codec::Message for SetPosition {
 codec::if_serde! {
     impl codec::view::View for SetPosition {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Position", codec::view::View::view(&self.position)),
-                ("Reading", codec::view::View::view(&self.reading)),
-            ])
+            codec::view::Value::object(2)
+            .with("Position", codec::view::View::view(&self.position))
+            .with("Reading", codec::view::View::view(&self.reading))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {

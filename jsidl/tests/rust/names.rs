@@ -236,17 +236,16 @@ impl Option_ {
 codec::if_serde! {
     impl codec::view::View for Option_ {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("type", codec::view::View::view(&self.r#type)),
-                ("self", codec::view::View::view(&self.self_)),
-                ("Self", codec::view::View::view(&self.self_2)),
-                ("super", codec::view::View::view(&self.super_)),
-                ("input", codec::view::View::view(&self.input)),
-                ("output", codec::view::View::view(&self.output)),
-                ("run", codec::view::View::view(&self.run)),
-                ("present", codec::view::View::view(&self.present)),
-                ("value", codec::view::View::view(&self.value)),
-            ])
+            codec::view::Value::object(9)
+            .with("type", codec::view::View::view(&self.r#type))
+            .with("self", codec::view::View::view(&self.self_))
+            .with("Self", codec::view::View::view(&self.self_2))
+            .with("super", codec::view::View::view(&self.super_))
+            .with("input", codec::view::View::view(&self.input))
+            .with("output", codec::view::View::view(&self.output))
+            .with("run", codec::view::View::view(&self.run))
+            .with("present", codec::view::View::view(&self.present))
+            .with("value", codec::view::View::view(&self.value))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -445,14 +444,13 @@ impl Result_ {
 codec::if_serde! {
     impl codec::view::View for Result_ {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("input", codec::view::View::view(&self.input)),
-                ("present", codec::view::View::view(&self.present)),
-                ("run", codec::view::View::view(&self.run)),
-                ("object", codec::view::View::view(&self.object)),
-                ("random", codec::view::View::view(&self.random)),
-                ("output", codec::view::View::view(&self.output)),
-            ])
+            codec::view::Value::object(6)
+            .with("input", codec::view::View::view(&self.input))
+            .with("present", codec::view::View::view(&self.present))
+            .with("run", codec::view::View::view(&self.run))
+            .with("object", codec::view::View::view(&self.object))
+            .with("random", codec::view::View::view(&self.random))
+            .with("output", codec::view::View::view(&self.output))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -536,11 +534,10 @@ impl codec::Message for Vec_ {
 codec::if_serde! {
     impl codec::view::View for Vec_ {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Some", codec::view::View::view(&self.some)),
-                ("None", codec::view::View::view(&self.none)),
-                ("Box", codec::view::View::view(&self.r#box)),
-            ])
+            codec::view::Value::object(3)
+            .with("Some", codec::view::View::view(&self.some))
+            .with("None", codec::view::View::view(&self.none))
+            .with("Box", codec::view::View::view(&self.r#box))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -619,9 +616,8 @@ pub mod vec {
     codec::if_serde! {
         impl codec::view::View for Some_ {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Ok", codec::view::View::view(&self.ok)),
-                ])
+                codec::view::Value::object(1)
+                .with("Ok", codec::view::View::view(&self.ok))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -676,9 +672,8 @@ pub mod vec {
     codec::if_serde! {
         impl codec::view::View for Err_ {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("String", codec::view::View::view(&self.string)),
-                ])
+                codec::view::Value::object(1)
+                .with("String", codec::view::View::view(&self.string))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -727,9 +722,8 @@ pub mod vec {
     codec::if_serde! {
         impl codec::view::View for Self_ {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("self", codec::view::View::view(&self.self_)),
-                ])
+                codec::view::Value::object(1)
+                .with("self", codec::view::View::view(&self.self_))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -778,9 +772,8 @@ pub mod vec {
     codec::if_serde! {
         impl codec::view::View for Default_ {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Clone", codec::view::View::view(&self.clone)),
-                ])
+                codec::view::Value::object(1)
+                .with("Clone", codec::view::View::view(&self.clone))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -983,13 +976,12 @@ impl codec::Message for Codec {
 codec::if_serde! {
     impl codec::view::View for Codec {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Position_RMS", codec::view::View::view(&self.position_rms)),
-                ("PositionRMS", codec::view::View::view(&self.position_rms_2)),
-                ("positionRms", codec::view::View::view(&self.position_rms_3)),
-                ("_9Lives", codec::view::View::view(&self._9lives)),
-                ("Code", codec::view::View::view(&self.code)),
-            ])
+            codec::view::Value::object(5)
+            .with("Position_RMS", codec::view::View::view(&self.position_rms))
+            .with("PositionRMS", codec::view::View::view(&self.position_rms_2))
+            .with("positionRms", codec::view::View::view(&self.position_rms_3))
+            .with("_9Lives", codec::view::View::view(&self._9lives))
+            .with("Code", codec::view::View::view(&self.code))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1081,8 +1073,7 @@ impl codec::Message for Move {
 codec::if_serde! {
     impl codec::view::View for Move {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-            ])
+            codec::view::Value::object(0)
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1132,8 +1123,7 @@ impl codec::Message for Move2 {
 codec::if_serde! {
     impl codec::view::View for Move2 {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-            ])
+            codec::view::Value::object(0)
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1207,11 +1197,10 @@ impl codec::Message for ReportSame {
 codec::if_serde! {
     impl codec::view::View for ReportSame {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("FirstSeq", codec::view::View::view(&self.first_seq)),
-                ("SecondSeq", codec::view::View::view(&self.second_seq)),
-                ("ThirdSeq", codec::view::View::view(&self.third_seq)),
-            ])
+            codec::view::Value::object(3)
+            .with("FirstSeq", codec::view::View::view(&self.first_seq))
+            .with("SecondSeq", codec::view::View::view(&self.second_seq))
+            .with("ThirdSeq", codec::view::View::view(&self.third_seq))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1268,9 +1257,8 @@ pub mod report_same {
     codec::if_serde! {
         impl codec::view::View for SameRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("A", codec::view::View::view(&self.a)),
-                ])
+                codec::view::Value::object(1)
+                .with("A", codec::view::View::view(&self.a))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1319,9 +1307,8 @@ pub mod report_same {
     codec::if_serde! {
         impl codec::view::View for FirstSeq {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("SameRec", codec::view::View::view(&self.same_rec)),
-                ])
+                codec::view::Value::object(1)
+                .with("SameRec", codec::view::View::view(&self.same_rec))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1374,10 +1361,9 @@ pub mod report_same {
     codec::if_serde! {
         impl codec::view::View for SameRec2 {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("A", codec::view::View::view(&self.a)),
-                    ("B", codec::view::View::view(&self.b)),
-                ])
+                codec::view::Value::object(2)
+                .with("A", codec::view::View::view(&self.a))
+                .with("B", codec::view::View::view(&self.b))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1428,9 +1414,8 @@ pub mod report_same {
     codec::if_serde! {
         impl codec::view::View for SecondSeq {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("SameRec", codec::view::View::view(&self.same_rec)),
-                ])
+                codec::view::Value::object(1)
+                .with("SameRec", codec::view::View::view(&self.same_rec))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1479,9 +1464,8 @@ pub mod report_same {
     codec::if_serde! {
         impl codec::view::View for ThirdSeq {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("SameRec", codec::view::View::view(&self.same_rec)),
-                ])
+                codec::view::Value::object(1)
+                .with("SameRec", codec::view::View::view(&self.same_rec))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -1544,9 +1528,8 @@ impl codec::Message for SameRecAgain {
 codec::if_serde! {
     impl codec::view::View for SameRecAgain {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("SameRec", codec::view::View::view(&self.same_rec)),
-            ])
+            codec::view::Value::object(1)
+            .with("SameRec", codec::view::View::view(&self.same_rec))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {

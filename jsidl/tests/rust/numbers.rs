@@ -145,18 +145,17 @@ impl codec::Message for ReportNumbers {
 codec::if_serde! {
     impl codec::view::View for ReportNumbers {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Byte", codec::view::View::view(&self.byte)),
-                ("Short", codec::view::View::view(&self.short)),
-                ("Integer", codec::view::View::view(&self.integer)),
-                ("Long", codec::view::View::view(&self.long)),
-                ("UnsignedByte", codec::view::View::view(&self.unsigned_byte)),
-                ("UnsignedShort", codec::view::View::view(&self.unsigned_short)),
-                ("UnsignedInteger", codec::view::View::view(&self.unsigned_integer)),
-                ("UnsignedLong", codec::view::View::view(&self.unsigned_long)),
-                ("Float", codec::view::View::view(&self.float)),
-                ("LongFloat", codec::view::View::view(&self.long_float)),
-            ])
+            codec::view::Value::object(10)
+            .with("Byte", codec::view::View::view(&self.byte))
+            .with("Short", codec::view::View::view(&self.short))
+            .with("Integer", codec::view::View::view(&self.integer))
+            .with("Long", codec::view::View::view(&self.long))
+            .with("UnsignedByte", codec::view::View::view(&self.unsigned_byte))
+            .with("UnsignedShort", codec::view::View::view(&self.unsigned_short))
+            .with("UnsignedInteger", codec::view::View::view(&self.unsigned_integer))
+            .with("UnsignedLong", codec::view::View::view(&self.unsigned_long))
+            .with("Float", codec::view::View::view(&self.float))
+            .with("LongFloat", codec::view::View::view(&self.long_float))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -357,14 +356,13 @@ impl codec::Message for SetScaled {
 codec::if_serde! {
     impl codec::view::View for SetScaled {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Percent", codec::view::View::view(&self.percent)),
-                ("Angle", codec::view::View::view(&self.angle)),
-                ("Latitude", codec::view::View::view(&self.latitude)),
-                ("Fine", codec::view::View::view(&self.fine)),
-                ("Below", codec::view::View::view(&self.below)),
-                ("Above", codec::view::View::view(&self.above)),
-            ])
+            codec::view::Value::object(6)
+            .with("Percent", codec::view::View::view(&self.percent))
+            .with("Angle", codec::view::View::view(&self.angle))
+            .with("Latitude", codec::view::View::view(&self.latitude))
+            .with("Fine", codec::view::View::view(&self.fine))
+            .with("Below", codec::view::View::view(&self.below))
+            .with("Above", codec::view::View::view(&self.above))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -567,11 +565,10 @@ impl SetScaledOptional {
 codec::if_serde! {
     impl codec::view::View for SetScaledOptional {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Latitude", codec::view::View::view(&self.latitude)),
-                ("Request", codec::view::View::view(&self.request)),
-                ("Heading", codec::view::View::view(&self.heading)),
-            ])
+            codec::view::Value::object(3)
+            .with("Latitude", codec::view::View::view(&self.latitude))
+            .with("Request", codec::view::View::view(&self.request))
+            .with("Heading", codec::view::View::view(&self.heading))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -672,12 +669,11 @@ impl codec::Message for ReportNamed {
 codec::if_serde! {
     impl codec::view::View for ReportNamed {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("State", codec::view::View::view(&self.state)),
-                ("Signed", codec::view::View::view(&self.signed)),
-                ("Range", codec::view::View::view(&self.range)),
-                ("Both", codec::view::View::view(&self.both)),
-            ])
+            codec::view::Value::object(4)
+            .with("State", codec::view::View::view(&self.state))
+            .with("Signed", codec::view::View::view(&self.signed))
+            .with("Range", codec::view::View::view(&self.range))
+            .with("Both", codec::view::View::view(&self.both))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {

@@ -107,12 +107,11 @@ impl codec::Message for SetTexts {
 codec::if_serde! {
     impl codec::view::View for SetTexts {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Name", codec::view::View::view(&self.name)),
-                ("Comment", codec::view::View::view(&self.comment)),
-                ("Long", codec::view::View::view(&self.long)),
-                ("Code", codec::view::View::view(&self.code)),
-            ])
+            codec::view::Value::object(4)
+            .with("Name", codec::view::View::view(&self.name))
+            .with("Comment", codec::view::View::view(&self.comment))
+            .with("Long", codec::view::View::view(&self.long))
+            .with("Code", codec::view::View::view(&self.code))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -208,12 +207,11 @@ impl codec::Message for SetBlobs {
 codec::if_serde! {
     impl codec::view::View for SetBlobs {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Message", codec::view::View::view(&self.message)),
-                ("Raw", codec::view::View::view(&self.raw)),
-                ("Image", codec::view::View::view(&self.image)),
-                ("Extra", codec::view::View::view(&self.extra)),
-            ])
+            codec::view::Value::object(4)
+            .with("Message", codec::view::View::view(&self.message))
+            .with("Raw", codec::view::View::view(&self.raw))
+            .with("Image", codec::view::View::view(&self.image))
+            .with("Extra", codec::view::View::view(&self.extra))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {

@@ -88,11 +88,10 @@ impl codec::Message for ReportSections {
 codec::if_serde! {
     impl codec::view::View for ReportSections {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("header", codec::view::View::view(&self.header)),
-                ("body", codec::view::View::view(&self.body)),
-                ("footer", codec::view::View::view(&self.footer)),
-            ])
+            codec::view::Value::object(3)
+            .with("header", codec::view::View::view(&self.header))
+            .with("body", codec::view::View::view(&self.body))
+            .with("footer", codec::view::View::view(&self.footer))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -149,9 +148,8 @@ pub mod report_sections {
     codec::if_serde! {
         impl codec::view::View for Header {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Priority", codec::view::View::view(&self.priority)),
-                ])
+                codec::view::Value::object(1)
+                .with("Priority", codec::view::View::view(&self.priority))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -200,9 +198,8 @@ pub mod report_sections {
     codec::if_serde! {
         impl codec::view::View for ItemRec {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Item", codec::view::View::view(&self.item)),
-                ])
+                codec::view::Value::object(1)
+                .with("Item", codec::view::View::view(&self.item))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -251,9 +248,8 @@ pub mod report_sections {
     codec::if_serde! {
         impl codec::view::View for Footer {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Checksum", codec::view::View::view(&self.checksum)),
-                ])
+                codec::view::Value::object(1)
+                .with("Checksum", codec::view::View::view(&self.checksum))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {

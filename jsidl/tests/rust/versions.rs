@@ -123,10 +123,9 @@ impl codec::Message for ReportState {
 codec::if_serde! {
     impl codec::view::View for ReportState {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Speed", codec::view::View::view(&self.speed)),
-                ("Mode", codec::view::View::view(&self.mode)),
-            ])
+            codec::view::Value::object(2)
+            .with("Speed", codec::view::View::view(&self.speed))
+            .with("Mode", codec::view::View::view(&self.mode))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -217,9 +216,8 @@ impl codec::Message for ReportMode {
 codec::if_serde! {
     impl codec::view::View for ReportMode {
         fn view(&self) -> codec::view::Value {
-            codec::view::Value::object([
-                ("Mode", codec::view::View::view(&self.mode)),
-            ])
+            codec::view::Value::object(1)
+            .with("Mode", codec::view::View::view(&self.mode))
         }
 
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
@@ -316,10 +314,9 @@ pub mod v1_0 {
     codec::if_serde! {
         impl codec::view::View for ReportState {
             fn view(&self) -> codec::view::Value {
-                codec::view::Value::object([
-                    ("Speed", codec::view::View::view(&self.speed)),
-                    ("Mode", codec::view::View::view(&self.mode)),
-                ])
+                codec::view::Value::object(2)
+                .with("Speed", codec::view::View::view(&self.speed))
+                .with("Mode", codec::view::View::view(&self.mode))
             }
 
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use bytes::Bytes;
 
 use super::{Error, Object, Value, View};
-use crate::codec::{Bits, FormattedBlob, Text, bits};
+use crate::codec::{Bits, FormattedBlob, OutOfRange, Scale, Text, bits};
 
 /// The member for the bits of a bit field that no sub-field owns.
 const RESERVED: &str = "_reserved";
@@ -111,7 +111,7 @@ impl View for Text {
     fn view(&self) -> Value {
         match self.as_str() {
             Some(text) => Value::Text(text.to_owned().into()),
-            None => Value::object([("hex", hex(self.as_bytes()))]),
+            None => Value::object(1).with("hex", hex(self.as_bytes())),
         }
     }
 
@@ -162,7 +162,9 @@ fn from_hex(text: &str) -> Option<Vec<u8>> {
 
 impl<F: View> View for FormattedBlob<F> {
     fn view(&self) -> Value {
-        Value::object([("format", self.format.view()), ("data", self.data.view())])
+        Value::object(2)
+            .with("format", self.format.view())
+            .with("data", self.data.view())
     }
 
     fn from_view(value: &Value) -> Result<Self, Error> {
@@ -172,6 +174,28 @@ impl<F: View> View for FormattedBlob<F> {
             data: object.member("data")?,
         })
     }
+}
+
+/// What people see of a scaled integer.
+#[doc(hidden)]
+#[inline(never)]
+pub fn scaled(scale: &Scale, raw: u64) -> Value {
+    Value::Real(scale.shortest(raw))
+}
+
+/// The scaled integer that people mean.
+///
+/// # Errors
+/// If it is not a number in the range.
+#[doc(hidden)]
+#[inline(never)]
+pub fn raw_scaled(
+    value: &Value,
+    scale: &Scale,
+    out_of_range: fn(f64) -> OutOfRange,
+) -> Result<u64, Error> {
+    let number = value.number()?;
+    Ok(scale.raw(number).ok_or_else(|| out_of_range(number))?)
 }
 
 /// What people see of a bit field.
@@ -233,12 +257,10 @@ fn sub_field<B: Bits>(name: &str, value: &Value, from: u32, to: u32) -> Result<u
 /// What people see of a `variable_field`.
 #[doc(hidden)]
 pub fn choice_of<T: View>(index: u8, units: &'static str, value: &T) -> Value {
-    let units = Value::Text(units.into());
-    Value::object([
-        ("index", index.view()),
-        ("units", units),
-        ("value", value.view()),
-    ])
+    Value::object(3)
+        .with("index", index.view())
+        .with("units", Value::Text(units.into()))
+        .with("value", value.view())
 }
 
 /// The value of a `variable_field` whose index chooses its type.

@@ -27,7 +27,7 @@ pub use serde;
 pub use value::{Object, Value};
 
 #[doc(hidden)]
-pub use impls::{bits, choice, choice_of, raw_bits};
+pub use impls::{bits, choice, choice_of, raw_bits, raw_scaled, scaled};
 
 use super::OutOfRange;
 
@@ -76,6 +76,8 @@ impl Error {
     }
 
     /// Adds the member in which the mistake was met.
+    #[cold]
+    #[inline(never)]
     #[must_use]
     pub fn within(mut self, member: &str) -> Self {
         self.path.push(member.to_owned());

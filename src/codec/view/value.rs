@@ -30,16 +30,21 @@ pub enum Value {
 }
 
 impl Value {
-    /// An object of members, without those that are absent.
-    pub fn object<const N: usize>(members: [(&'static str, Self); N]) -> Self {
-        let present = members
-            .into_iter()
-            .filter(|(_, value)| *value != Self::Null);
-        Self::Object(
-            present
-                .map(|(name, value)| (Cow::Borrowed(name), value))
-                .collect(),
-        )
+    /// An object without members, with room for some.
+    pub fn object(members: usize) -> Self {
+        Self::Object(Vec::with_capacity(members))
+    }
+
+    /// The object with one more member; nothing is added for one that is absent.
+    #[inline(never)]
+    #[must_use]
+    pub fn with(mut self, name: &'static str, value: Self) -> Self {
+        if let Self::Object(members) = &mut self
+            && value != Self::Null
+        {
+            members.push((Cow::Borrowed(name), value));
+        }
+        self
     }
 
     /// An array of shown elements.
@@ -178,12 +183,22 @@ impl<'a> Object<'a> {
     /// # Errors
     /// If it is required but absent; its own.
     pub fn member<T: View>(&self, name: &str) -> Result<T, Error> {
-        let read = match (self.get(name), T::absent()) {
-            (None | Some(Value::Null), Some(absent)) => return Ok(absent),
-            (None, None) => Err(Error::new("required, but absent")),
-            (Some(value), _) => T::from_view(value),
-        };
-        read.map_err(|error| error.within(name))
+        match self.present(name) {
+            Some(value) => T::from_view(value).map_err(|error| error.within(name)),
+            None => T::absent().ok_or_else(|| Self::missing(name)),
+        }
+    }
+
+    /// The value of a member that is neither left out nor null.
+    #[inline(never)]
+    fn present(&self, name: &str) -> Option<&'a Value> {
+        self.get(name).filter(|value| **value != Value::Null)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn missing(name: &str) -> Error {
+        Error::new("required, but absent").within(name)
     }
 }
 
