@@ -1,4 +1,17 @@
-//! A node stack for SAE JAUS.
+//! A node stack for unmanned systems that speaks SAE JAUS on the wire: AS5669A transport, AS5710
+//! core services, and services defined in JSIDL (AS5684).
+//!
+//! | you want to | look at |
+//! |---|---|
+//! | offer services, find and ask others | [`component`] |
+//! | read and write messages | [`messages`], [`codec`] |
+//! | run a node and see raw messages | [`node`] |
+//! | embed the protocol where there is no tokio | [`endpoint`], [`service`] |
+//! | look into datagrams | [`wire`], and [`view`] for captures and JSON |
+//!
+//! Modules know only those below them: `view` and `component`, then `service` and `node`, then
+//! `link`, `endpoint` and `messages`, then `wire` and `codec`, then `address`. From `service` and
+//! `endpoint` downwards nothing opens a socket or reads a clock.
 #![forbid(unsafe_code)]
 
 pub mod address;
@@ -15,3 +28,8 @@ pub mod service;
 #[cfg(feature = "view")]
 pub mod view;
 pub mod wire;
+
+/// The README's programs compile.
+#[cfg(all(doctest, feature = "node", feature = "mobility"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
