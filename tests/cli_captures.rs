@@ -109,6 +109,14 @@ fn a_damaged_pcapng_block_costs_no_other() {
         interface(RAW, &[]),
         enhanced_packet(7, 0, &frame),
         enhanced_packet(0, 0, &frame),
+        // Names that are not there.
+        block(4, &[1, 0, 0xFF, 0xFF]),
+        // Interface 0, no time, and 100 octets of which there are 8.
+        block(
+            6,
+            &[&[0; 12][..], &[100, 0, 0, 0, 100, 0, 0, 0], &[7; 8]].concat(),
+        ),
+        enhanced_packet(0, 0, &frame),
     ]
     .concat();
     let run = decode(&capture);
@@ -121,7 +129,9 @@ fn a_damaged_pcapng_block_costs_no_other() {
             .contains("not described")
     );
     assert_eq!(lines[1]["message"], "QueryIdentification");
-    assert_eq!(run.status, 1);
+    assert!(lines[2]["error"].as_str().unwrap().contains("too short"));
+    assert_eq!(lines[3]["message"], "QueryIdentification");
+    assert_eq!((lines.len(), run.status), (4, 1));
 }
 
 #[test]
@@ -339,6 +349,28 @@ fn a_reader_that_goes_away_ends_the_run_quietly() {
     let output = child.wait_with_output().unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!((output.status.code(), output.stderr), (Some(0), Vec::new()));
+}
+
+#[test]
+fn nobody_reading_the_errors_changes_nothing_else() {
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let status = jaus()
+        .args(["-vv", "decode", "no/such/file.pcap"])
+        .stdin(Stdio::null())
+        .stderr(writer)
+        .status()
+        .unwrap();
+    assert_eq!(status.code(), Some(2));
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let demo = jaus()
+        .args(["-vvv", "demo", "--seconds", "0.2"])
+        .stdout(Stdio::null())
+        .stderr(writer)
+        .status()
+        .unwrap();
+    assert_eq!(demo.code(), Some(0), "whatever is logged");
 }
 
 #[test]

@@ -171,6 +171,15 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
             &["query", "103.1.1", "QueryStatsu"],
             "there is no message QueryStatsu",
         ),
+        (
+            &["query", "103.1.1", "QueryStatsu"],
+            "perhaps QueryStatus is meant",
+        ),
+        (&["query", "103.1.1", "QueryFoo"], "must be loaded"),
+        (
+            &["query", "103.1.1", "QueryIdentification"],
+            "'{\"QueryType\":2}'",
+        ),
         (&["query", "103.1.1", "Resume"], "is not a query"),
         (&["query", "103.1.1", "QueryStatus", "{"], "not JSON"),
         (&["decode"], "FILE"),

@@ -32,6 +32,9 @@ pub struct Dictionary {
     preferred: Vec<ServiceName>,
 }
 
+/// How much of a name must be right for it to be taken for a slip: 1 is all of it.
+const ALIKE: f64 = 0.75;
+
 /// What [`Dictionary::load`] did.
 #[derive(Debug)]
 pub struct Added {
@@ -246,6 +249,12 @@ impl Dictionary {
 }
 
 impl Dictionary {
+    /// Whether a message of this name is defined.
+    pub fn defines(&self, message: &str) -> bool {
+        let mut all = self.by_code.values().flatten();
+        all.any(|definition| definition.name() == message)
+    }
+
     /// Makes the octets of a message out of what people write.
     ///
     /// # Errors
@@ -312,13 +321,18 @@ impl Dictionary {
             return format!("{name} has the code {:04X}h", known.code());
         }
         let lower = name.to_lowercase();
-        let similar = all().map(Definition::name).filter(|known| {
-            let known = known.to_lowercase();
-            known.contains(&lower) || lower.contains(&known)
+        let similar = all().filter_map(|definition| {
+            let known = definition.name().to_lowercase();
+            let likeness = strsim::normalized_damerau_levenshtein(&known, &lower);
+            let alike = likeness > ALIKE || known.contains(&lower) || lower.contains(&known);
+            alike.then_some((likeness, definition.name()))
         });
-        match similar.min_by_key(|known| known.len().abs_diff(name.len())) {
-            Some(similar) => format!("there is no message {name}; perhaps {similar} is meant"),
-            None => format!("there is no message {name}"),
+        match similar.max_by(|(one, _), (other, _)| one.total_cmp(other)) {
+            Some((_, similar)) => format!("there is no message {name}; perhaps {similar} is meant"),
+            None => format!(
+                "there is no message {name} here; if a service of your own defines it, \
+                 that definition must be loaded too"
+            ),
         }
     }
 }

@@ -10,7 +10,7 @@ use jaus::view::{self, Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network
 
 use crate::definitions::Definitions;
 use crate::failure::{Failure, Outcome};
-use crate::output::Output;
+use crate::output::{Output, say};
 
 /// Print captured messages, or lines of hex, as one JSON object a line
 ///
@@ -163,7 +163,7 @@ fn report_unread(network: &Network, log: &MessageLog<'_>) {
     ];
     for (count, note) in notes {
         if count > 0 {
-            eprintln!("jaus: note: {count} {note}");
+            say(format_args!("note: {count} {note}"));
         }
     }
     if log.stale_octets() > 0 {

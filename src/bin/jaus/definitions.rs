@@ -6,6 +6,7 @@ use clap::Args;
 use jaus::view::Dictionary;
 
 use crate::failure::Failure;
+use crate::output::say;
 
 #[derive(Args)]
 pub(crate) struct Definitions {
@@ -43,7 +44,7 @@ impl Definitions {
         }
         let added = dictionary.load(&self.jsidl);
         for diagnostic in added.diagnostics.errors() {
-            eprintln!("jaus: {diagnostic}");
+            say(diagnostic);
         }
         if added.messages > 0 {
             return Ok(());

@@ -8,7 +8,7 @@ use jaus::node::Node;
 
 use crate::failure::{Failure, Outcome};
 use crate::network::Network;
-use crate::output::Output;
+use crate::output::{Output, say};
 use crate::runtime::{self, Clock};
 use crate::tree;
 
@@ -74,10 +74,10 @@ impl Discover {
         }
         if lines.is_empty() {
             let seconds = self.seconds.unwrap_or(LOOK).as_secs_f64();
-            eprintln!(
-                "jaus: nobody answered within {seconds} s. --interface chooses the network, --peer \
+            say(format_args!(
+                "nobody answered within {seconds} s. --interface chooses the network, --peer \
                  reaches where multicast does not, --seconds looks longer"
-            );
+            ));
         }
         Ok(Outcome::complete_if(!lines.is_empty()))
     }

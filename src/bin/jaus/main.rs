@@ -1,4 +1,9 @@
 //! The command line tool `jaus`: one file per subcommand, over the library's public API only.
+#![warn(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "they panic when the reader has gone; see `output`"
+)]
 
 mod decode;
 mod definitions;
@@ -87,6 +92,8 @@ impl Logging {
             .with_writer(std::io::stderr)
             .with_ansi(output::colours_wanted(&std::io::stderr()))
             .with_target(self.verbose > 1)
+            // It would complain on standard error that standard error is closed, and panic.
+            .log_internal_errors(false)
             .init();
         Ok(())
     }
@@ -104,7 +111,7 @@ fn main() -> ExitCode {
         // Whoever read our output has seen enough, as `head` does.
         Err(Failure::OutputClosed) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("jaus: {failure}");
+            output::say(failure);
             ExitCode::from(2)
         }
     }

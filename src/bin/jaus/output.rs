@@ -1,4 +1,4 @@
-//! Standard output, line by line.
+//! Standard output, line by line; and what goes to standard error.
 
 use std::fmt::Display;
 use std::io::{self, IsTerminal, StdoutLock, Write};
@@ -26,6 +26,11 @@ impl Output {
                 _ => Failure::new(format!("cannot write to standard output: {error}")),
             })
     }
+}
+
+/// Says something on standard error. If nobody reads that, it is not said.
+pub(crate) fn say(words: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "jaus: {words}");
 }
 
 /// Whether to write in colours: to a terminal, unless NO_COLOR (<https://no-color.org>) is set.

@@ -16,7 +16,7 @@ use tokio::time::{Instant, timeout_at};
 use crate::definitions::Definitions;
 use crate::failure::{Failure, Outcome};
 use crate::network::Network;
-use crate::output::Output;
+use crate::output::{Output, say};
 use crate::runtime;
 
 /// How often a question is asked while no answer comes.
@@ -40,8 +40,7 @@ pub(crate) struct Query {
     message: String,
 
     /// The query's fields, as `jaus decode` prints a body
-    #[arg(default_value = "{}", hide_default_value = true)]
-    json: String,
+    json: Option<String>,
 
     /// How long to wait for an answer
     #[arg(long, default_value = "2", value_parser = runtime::seconds)]
@@ -75,15 +74,20 @@ impl Query {
     }
 
     fn octets(&self, dictionary: &Dictionary) -> Result<Bytes, Failure> {
-        let body = serde_json::from_str(&self.json).map_err(|error| {
-            Failure::new(format!(
-                "the query's fields are not JSON: {error}: {}",
-                self.json
-            ))
+        let json = self.json.as_deref().unwrap_or("{}");
+        let body = serde_json::from_str(json).map_err(|error| {
+            Failure::new(format!("the query's fields are not JSON: {error}: {json}"))
         })?;
-        dictionary
-            .write(&Request::new(&self.message, body))
-            .map_err(Failure::of)
+        let written = dictionary.write(&Request::new(&self.message, body));
+        written.map_err(|error| {
+            if self.json.is_none() && dictionary.defines(&self.message) {
+                return Failure::new(format!(
+                    "{error}. Give the fields as JSON behind the name, \
+                     as in QueryIdentification '{{\"QueryType\":2}}'"
+                ));
+            }
+            Failure::of(error)
+        })
     }
 
     /// Asks until there is an answer; with wildcards until the time is over.
@@ -115,7 +119,7 @@ impl Query {
             }
         }
         if answered.is_empty() {
-            eprintln!("jaus: {}", self.silence());
+            say(self.silence());
         }
         Ok(Outcome::complete_if(complete && !answered.is_empty()))
     }

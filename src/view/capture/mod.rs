@@ -3,6 +3,18 @@
 //! A [`Capture`] hands out [`Frame`]s one after the other and keeps only one in memory, so that a
 //! file may be as long as it likes and may as well be a pipe. A file that was cut short, or is
 //! damaged, gives everything that can be had and then says where it ends.
+//!
+//! The reader is our own because neither crate that was tried keeps this promise:
+//!
+//! * `pcap-parser` 0.17.0 reports a pcapng packet that claims more octets than its block has as a
+//!   file cut short, and so a malformed block that nobody needs. Opening fails if the first `read`
+//!   is as short as a pipe's may be; causes of I/O errors are lost. It refuses binary `if_tsresol`,
+//!   takes `if_tsoffset` for little-endian and does not know obsolete packet blocks. Around it,
+//!   block lengths, byte order, options and obsolete packets would still have to be read here.
+//! * `pcap-file` 2.0.0 takes every pcapng time stamp for nanoseconds, refuses pcap packets that were
+//!   longer than the snap length, and repeats the error of a damaged block for ever. Its raw blocks
+//!   and packets avoid most of that, but leave their fields to be read here, and a capture cut short
+//!   gives no place. 3.0.0-rc.3 needs a newer Rust than this crate.
 
 mod input;
 mod pcap;
