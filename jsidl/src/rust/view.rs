@@ -55,11 +55,12 @@ fn begin(out: &mut Writer, ident: &str) {
     out.gap();
     out.push("codec::if_serde! {");
     out.push(format!("impl codec::view::View for {ident} {{"));
-    out.push("fn view(&self) -> codec::view::Value {");
+    // The registry refers to these functions; copies of them would only take room.
+    out.push("#[inline(never)]\nfn view(&self) -> codec::view::Value {");
 }
 
 fn middle(out: &mut Writer) {
-    out.push("}\n\nfn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {");
+    out.push("}\n\n#[inline(never)]\nfn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {");
 }
 
 fn end(out: &mut Writer, ident: &str) {

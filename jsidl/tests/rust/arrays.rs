@@ -142,6 +142,7 @@ impl codec::Message for ReportArrays {
 
 codec::if_serde! {
     impl codec::view::View for ReportArrays {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(9)
             .with("Vector", codec::view::View::view(&self.vector))
@@ -155,6 +156,7 @@ codec::if_serde! {
             .with("Codes", codec::view::View::view(&self.codes))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Vector", "Matrix", "Cube", "Many", "Names", "Grid", "Stamps", "Maybe", "Codes"])?;
             Ok(Self {
@@ -266,10 +268,12 @@ impl codec::Message for ReportArrayList {
 
 codec::if_serde! {
     impl codec::view::View for ReportArrayList {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::View::view(&self.rows)
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             Ok(Self { rows: codec::view::View::from_view(value)? })
         }
@@ -316,11 +320,13 @@ pub mod report_array_list {
 
     codec::if_serde! {
         impl codec::view::View for RowRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("Row", codec::view::View::view(&self.row))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Row"])?;
                 Ok(Self {

@@ -146,6 +146,7 @@ impl ReportTime {
 
 codec::if_serde! {
     impl codec::view::View for ReportTime {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(4)
             .with("TimeStamp", codec::view::View::view(&self.time_stamp))
@@ -154,6 +155,7 @@ codec::if_serde! {
             .with("Whole", codec::view::View::view(&self.whole))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["TimeStamp", "Flags", "Wide", "Whole"])?;
             Ok(Self {

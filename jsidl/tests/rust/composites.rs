@@ -86,10 +86,12 @@ impl codec::Message for QueryNothing {
 
 codec::if_serde! {
     impl codec::view::View for QueryNothing {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(0)
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             codec::view::Object::new(value, &[])?;
             Ok(Self)
@@ -150,12 +152,14 @@ impl codec::Message for ReportTree {
 
 codec::if_serde! {
     impl codec::view::View for ReportTree {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(2)
             .with("RequestIDRec", codec::view::View::view(&self.request_id_rec))
             .with("Nodes", codec::view::View::view(&self.nodes))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["RequestIDRec", "Nodes"])?;
             Ok(Self {
@@ -207,11 +211,13 @@ pub mod report_tree {
 
     codec::if_serde! {
         impl codec::view::View for RequestIdRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("RequestID", codec::view::View::view(&self.request_id))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["RequestID"])?;
                 Ok(Self {
@@ -261,12 +267,14 @@ pub mod report_tree {
 
     codec::if_serde! {
         impl codec::view::View for NodeRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(2)
                 .with("NodeID", codec::view::View::view(&self.node_id))
                 .with("Kind", codec::view::View::view(&self.kind))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["NodeID", "Kind"])?;
                 Ok(Self {
@@ -326,12 +334,14 @@ pub mod report_tree {
 
     codec::if_serde! {
         impl codec::view::View for ComponentRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(2)
                 .with("ComponentID", codec::view::View::view(&self.component_id))
                 .with("Name", codec::view::View::view(&self.name))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["ComponentID", "Name"])?;
                 Ok(Self {
@@ -391,12 +401,14 @@ pub mod report_tree {
 
     codec::if_serde! {
         impl codec::view::View for NodeSeq {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(2)
                 .with("NodeRec", codec::view::View::view(&self.node_rec))
                 .with("Components", codec::view::View::view(&self.components))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["NodeRec", "Components"])?;
                 Ok(Self {
@@ -458,10 +470,12 @@ impl codec::Message for ReportListOfLists {
 
 codec::if_serde! {
     impl codec::view::View for ReportListOfLists {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::View::view(&self.outer)
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             Ok(Self { outer: codec::view::View::from_view(value)? })
         }
@@ -512,12 +526,14 @@ pub mod report_list_of_lists {
 
     codec::if_serde! {
         impl codec::view::View for PointRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(2)
                 .with("X", codec::view::View::view(&self.x))
                 .with("Y", codec::view::View::view(&self.y))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["X", "Y"])?;
                 Ok(Self {
@@ -579,10 +595,12 @@ impl codec::Message for SetChoice {
 
 codec::if_serde! {
     impl codec::view::View for SetChoice {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::View::view(&self.choice)
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             Ok(Self { choice: codec::view::View::from_view(value)? })
         }
@@ -629,11 +647,13 @@ pub mod set_choice {
 
     codec::if_serde! {
         impl codec::view::View for NumberRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("Number", codec::view::View::view(&self.number))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Number"])?;
                 Ok(Self {
@@ -685,11 +705,13 @@ pub mod set_choice {
 
     codec::if_serde! {
         impl codec::view::View for TextRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("Text", codec::view::View::view(&self.text))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Text"])?;
                 Ok(Self {
@@ -777,11 +799,13 @@ pub mod set_choice {
 
     codec::if_serde! {
         impl codec::view::View for EmptyPresenceRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("Maybe", codec::view::View::view(&self.maybe))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Maybe"])?;
                 Ok(Self {
@@ -910,11 +934,13 @@ pub mod set_choice {
 
     codec::if_serde! {
         impl codec::view::View for FirstRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("A", codec::view::View::view(&self.a))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["A"])?;
                 Ok(Self {
@@ -960,11 +986,13 @@ pub mod set_choice {
 
     codec::if_serde! {
         impl codec::view::View for SecondRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("B", codec::view::View::view(&self.b))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["B"])?;
                 Ok(Self {
@@ -1014,12 +1042,14 @@ pub mod set_choice {
 
     codec::if_serde! {
         impl codec::view::View for PairSeq {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(2)
                 .with("FirstRec", codec::view::View::view(&self.first_rec))
                 .with("SecondRec", codec::view::View::view(&self.second_rec))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["FirstRec", "SecondRec"])?;
                 Ok(Self {
@@ -1195,12 +1225,14 @@ impl codec::Message for ReportEmptyVariant {
 
 codec::if_serde! {
     impl codec::view::View for ReportEmptyVariant {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(2)
             .with("Nothing", codec::view::View::view(&self.nothing))
             .with("AfterRec", codec::view::View::view(&self.after_rec))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Nothing", "AfterRec"])?;
             Ok(Self {
@@ -1251,10 +1283,12 @@ pub mod report_empty_variant {
 
     codec::if_serde! {
         impl codec::view::View for Nothing {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(0)
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 codec::view::Object::new(value, &[])?;
                 Ok(Self)
@@ -1296,11 +1330,13 @@ pub mod report_empty_variant {
 
     codec::if_serde! {
         impl codec::view::View for AfterRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("After", codec::view::View::view(&self.after))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["After"])?;
                 Ok(Self {
@@ -1390,6 +1426,7 @@ impl codec::Message for ReportOptional {
 
 codec::if_serde! {
     impl codec::view::View for ReportOptional {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(4)
             .with("AlwaysRec", codec::view::View::view(&self.always_rec))
@@ -1398,6 +1435,7 @@ codec::if_serde! {
             .with("MaybeVariant", codec::view::View::view(&self.maybe_variant))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["AlwaysRec", "MaybeRec", "MaybeList", "MaybeVariant"])?;
             Ok(Self {
@@ -1453,11 +1491,13 @@ pub mod report_optional {
 
     codec::if_serde! {
         impl codec::view::View for AlwaysRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("A", codec::view::View::view(&self.a))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["A"])?;
                 Ok(Self {
@@ -1555,12 +1595,14 @@ pub mod report_optional {
 
     codec::if_serde! {
         impl codec::view::View for MaybeRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(2)
                 .with("B", codec::view::View::view(&self.b))
                 .with("C", codec::view::View::view(&self.c))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["B", "C"])?;
                 Ok(Self {
@@ -1608,11 +1650,13 @@ pub mod report_optional {
 
     codec::if_serde! {
         impl codec::view::View for ItemRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("D", codec::view::View::view(&self.d))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["D"])?;
                 Ok(Self {
@@ -1658,11 +1702,13 @@ pub mod report_optional {
 
     codec::if_serde! {
         impl codec::view::View for LeftRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("E", codec::view::View::view(&self.e))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["E"])?;
                 Ok(Self {
@@ -1708,11 +1754,13 @@ pub mod report_optional {
 
     codec::if_serde! {
         impl codec::view::View for RightRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("F", codec::view::View::view(&self.f))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["F"])?;
                 Ok(Self {
@@ -2015,6 +2063,7 @@ impl ReportManyOptional {
 
 codec::if_serde! {
     impl codec::view::View for ReportManyOptional {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(12)
             .with("M0", codec::view::View::view(&self.m0))
@@ -2031,6 +2080,7 @@ codec::if_serde! {
             .with("M11", codec::view::View::view(&self.m11))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9", "M10", "M11"])?;
             Ok(Self {

@@ -89,12 +89,14 @@ impl codec::Message for SetPosition {
 
 codec::if_serde! {
     impl codec::view::View for SetPosition {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(2)
             .with("Position", codec::view::View::view(&self.position))
             .with("Reading", codec::view::View::view(&self.reading))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Position", "Reading"])?;
             Ok(Self {

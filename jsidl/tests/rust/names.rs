@@ -235,6 +235,7 @@ impl Option_ {
 
 codec::if_serde! {
     impl codec::view::View for Option_ {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(9)
             .with("type", codec::view::View::view(&self.r#type))
@@ -248,6 +249,7 @@ codec::if_serde! {
             .with("value", codec::view::View::view(&self.value))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["type", "self", "Self", "super", "input", "output", "run", "present", "value"])?;
             Ok(Self {
@@ -443,6 +445,7 @@ impl Result_ {
 
 codec::if_serde! {
     impl codec::view::View for Result_ {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(6)
             .with("input", codec::view::View::view(&self.input))
@@ -453,6 +456,7 @@ codec::if_serde! {
             .with("output", codec::view::View::view(&self.output))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["input", "present", "run", "object", "random", "output"])?;
             Ok(Self {
@@ -533,6 +537,7 @@ impl codec::Message for Vec_ {
 
 codec::if_serde! {
     impl codec::view::View for Vec_ {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(3)
             .with("Some", codec::view::View::view(&self.some))
@@ -540,6 +545,7 @@ codec::if_serde! {
             .with("Box", codec::view::View::view(&self.r#box))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Some", "None", "Box"])?;
             Ok(Self {
@@ -615,11 +621,13 @@ pub mod vec {
 
     codec::if_serde! {
         impl codec::view::View for Some_ {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("Ok", codec::view::View::view(&self.ok))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Ok"])?;
                 Ok(Self {
@@ -671,11 +679,13 @@ pub mod vec {
 
     codec::if_serde! {
         impl codec::view::View for Err_ {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("String", codec::view::View::view(&self.string))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["String"])?;
                 Ok(Self {
@@ -721,11 +731,13 @@ pub mod vec {
 
     codec::if_serde! {
         impl codec::view::View for Self_ {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("self", codec::view::View::view(&self.self_))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["self"])?;
                 Ok(Self {
@@ -771,11 +783,13 @@ pub mod vec {
 
     codec::if_serde! {
         impl codec::view::View for Default_ {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("Clone", codec::view::View::view(&self.clone))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Clone"])?;
                 Ok(Self {
@@ -975,6 +989,7 @@ impl codec::Message for Codec {
 
 codec::if_serde! {
     impl codec::view::View for Codec {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(5)
             .with("Position_RMS", codec::view::View::view(&self.position_rms))
@@ -984,6 +999,7 @@ codec::if_serde! {
             .with("Code", codec::view::View::view(&self.code))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Position_RMS", "PositionRMS", "positionRms", "_9Lives", "Code"])?;
             Ok(Self {
@@ -1072,10 +1088,12 @@ impl codec::Message for Move {
 
 codec::if_serde! {
     impl codec::view::View for Move {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(0)
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             codec::view::Object::new(value, &[])?;
             Ok(Self)
@@ -1122,10 +1140,12 @@ impl codec::Message for Move2 {
 
 codec::if_serde! {
     impl codec::view::View for Move2 {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(0)
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             codec::view::Object::new(value, &[])?;
             Ok(Self)
@@ -1196,6 +1216,7 @@ impl codec::Message for ReportSame {
 
 codec::if_serde! {
     impl codec::view::View for ReportSame {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(3)
             .with("FirstSeq", codec::view::View::view(&self.first_seq))
@@ -1203,6 +1224,7 @@ codec::if_serde! {
             .with("ThirdSeq", codec::view::View::view(&self.third_seq))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["FirstSeq", "SecondSeq", "ThirdSeq"])?;
             Ok(Self {
@@ -1256,11 +1278,13 @@ pub mod report_same {
 
     codec::if_serde! {
         impl codec::view::View for SameRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("A", codec::view::View::view(&self.a))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["A"])?;
                 Ok(Self {
@@ -1306,11 +1330,13 @@ pub mod report_same {
 
     codec::if_serde! {
         impl codec::view::View for FirstSeq {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("SameRec", codec::view::View::view(&self.same_rec))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["SameRec"])?;
                 Ok(Self {
@@ -1360,12 +1386,14 @@ pub mod report_same {
 
     codec::if_serde! {
         impl codec::view::View for SameRec2 {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(2)
                 .with("A", codec::view::View::view(&self.a))
                 .with("B", codec::view::View::view(&self.b))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["A", "B"])?;
                 Ok(Self {
@@ -1413,11 +1441,13 @@ pub mod report_same {
 
     codec::if_serde! {
         impl codec::view::View for SecondSeq {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("SameRec", codec::view::View::view(&self.same_rec))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["SameRec"])?;
                 Ok(Self {
@@ -1463,11 +1493,13 @@ pub mod report_same {
 
     codec::if_serde! {
         impl codec::view::View for ThirdSeq {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("SameRec", codec::view::View::view(&self.same_rec))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["SameRec"])?;
                 Ok(Self {
@@ -1527,11 +1559,13 @@ impl codec::Message for SameRecAgain {
 
 codec::if_serde! {
     impl codec::view::View for SameRecAgain {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(1)
             .with("SameRec", codec::view::View::view(&self.same_rec))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["SameRec"])?;
             Ok(Self {

@@ -144,6 +144,7 @@ impl codec::Message for ReportNumbers {
 
 codec::if_serde! {
     impl codec::view::View for ReportNumbers {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(10)
             .with("Byte", codec::view::View::view(&self.byte))
@@ -158,6 +159,7 @@ codec::if_serde! {
             .with("LongFloat", codec::view::View::view(&self.long_float))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Byte", "Short", "Integer", "Long", "UnsignedByte", "UnsignedShort", "UnsignedInteger", "UnsignedLong", "Float", "LongFloat"])?;
             Ok(Self {
@@ -355,6 +357,7 @@ impl codec::Message for SetScaled {
 
 codec::if_serde! {
     impl codec::view::View for SetScaled {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(6)
             .with("Percent", codec::view::View::view(&self.percent))
@@ -365,6 +368,7 @@ codec::if_serde! {
             .with("Above", codec::view::View::view(&self.above))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Percent", "Angle", "Latitude", "Fine", "Below", "Above"])?;
             Ok(Self {
@@ -564,6 +568,7 @@ impl SetScaledOptional {
 
 codec::if_serde! {
     impl codec::view::View for SetScaledOptional {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(3)
             .with("Latitude", codec::view::View::view(&self.latitude))
@@ -571,6 +576,7 @@ codec::if_serde! {
             .with("Heading", codec::view::View::view(&self.heading))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Latitude", "Request", "Heading"])?;
             Ok(Self {
@@ -668,6 +674,7 @@ impl codec::Message for ReportNamed {
 
 codec::if_serde! {
     impl codec::view::View for ReportNamed {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(4)
             .with("State", codec::view::View::view(&self.state))
@@ -676,6 +683,7 @@ codec::if_serde! {
             .with("Both", codec::view::View::view(&self.both))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["State", "Signed", "Range", "Both"])?;
             Ok(Self {

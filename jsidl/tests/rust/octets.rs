@@ -106,6 +106,7 @@ impl codec::Message for SetTexts {
 
 codec::if_serde! {
     impl codec::view::View for SetTexts {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(4)
             .with("Name", codec::view::View::view(&self.name))
@@ -114,6 +115,7 @@ codec::if_serde! {
             .with("Code", codec::view::View::view(&self.code))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Name", "Comment", "Long", "Code"])?;
             Ok(Self {
@@ -206,6 +208,7 @@ impl codec::Message for SetBlobs {
 
 codec::if_serde! {
     impl codec::view::View for SetBlobs {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(4)
             .with("Message", codec::view::View::view(&self.message))
@@ -214,6 +217,7 @@ codec::if_serde! {
             .with("Extra", codec::view::View::view(&self.extra))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Message", "Raw", "Image", "Extra"])?;
             Ok(Self {

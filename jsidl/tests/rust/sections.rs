@@ -87,6 +87,7 @@ impl codec::Message for ReportSections {
 
 codec::if_serde! {
     impl codec::view::View for ReportSections {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(3)
             .with("header", codec::view::View::view(&self.header))
@@ -94,6 +95,7 @@ codec::if_serde! {
             .with("footer", codec::view::View::view(&self.footer))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["header", "body", "footer"])?;
             Ok(Self {
@@ -147,11 +149,13 @@ pub mod report_sections {
 
     codec::if_serde! {
         impl codec::view::View for Header {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("Priority", codec::view::View::view(&self.priority))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Priority"])?;
                 Ok(Self {
@@ -197,11 +201,13 @@ pub mod report_sections {
 
     codec::if_serde! {
         impl codec::view::View for ItemRec {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("Item", codec::view::View::view(&self.item))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Item"])?;
                 Ok(Self {
@@ -247,11 +253,13 @@ pub mod report_sections {
 
     codec::if_serde! {
         impl codec::view::View for Footer {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(1)
                 .with("Checksum", codec::view::View::view(&self.checksum))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Checksum"])?;
                 Ok(Self {

@@ -122,12 +122,14 @@ impl codec::Message for ReportState {
 
 codec::if_serde! {
     impl codec::view::View for ReportState {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(2)
             .with("Speed", codec::view::View::view(&self.speed))
             .with("Mode", codec::view::View::view(&self.mode))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Speed", "Mode"])?;
             Ok(Self {
@@ -215,11 +217,13 @@ impl codec::Message for ReportMode {
 
 codec::if_serde! {
     impl codec::view::View for ReportMode {
+        #[inline(never)]
         fn view(&self) -> codec::view::Value {
             codec::view::Value::object(1)
             .with("Mode", codec::view::View::view(&self.mode))
         }
 
+        #[inline(never)]
         fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
             let object = codec::view::Object::new(value, &["Mode"])?;
             Ok(Self {
@@ -313,12 +317,14 @@ pub mod v1_0 {
 
     codec::if_serde! {
         impl codec::view::View for ReportState {
+            #[inline(never)]
             fn view(&self) -> codec::view::Value {
                 codec::view::Value::object(2)
                 .with("Speed", codec::view::View::view(&self.speed))
                 .with("Mode", codec::view::View::view(&self.mode))
             }
 
+            #[inline(never)]
             fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
                 let object = codec::view::Object::new(value, &["Speed", "Mode"])?;
                 Ok(Self {
