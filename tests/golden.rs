@@ -102,8 +102,8 @@ fn alternative(members: &Map<String, Value>) -> Value {
     }
 }
 
-/// Equal, but a real in the vector may be anything that the field rounds to the same integer: what
-/// we show must come back as the same octets, and be close.
+/// Equal; only a real in the vector may be anything that the field rounds to the same integer, and
+/// is merely close to what we show. That both stand for the same octets is checked besides.
 fn agree(ours: &Value, theirs: &Value) -> bool {
     match (ours, theirs) {
         (Value::Object(a), Value::Object(b)) => {
@@ -112,7 +112,7 @@ fn agree(ours: &Value, theirs: &Value) -> bool {
         (Value::Array(a), Value::Array(b)) => {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| agree(a, b))
         }
-        (Value::Number(a), Value::Number(b)) if a != b => {
+        (Value::Number(a), Value::Number(b)) if a != b && (a.is_f64() || b.is_f64()) => {
             let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
             // The vector's reals are a quarter step above the code.
             (a - b).abs() <= 0.005 * b.abs().max(100.0)
@@ -166,6 +166,7 @@ fn every_vector_decodes_shows_its_values_and_encodes_to_the_same_octets() {
             }
         }
     }
+    println!("{checked} vectors are of generated messages");
     assert!(
         wrong.is_empty(),
         "{} of {checked}:\n{}",
