@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bytes::{Bytes, BytesMut};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event, LinkId, Outgoing, Path};
+use jaus::endpoint::{Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path};
 use jaus::wire::{Flags, Frame, as5669a, judp, ra};
 
 const US: JausId = JausId::new(101, 1, 1);
@@ -85,11 +85,12 @@ fn datagram(c: &mut Criterion) {
 fn endpoint() -> (Endpoint, Path, Instant) {
     let peer = Path {
         link: LinkId(0),
-        peer: SocketAddr::from(([10, 0, 0, 2], judp::PORT)),
+        peer: SocketAddr::from(([10, 0, 0, 2], judp::PORT)).into(),
     };
     let now = Instant::now();
     let mut endpoint = Endpoint::new(Config::default());
-    endpoint.add_link(LinkId(0), [SocketAddr::from(([10, 0, 0, 1], judp::PORT))]);
+    let own = SocketAddr::from(([10, 0, 0, 1], judp::PORT));
+    endpoint.add_link(LinkId(0), LinkProfile::judp([own]));
     endpoint.attach(US).expect("an id of one component");
     endpoint.handle_datagram(now, peer, judp::encode(&frame(2)).expect("a datagram"));
     while endpoint.poll_event().is_some() {}

@@ -14,7 +14,9 @@ use std::time::{Duration, Instant};
 
 use Counter::{AcknowledgementsSent, MessagesDelivered, MessagesReceived};
 use bytes::Bytes;
-use jaus::endpoint::{Config, Counter, Endpoint, Event, LinkId, Path, Received, To, Transmit};
+use jaus::endpoint::{
+    Config, Counter, Endpoint, Event, LinkId, LinkProfile, Path, Received, To, Transmit,
+};
 use jaus::view::{Capture, Network};
 use jaus::wire::{Version, judp};
 
@@ -184,7 +186,8 @@ impl Replay {
     fn new(file: &FilePath, address: &str, ids: &[&str]) -> Self {
         let address: IpAddr = address.parse().expect("an address");
         let mut endpoint = Endpoint::new(Config::default());
-        endpoint.add_link(LinkId(0), [SocketAddr::new(address, judp::PORT)]);
+        let own = SocketAddr::new(address, judp::PORT);
+        endpoint.add_link(LinkId(0), LinkProfile::judp([own]));
         for id in ids {
             endpoint
                 .attach(id.parse().expect("an id"))
@@ -213,7 +216,7 @@ impl Replay {
         self.endpoint.handle_timeout(now);
         let path = Path {
             link: LinkId(0),
-            peer: datagram.source,
+            peer: datagram.source.into(),
         };
         self.endpoint
             .handle_datagram(now, path, datagram.payload.clone());
@@ -301,13 +304,10 @@ fn what_junior_sends_is_taken_as_junior_takes_it() {
                 "{file}: the code comes first"
             );
         }
+        let sender: SocketAddr = "10.77.0.1:3794".parse().expect("an address");
         let acknowledgements = replay.transmits.iter();
         for to in acknowledgements.map(|transmit| transmit.to) {
-            assert_eq!(
-                to,
-                To::Peer("10.77.0.1:3794".parse().expect("an address")),
-                "{file}"
-            );
+            assert_eq!(to, To::Peer(sender.into()), "{file}");
         }
     }
 }

@@ -189,7 +189,7 @@ async fn a_second_node_with_the_same_id_is_announced() {
     let Event::IdConflict { id, path } = conflict else {
         unreachable!()
     };
-    assert_eq!((id, path.peer), (theirs.id(), b.links()[0].local));
+    assert_eq!((id, path.peer), (theirs.id(), b.links()[0].local.into()));
 }
 
 #[tokio::test]

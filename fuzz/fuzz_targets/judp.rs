@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event, LinkId, Outgoing, Path};
+use jaus::endpoint::{Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path};
 use jaus::wire::{Broadcast, Flags, Frame, Kind, Priority, Version, judp};
 use libfuzzer_sys::fuzz_target;
 
@@ -82,7 +82,7 @@ impl<'a> Story<'a> {
         let address = Ipv4Addr::new(10, 0, 0, choice >> 2);
         Path {
             link: LinkId(u16::from(choice & 3)),
-            peer: SocketAddr::new(address.into(), 3794),
+            peer: SocketAddr::new(address.into(), 3794).into(),
         }
     }
 
@@ -135,7 +135,7 @@ fn play(story: &[u8]) {
     let mut endpoint = Endpoint::new(config());
     let mine = JausId::new(1, 1, 1);
     endpoint.attach(mine).expect("the first component");
-    endpoint.add_link(LinkId(0), []);
+    endpoint.add_link(LinkId(0), LinkProfile::judp([]));
     while !story.0.is_empty() {
         match story.octet() % 10 {
             0 => {
@@ -155,7 +155,10 @@ fn play(story: &[u8]) {
             5 => _ = endpoint.send(now, story.outgoing()),
             6 => _ = endpoint.attach(story.id()),
             7 => endpoint.detach(story.id()),
-            8 => endpoint.add_link(LinkId(u16::from(story.octet() & 3)), [story.path().peer]),
+            8 => {
+                let link = LinkId(u16::from(story.octet() & 3));
+                endpoint.add_link(link, LinkProfile::judp(story.path().peer.socket()));
+            }
             _ => drain(&mut endpoint),
         }
         assert!(endpoint.components().count() <= 4);

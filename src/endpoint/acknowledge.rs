@@ -7,7 +7,7 @@ use tracing::debug;
 
 use super::{Config, Counter, Endpoint, Event, Path, To, Transmit};
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Kind, Version, judp, ra};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Kind, Version, ra};
 
 /// Names a sent message in the events about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -150,7 +150,7 @@ impl Endpoint {
             sequence: request.sequence,
             payload: request.payload.slice(..code_len.min(request.payload.len())),
         };
-        let Ok(payload) = judp::encode(&answer) else {
+        let Ok(payload) = self.framing(from.link).encode(&answer) else {
             return;
         };
         let transmit = Transmit {
@@ -158,6 +158,7 @@ impl Endpoint {
             to: To::Peer(from.peer),
             priority: request.flags.priority(),
             payload,
+            segment: None,
         };
         if self.transmit(transmit) {
             self.counters.add(Counter::AcknowledgementsSent);

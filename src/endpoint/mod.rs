@@ -1,7 +1,8 @@
 //! The protocol core of a node: who is here, who is where, what to send and what to deliver.
 //!
 //! An [`Endpoint`] does no I/O and reads no clock. Its owner says what happened
-//! ([`Endpoint::handle_datagram`], [`Endpoint::handle_timeout`]), what is wanted
+//! ([`Endpoint::handle_datagram`] or, where a link has read the frames itself,
+//! [`Endpoint::handle_frame`]; [`Endpoint::handle_timeout`]), what is wanted
 //! ([`Endpoint::attach`], [`Endpoint::send`]), and then polls until there is no more:
 //! [`Endpoint::poll_transmit`] for datagrams to send, [`Endpoint::poll_event`] for messages to
 //! deliver and news, [`Endpoint::poll_timeout`] for when to call `handle_timeout`.
@@ -34,6 +35,7 @@ mod config;
 mod counters;
 mod event;
 mod fragment;
+mod link;
 mod local;
 mod peers;
 mod queue;
@@ -43,22 +45,19 @@ mod send;
 #[cfg(test)]
 mod tests;
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::net::SocketAddr;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Instant;
-
-use bytes::Bytes;
 
 pub use acknowledge::MessageHandle;
 pub use config::{Config, StaticPeer};
 pub use counters::{Counter, Counters};
 pub use event::{Event, Outgoing, Received};
+pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
 pub use peers::Peer;
 pub use send::SendError;
 
 use crate::address::JausId;
-use crate::wire::Priority;
 use acknowledge::Acknowledgements;
 use fragment::Reassembly;
 use local::Components;
@@ -66,47 +65,12 @@ use peers::Peers;
 use queue::PriorityQueue;
 use recent::Recent;
 
-/// A link of the node, numbered by its owner.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct LinkId(pub u16);
-
-/// Where a datagram came from, and where answers go: a socket address as seen through a link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Path {
-    /// The link.
-    pub link: LinkId,
-    /// The address at the other end.
-    pub peer: SocketAddr,
-}
-
-/// Whereto on a link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum To {
-    /// One address.
-    Peer(SocketAddr),
-    /// The link's multicast group, or what it has instead.
-    Group,
-}
-
-/// A datagram that the owner is to send.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Transmit {
-    /// Through this link.
-    pub link: LinkId,
-    /// Whereto.
-    pub to: To,
-    /// How urgent it is, should the link be slower than the endpoint.
-    pub priority: Priority,
-    /// The datagram.
-    pub payload: Bytes,
-}
-
 /// The protocol core of a node. See the [module](self).
 #[derive(Debug)]
 pub struct Endpoint {
     config: Config,
     components: Components,
-    links: BTreeMap<LinkId, BTreeSet<SocketAddr>>,
+    links: BTreeMap<LinkId, LinkProfile>,
     peers: Peers,
     sequence: u16,
     heard: Recent,
@@ -165,13 +129,9 @@ impl Endpoint {
         self.components.iter()
     }
 
-    /// Takes in a link, or tells that its addresses have changed.
-    ///
-    /// `own` are the addresses that the link sends from, as peers see them. A message from one of
-    /// our ids that comes from elsewhere is an id conflict and not an echo of our own multicast;
-    /// without addresses only the content tells.
-    pub fn add_link(&mut self, link: LinkId, own: impl IntoIterator<Item = SocketAddr>) {
-        self.links.insert(link, own.into_iter().collect());
+    /// Takes in a link, or tells that something about it has changed.
+    pub fn add_link(&mut self, link: LinkId, profile: LinkProfile) {
+        self.links.insert(link, profile);
     }
 
     /// Lets a link go, with what was learned through it and what waits to be sent on it.
@@ -179,6 +139,11 @@ impl Endpoint {
         self.links.remove(&link);
         self.peers.forget_link(link);
         self.transmits.retain(|transmit| transmit.link != link);
+    }
+
+    /// Tells that a connection has closed: what was learned through it is forgotten.
+    pub fn forget_path(&mut self, path: Path) {
+        self.peers.forget_path(path);
     }
 
     /// Changes the peers whose address is configured, for instance because links have come or gone.

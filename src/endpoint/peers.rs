@@ -112,6 +112,10 @@ impl Peers {
         self.learned.retain(|_, peer| peer.path.link != link);
     }
 
+    pub(super) fn forget_path(&mut self, path: Path) {
+        self.learned.retain(|_, peer| peer.path != path);
+    }
+
     pub(super) fn iter(&self) -> impl Iterator<Item = Peer> + '_ {
         self.learned.values().copied()
     }

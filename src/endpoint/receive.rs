@@ -31,7 +31,7 @@ impl Endpoint {
         };
         for frame in &mut frames {
             match frame {
-                Ok(frame) => self.receive(now, from, &frame),
+                Ok(frame) => self.handle_frame(now, from, &frame),
                 Err(error) => {
                     debug!(?from, %error, "malformed");
                     return self.counters.add(Counter::Malformed);
@@ -45,8 +45,13 @@ impl Endpoint {
         }
     }
 
-    fn receive(&mut self, now: Instant, from: Path, frame: &Frame) {
+    /// Takes a frame that came from `from`, from a link that reads frames itself. Nothing in it is
+    /// an error, as with [`handle_datagram`](Self::handle_datagram).
+    pub fn handle_frame(&mut self, now: Instant, from: Path, frame: &Frame) {
         self.counters.add(Counter::MessagesReceived);
+        if !self.links.contains_key(&from.link) {
+            return self.counters.add(Counter::UnknownLink);
+        }
         let (source, destination) = (frame.source, frame.destination);
         if let Err(reason) = self.accept(now, from, frame) {
             trace!(%source, %destination, peer = %from.peer, %reason);
@@ -106,9 +111,9 @@ impl Endpoint {
     /// Whether this is our own multicast come back. A component that has gone meanwhile is known by
     /// what it sent.
     fn is_own_echo(&self, now: Instant, from: Path, frame: &Frame) -> bool {
-        let mut own_addresses = self.links.values().flatten().peekable();
+        let mut own_addresses = self.links.values().flat_map(|link| &link.own).peekable();
         let may_be_own =
-            own_addresses.peek().is_none() || own_addresses.any(|&address| address == from.peer);
+            own_addresses.peek().is_none() || own_addresses.any(|&own| from.peer == own);
         let window = self.config.echo_window;
         may_be_own
             && self

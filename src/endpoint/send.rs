@@ -6,11 +6,13 @@ use bytes::Bytes;
 use tracing::trace;
 
 use super::{
-    Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To, Transmit,
-    fragment,
+    Counter, Endpoint, Event, LinkId, LinkProfile, MessageHandle, Outgoing, Path, Received, To,
+    Transmit, fragment,
 };
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, EncodeError, Flags, Frame, Priority, Version, judp};
+use crate::wire::{
+    Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version, judp,
+};
 
 /// Why a message cannot be sent. Nothing of it was.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -273,7 +275,7 @@ impl Endpoint {
             });
         };
         let priority = frame.flags.priority();
-        let payload = judp::encode(&Frame {
+        let payload = self.framing(path.link).encode(&Frame {
             version,
             ..frame.clone()
         })?;
@@ -283,18 +285,29 @@ impl Endpoint {
     /// A frame for the group of every link and for the static peers that multicast does not reach.
     fn to_group(&self, frame: &Frame) -> Result<Vec<Transmit>, SendError> {
         let priority = frame.flags.priority();
-        let payload = judp::encode(frame)?;
-        let group = |&link: &LinkId| Transmit {
-            link,
-            to: To::Group,
-            priority,
-            payload: payload.clone(),
+        let group = |(&link, profile): (&LinkId, &LinkProfile)| {
+            Ok(Transmit {
+                link,
+                to: To::Group,
+                priority,
+                payload: profile.framing.encode(frame)?,
+                segment: None,
+            })
         };
         let copies = self.peers.broadcast_copies(frame.destination);
-        let copies = copies
-            .into_iter()
-            .map(|path| to_path(path, priority, payload.clone()));
-        Ok(self.links.keys().map(group).chain(copies).collect())
+        let copy = |path: Path| {
+            let payload = self.framing(path.link).encode(frame)?;
+            Ok(to_path(path, priority, payload))
+        };
+        let copies = copies.into_iter().map(copy);
+        self.links.iter().map(group).chain(copies).collect()
+    }
+
+    /// How a link frames messages.
+    pub(super) fn framing(&self, link: LinkId) -> Framing {
+        self.links
+            .get(&link)
+            .map_or(Framing::default(), |profile| profile.framing)
     }
 }
 
@@ -304,6 +317,7 @@ fn to_path(path: Path, priority: Priority, payload: Bytes) -> Transmit {
         to: To::Peer(path.peer),
         priority,
         payload,
+        segment: None,
     }
 }
 

@@ -16,7 +16,8 @@ use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
 use crate::address::JausId;
 use crate::endpoint::{
-    AttachError, Endpoint, Event, MessageHandle, Outgoing, Path, Received, SendError, To, Transmit,
+    AttachError, Endpoint, Event, LinkProfile, MessageHandle, Outgoing, Path, Received, Remote,
+    SendError, To, Transmit,
 };
 use crate::link::Slab;
 
@@ -102,8 +103,8 @@ impl Core {
     /// any of them, so each is told all addresses.
     fn announce_links(&mut self) {
         for (id, _) in self.links.iter() {
-            self.endpoint
-                .add_link(id, self.links.iter().map(|(_, link)| link.local()));
+            let own = self.links.iter().map(|(_, link)| link.local());
+            self.endpoint.add_link(id, LinkProfile::judp(own));
         }
         self.endpoint.set_static_peers(self.links.static_peers());
     }
@@ -211,7 +212,10 @@ impl Core {
             return;
         };
         match transmit.to {
-            To::Peer(peer) => link.send_to(peer, transmit.priority, &transmit.payload),
+            To::Peer(Remote::Socket(peer)) => {
+                link.send_to(peer, transmit.priority, &transmit.payload);
+            }
+            To::Peer(Remote::Line) => {}
             To::Group => link.send_to_group(transmit.priority, &transmit.payload),
         }
     }
@@ -235,6 +239,7 @@ impl Core {
         for (id, link) in self.links.iter_mut() {
             let mut batch = 0;
             while let Poll::Ready((peer, datagram)) = link.poll_recv(cx, &mut self.slab) {
+                let peer = Remote::Socket(peer);
                 let path = Path { link: id, peer };
                 self.endpoint.handle_datagram(now, path, datagram);
                 batch += 1;

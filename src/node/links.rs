@@ -99,7 +99,7 @@ impl Links {
         let named = |&peer: &Peer| {
             let path = Path {
                 link: self.link_to(peer.address())?,
-                peer: peer.address(),
+                peer: peer.address().into(),
             };
             Some(StaticPeer {
                 id: peer.id()?,

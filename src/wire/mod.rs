@@ -12,6 +12,7 @@ pub mod as5669;
 pub mod as5669a;
 mod error;
 mod flags;
+mod framing;
 pub mod judp;
 pub mod ra;
 #[cfg(test)]
@@ -23,6 +24,7 @@ use bytes::Bytes;
 
 pub use error::{EncodeError, Error, Problem};
 pub use flags::{Acknowledgement, Broadcast, DataControl, Flags, Kind, Priority};
+pub use framing::Framing;
 
 use crate::address::JausId;
 

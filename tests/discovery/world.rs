@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message;
-use jaus::endpoint::{Config, Endpoint, Event, LinkId, Outgoing, Path, Received, To};
+use jaus::endpoint::{Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path, Received, To};
 use jaus::service::{
     Change, Discovery, Kind, Liveness, Profile, Scope, Service, Stack, Timing, Transport,
 };
@@ -89,7 +89,7 @@ impl World {
         let port = 10_000 + u16::try_from(place).unwrap();
         let address = SocketAddr::from(([10, 0, 0, 1], port));
         let mut endpoint = Endpoint::new(Config::default());
-        endpoint.add_link(LINK, [address]);
+        endpoint.add_link(LINK, LinkProfile::judp([address]));
         endpoint.attach(id).unwrap();
         self.nodes.push(Node {
             address,
@@ -263,14 +263,14 @@ impl World {
         for (from, transmit) in departures {
             let everybody = self.nodes.iter().map(|node| node.address);
             let receivers: Vec<_> = match transmit.to {
-                To::Peer(address) => vec![address],
+                To::Peer(peer) => peer.socket().into_iter().collect(),
                 To::Group => everybody.filter(|address| *address != from).collect(),
             };
             for to in receivers {
                 self.flown += 1;
                 let from = Path {
                     link: LINK,
-                    peer: from,
+                    peer: from.into(),
                 };
                 let flight = Flight {
                     from,

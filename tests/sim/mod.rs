@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::endpoint::{
-    Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, SendError, To,
+    Endpoint, Event, LinkId, LinkProfile, MessageHandle, Outgoing, Path, Received, SendError, To,
 };
 use jaus::wire::judp;
 
@@ -168,7 +168,7 @@ impl<O: Owner> Network<O> {
     pub fn join(&mut self, mut endpoint: Endpoint, owner: O) -> Host {
         let host = self.nodes.len();
         let address = SocketAddr::from(([10, 0, 0, host as u8 + 1], judp::PORT));
-        endpoint.add_link(WIRE, [address]);
+        endpoint.add_link(WIRE, LinkProfile::judp([address]));
         self.nodes.push(Node {
             endpoint,
             owner,
@@ -181,7 +181,7 @@ impl<O: Owner> Network<O> {
     /// Replaces a node by a new one at the same address, as after a crash and a restart.
     pub fn restart(&mut self, host: Host, mut endpoint: Endpoint, owner: O) {
         let address = self.nodes[host.0].address;
-        endpoint.add_link(WIRE, [address]);
+        endpoint.add_link(WIRE, LinkProfile::judp([address]));
         self.nodes[host.0] = Node {
             endpoint,
             owner,
@@ -318,7 +318,7 @@ impl<O: Owner> Network<O> {
         if node.up {
             let path = Path {
                 link: WIRE,
-                peer: flight.from,
+                peer: flight.from.into(),
             };
             node.endpoint
                 .handle_datagram(self.now, path, flight.datagram);
@@ -363,7 +363,7 @@ impl<O: Owner> Network<O> {
         for host in 0..self.nodes.len() {
             let meant = match to {
                 To::Group => true,
-                To::Peer(address) => self.nodes[host].address == address,
+                To::Peer(peer) => peer == self.nodes[host].address,
             };
             if meant && !self.cut.contains(&(from, host)) {
                 self.launch(from, host, datagram);

@@ -133,7 +133,10 @@ fn take(rig: &mut Rig, step: Step) {
             let _ = rig.endpoint.attach(id);
         }
         Step::Detach(id) => rig.endpoint.detach(id),
-        Step::AddLink(link) => rig.endpoint.add_link(LinkId(link), [path(OUR_HOST).peer]),
+        Step::AddLink(link) => {
+            let own = path(OUR_HOST).peer.socket();
+            rig.endpoint.add_link(LinkId(link), LinkProfile::judp(own));
+        }
         Step::RemoveLink(link) => rig.endpoint.remove_link(LinkId(link)),
         Step::Pass(milliseconds) => rig.pass(Duration::from_millis(milliseconds)),
         Step::Poll => {

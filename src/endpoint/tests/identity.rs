@@ -105,7 +105,7 @@ fn two_nodes_on_one_host_are_told_apart_by_what_they_say() {
 #[test]
 fn without_addresses_of_our_own_the_content_tells_an_echo() {
     let mut rig = Rig::new();
-    rig.endpoint.add_link(WIRE, []);
+    rig.endpoint.add_link(WIRE, LinkProfile::judp([]));
     let datagram = broadcast(&mut rig);
     rig.hear_octets(PEER_HOST, datagram);
     assert_eq!((rig.events(), rig.count(Counter::OwnEcho)), (vec![], 1));

@@ -9,10 +9,13 @@ mod identity;
 mod receiving;
 mod sending;
 
+use std::net::SocketAddr;
 use std::time::Duration;
 
+use bytes::Bytes;
+
 use super::*;
-use crate::wire::{Acknowledgement, Broadcast, Flags, Frame, Version, judp};
+use crate::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version, judp};
 
 /// Query Identification about a subsystem.
 const QUERY_IDENTIFICATION: &[u8] = b"\x00\x2B\x02";
@@ -32,7 +35,7 @@ fn id(text: &str) -> JausId {
 fn path(host: u8) -> Path {
     Path {
         link: WIRE,
-        peer: SocketAddr::from(([10, 0, 0, host], judp::PORT)),
+        peer: SocketAddr::from(([10, 0, 0, host], judp::PORT)).into(),
     }
 }
 
@@ -56,7 +59,7 @@ impl Rig {
     )]
     fn with(config: Config) -> Self {
         let mut endpoint = Endpoint::new(config);
-        endpoint.add_link(WIRE, [path(OUR_HOST).peer]);
+        endpoint.add_link(WIRE, LinkProfile::judp(path(OUR_HOST).peer.socket()));
         endpoint.attach(US).unwrap();
         Self {
             endpoint,

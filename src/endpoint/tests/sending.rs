@@ -36,7 +36,7 @@ fn a_message_to_an_unknown_id_goes_to_the_group_until_the_answer_teaches_the_add
 #[test]
 fn a_message_goes_to_the_group_of_every_link() {
     let mut rig = Rig::new();
-    rig.endpoint.add_link(LinkId(7), []);
+    rig.endpoint.add_link(LinkId(7), LinkProfile::judp([]));
     rig.send(Outgoing::new(
         US,
         JausId::EVERYONE,
