@@ -8,7 +8,7 @@ use super::Component;
 use super::driver::{Driver, Publisher};
 use super::handle::Shared;
 use crate::address::JausId;
-use crate::node::{self, Node};
+use crate::node::{self, Node, Port};
 use crate::service::{
     Discovery, Kind, Liveness, Patience, Profile, Scope, Service, Stack, Timing, Transport,
 };
@@ -118,7 +118,19 @@ impl Builder {
     /// Outside of a tokio runtime, which a running node has.
     pub fn attach(self, node: &Node, component: u8) -> Result<Component, AttachError> {
         self.check_names()?;
-        let port = node.attach(component)?;
+        self.live_on(node.attach(component)?)
+    }
+
+    /// Brings the component to life on a port that is there already, such as one to the node of
+    /// this host, which another process runs ([`Host::attach`](node::Host::attach)).
+    ///
+    /// # Errors
+    /// If a name is unusable.
+    ///
+    /// # Panics
+    /// Outside of a tokio runtime, which a port has.
+    pub fn live_on(self, port: Port) -> Result<Component, AttachError> {
+        self.check_names()?;
         let id = port.id();
         let patience = self.patience;
         let stack = self.stack(id);

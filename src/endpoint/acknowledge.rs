@@ -11,7 +11,7 @@ use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Kind, Version,
 
 /// Names a sent message in the events about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct MessageHandle(pub(super) u64);
+pub struct MessageHandle(pub(crate) u64);
 
 /// What an answer repeats: our component, the peer and the sequence number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -44,6 +44,11 @@ impl<T> Backlog<T> {
         self.items == 0
     }
 
+    /// Whether so many more items fit, and less than half of the octets wait.
+    pub(crate) const fn has_room(&self, items: usize) -> bool {
+        self.items + items <= self.bounds.items && self.octets <= self.bounds.octets / 2
+    }
+
     /// Takes an item in; returns how many items went for it.
     #[must_use]
     pub(crate) fn push(&mut self, priority: Priority, octets: usize, item: T) -> u64 {

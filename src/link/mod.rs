@@ -28,6 +28,7 @@ mod error;
 mod group;
 mod holder;
 pub mod interface;
+pub mod local;
 mod slab;
 mod socket_table;
 pub mod udp;

@@ -23,6 +23,7 @@ use std::str::FromStr;
 use super::mailbox::MailboxLimits;
 use crate::address::{JausId, ParseIdError};
 use crate::endpoint;
+use crate::link::local::{Address, Local};
 use crate::link::udp::{self, PortTaken};
 use crate::link::{Group, Interfaces, InvalidGroup, STANDARD_PORT};
 
@@ -70,6 +71,8 @@ pub struct Config {
     pub max_message: usize,
     /// How much may wait for each component.
     pub mailbox: MailboxLimits,
+    /// Where component processes of this host may attach, if at all.
+    pub local: Local,
 }
 
 impl Default for Config {
@@ -97,6 +100,7 @@ impl Config {
             payload_limit: endpoint.payload_limit,
             max_message: endpoint.max_message,
             mailbox: MailboxLimits::default(),
+            local: Local::Off,
         }
     }
 
@@ -136,6 +140,13 @@ impl Config {
     #[must_use]
     pub const fn group(mut self, group: Group) -> Self {
         self.group = group;
+        self
+    }
+
+    /// Serves the component processes of this host there.
+    #[must_use]
+    pub fn local(mut self, address: Address) -> Self {
+        self.local = Local::At(address);
         self
     }
 

@@ -12,14 +12,18 @@ use std::time::{Duration, Instant};
 use tokio::sync::{broadcast, watch};
 
 use super::Config;
+use super::attendance::{Attendance, Departure};
+use super::awaiting::{Awaiting, Waiter};
+use super::error::SendError;
 use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
 use crate::address::JausId;
 use crate::endpoint::{
-    AttachError, Endpoint, Event, LinkProfile, MessageHandle, Outgoing, Path, Received, Remote,
-    SendError, To, Transmit,
+    AttachError, Endpoint, Event, LinkProfile, MessageHandle, Outgoing, Path, Received, Remote, To,
+    Transmit,
 };
 use crate::link::Slab;
+use crate::link::local::Process;
 
 /// Datagrams taken from one link before the others have their turn.
 const BATCH: usize = 32;
@@ -70,6 +74,8 @@ pub(super) struct Core {
     pub(super) endpoint: Endpoint,
     pub(super) links: Links,
     pub(super) mailboxes: BTreeMap<JausId, Arc<Mailbox>>,
+    pub(super) attendance: Attendance,
+    awaiting: Awaiting,
     limits: MailboxLimits,
     /// Gone when the node has stopped, which ends the listeners' streams.
     events: Option<broadcast::Sender<Event>>,
@@ -87,6 +93,8 @@ impl Core {
             endpoint,
             links,
             mailboxes: BTreeMap::new(),
+            attendance: Attendance::new(),
+            awaiting: Awaiting::default(),
             limits,
             events: Some(broadcast::Sender::new(EVENTS)),
             slab: Slab::new(),
@@ -123,19 +131,35 @@ impl Core {
         }
     }
 
-    pub(super) fn attach(&mut self, id: JausId) -> Result<Arc<Mailbox>, AttachError> {
+    /// Takes in a component; `process` is where it lives, if not here.
+    pub(super) fn attach(
+        &mut self,
+        id: JausId,
+        process: Option<Process>,
+    ) -> Result<Arc<Mailbox>, AttachError> {
         self.endpoint.attach(id)?;
         let mailbox = Arc::new(Mailbox::new(self.limits));
         if self.stopped {
             mailbox.close();
         }
         self.mailboxes.insert(id, mailbox.clone());
+        self.attendance.arrive(id, process);
         Ok(mailbox)
     }
 
-    pub(super) fn detach(&mut self, id: JausId) {
-        self.endpoint.detach(id);
-        self.mailboxes.remove(&id);
+    /// Lets a component go, unless somebody else has its id by now.
+    pub(super) fn detach(&mut self, id: JausId, mailbox: &Arc<Mailbox>, why: Departure) {
+        let is_it = |there: &Arc<Mailbox>| Arc::ptr_eq(there, mailbox);
+        if self.mailboxes.get(&id).is_some_and(is_it) {
+            self.endpoint.detach(id);
+            self.mailboxes.remove(&id);
+            self.awaiting.forget_source(id);
+            self.attendance.depart(id, why);
+        }
+    }
+
+    pub(super) const fn is_stopping(&self) -> bool {
+        self.stop_at.is_some()
     }
 
     pub(super) fn subscribe(&self) -> broadcast::Receiver<Event> {
@@ -145,11 +169,20 @@ impl Core {
             .map_or_else(ended, broadcast::Sender::subscribe)
     }
 
-    pub(super) fn send(&mut self, message: Outgoing) -> Result<MessageHandle, SendError> {
+    /// Sends a message; `waiter` is told what becomes of it, if it wants an acknowledgement.
+    pub(super) fn send(
+        &mut self,
+        message: Outgoing,
+        waiter: Option<Waiter>,
+    ) -> Result<MessageHandle, SendError> {
+        let source = message.source;
         let result = self.endpoint.send(now(), message);
+        if let (Ok(handle), Some(waiter)) = (&result, waiter) {
+            self.awaiting.insert(*handle, source, waiter);
+        }
         self.pump();
         self.wake_driver();
-        result
+        Ok(result?)
     }
 
     /// Begins to shut down; the driver finishes.
@@ -202,7 +235,10 @@ impl Core {
         while let Some(event) = self.endpoint.poll_event() {
             match event {
                 Event::Received(message) => self.deliver(message),
-                news => self.announce(news),
+                news => {
+                    self.awaiting.handle_event(&news);
+                    self.announce(news);
+                }
             }
         }
     }
@@ -268,6 +304,8 @@ impl Core {
             self.endpoint.detach(id);
             mailbox.close();
         }
+        self.awaiting.clear();
+        self.attendance.end();
         for (id, _) in self.links.iter() {
             self.endpoint.remove_link(id);
         }

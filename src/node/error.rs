@@ -1,9 +1,12 @@
-//! Why a node cannot start.
+//! What can go wrong with a node: at its start, when sending, when attaching from elsewhere.
 
 use std::net::Ipv4Addr;
 
 use super::{ConfigError, Peer};
+use crate::address::JausId;
+use crate::endpoint;
 use crate::link;
+use crate::link::local::record::Reason;
 
 /// Why a node was not started. Nothing of it runs.
 #[derive(Debug, thiserror::Error)]
@@ -15,6 +18,9 @@ pub enum StartError {
     /// A link cannot be opened.
     #[error(transparent)]
     Link(#[from] link::Error),
+    /// The component processes of this host cannot be served.
+    #[error(transparent)]
+    Local(#[from] link::local::Error),
     /// A peer lies behind an interface that was not chosen.
     #[error(
         "the peer {peer} is reached from {local}, and that is none of the chosen interfaces \
@@ -34,4 +40,76 @@ pub enum StartError {
          (`#[tokio::main]`, or `Runtime::enter`)"
     )]
     NoRuntime,
+}
+
+/// Why a message was not sent. Nothing of it was.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SendError {
+    /// The node's endpoint says what is wrong with it.
+    #[error(transparent)]
+    Endpoint(#[from] endpoint::SendError),
+    /// The component is attached to the host's node, and that is gone just now.
+    #[error(
+        "{0} has no connection to the node of this host just now; it is made again as soon as the \
+         node is back"
+    )]
+    NotConnected(JausId),
+    /// The host's node takes messages more slowly than the component sends them.
+    #[error("{octets} octets wait for the node of this host already: send more slowly")]
+    Busy {
+        /// How much waits.
+        octets: usize,
+    },
+}
+
+/// Why it is not known that a message has arrived.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Undelivered {
+    /// It was not sent.
+    #[error(transparent)]
+    NotSent(#[from] SendError),
+    /// The host's node would not send it, and says why in its own words.
+    #[error("the node of this host did not send it: {0}")]
+    Rejected(String),
+    /// The receiver refused it (NAK).
+    #[error("{destination} refused the message")]
+    Refused {
+        /// For whom it was.
+        destination: JausId,
+    },
+    /// It was sent, again and again, and not acknowledged.
+    #[error(
+        "{destination} has acknowledged {acknowledged} of {length} octets, and nothing more came \
+         in time"
+    )]
+    NotAcknowledged {
+        /// For whom it was.
+        destination: JausId,
+        /// Octets that were acknowledged.
+        acknowledged: usize,
+        /// Octets of the message.
+        length: usize,
+    },
+    /// The component or its node went away before an answer came. The message may have arrived.
+    #[error("the node was lost before it could tell whether the message arrived")]
+    Lost,
+}
+
+/// Why a component could not be attached to the host's node.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum HostError {
+    /// The node cannot be reached.
+    #[error(transparent)]
+    Link(#[from] link::local::Error),
+    /// The node would not have the component, and says why in its own words.
+    #[error("the node of this host refuses: {words}")]
+    Refused {
+        /// Why, for programs.
+        reason: Reason,
+        /// Why, for people.
+        words: String,
+    },
 }

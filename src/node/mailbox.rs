@@ -10,6 +10,9 @@ use std::task::{Context, Poll, Waker};
 use crate::endpoint::Received;
 use crate::link::backlog::{Backlog, Bounds};
 
+/// Who waits for room is woken when the number of messages is a multiple of this.
+const WAKE_WRITER: usize = 128;
+
 /// How much a mailbox holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -25,7 +28,7 @@ pub struct MailboxLimits {
 impl Default for MailboxLimits {
     fn default() -> Self {
         Self {
-            messages: 1024,
+            messages: 4096,
             octets: 8 << 20,
         }
     }
@@ -56,6 +59,8 @@ struct Inner {
     dropped: u64,
     closed: bool,
     reader: Option<Waker>,
+    /// Who fills the mailbox, if it waits for room.
+    writer: Option<Waker>,
 }
 
 impl Mailbox {
@@ -71,6 +76,7 @@ impl Mailbox {
                 dropped: 0,
                 closed: false,
                 reader: None,
+                writer: None,
             }),
         }
     }
@@ -87,18 +93,59 @@ impl Mailbox {
     /// The most urgent message, the oldest of these; `None` when the mailbox is closed and empty.
     pub(super) fn poll_pop(&self, cx: &mut Context<'_>) -> Poll<Option<Received>> {
         let mut inner = self.lock();
-        if let Some(message) = inner.messages.pop() {
+        if let Some(message) = inner.pop() {
             return Poll::Ready(Some(message));
         }
         if inner.closed {
             return Poll::Ready(None);
         }
-        inner.reader = Some(cx.waker().clone());
+        inner.await_more(cx);
         Poll::Pending
     }
 
     pub(super) fn pop(&self) -> Option<Received> {
-        self.lock().messages.pop()
+        self.lock().pop()
+    }
+
+    /// Gives messages to `each` as long as that wants more, in the order of [`poll_pop`]. Ready
+    /// when the mailbox is closed and empty.
+    ///
+    /// [`poll_pop`]: Self::poll_pop
+    pub(super) fn poll_drain(
+        &self,
+        cx: &mut Context<'_>,
+        mut each: impl FnMut(Received) -> bool,
+    ) -> Poll<()> {
+        let mut inner = self.lock();
+        while let Some(message) = inner.pop() {
+            if !each(message) {
+                return Poll::Pending;
+            }
+        }
+        if inner.closed {
+            return Poll::Ready(());
+        }
+        inner.await_more(cx);
+        Poll::Pending
+    }
+
+    /// Waits until so many more messages fit, or none waits.
+    pub(super) fn poll_room(&self, cx: &mut Context<'_>, messages: usize) -> Poll<()> {
+        let mut inner = self.lock();
+        if inner.messages.is_empty() || inner.messages.has_room(messages) {
+            return Poll::Ready(());
+        }
+        match &inner.writer {
+            Some(waker) if waker.will_wake(cx.waker()) => {}
+            _ => inner.writer = Some(cx.waker().clone()),
+        }
+        Poll::Pending
+    }
+
+    /// Messages taken out until now.
+    pub(super) fn taken(&self) -> u64 {
+        let inner = self.lock();
+        inner.delivered - inner.dropped - inner.messages.len() as u64
     }
 
     /// Nothing more will come; what waits can still be read.
@@ -123,6 +170,24 @@ impl Mailbox {
 }
 
 impl Inner {
+    fn pop(&mut self) -> Option<Received> {
+        let message = self.messages.pop();
+        if let Some(writer) = self
+            .writer
+            .take_if(|_| self.messages.len().is_multiple_of(WAKE_WRITER))
+        {
+            writer.wake();
+        }
+        message
+    }
+
+    fn await_more(&mut self, cx: &Context<'_>) {
+        match &self.reader {
+            Some(waker) if waker.will_wake(cx.waker()) => {}
+            _ => self.reader = Some(cx.waker().clone()),
+        }
+    }
+
     fn wake(&mut self) {
         if let Some(reader) = self.reader.take() {
             reader.wake();

@@ -32,11 +32,15 @@
 //! # }
 //! ```
 
+mod attendance;
+mod awaiting;
 mod config;
 mod core;
 mod driver;
 mod error;
+mod host;
 mod links;
+mod local;
 mod mailbox;
 mod port;
 
@@ -45,17 +49,22 @@ use std::sync::Arc;
 
 use tokio::sync::broadcast;
 
+pub use self::attendance::{ComponentEvent, Departure};
 pub use self::config::{Config, ConfigError, Peer};
-pub use self::error::StartError;
+pub use self::error::{HostError, SendError, StartError, Undelivered};
+pub use self::host::{Host, HostEvent, HostEvents};
 pub use self::mailbox::{MailboxCounters, MailboxLimits};
 pub use self::port::{Port, Sender};
-pub use crate::endpoint::{AttachError, SendError};
+pub use crate::endpoint::AttachError;
+pub use crate::link::local::{Address, Local, Process};
 
 use self::core::Shared;
 use self::driver::Driver;
 use self::links::Links;
+use self::local::Reception;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
+use crate::link::local::Door;
 use crate::link::{Interface, udp};
 
 /// A handle to a running node. Cheap to clone.
@@ -87,8 +96,17 @@ impl Node {
         config.validate()?;
         let runtime = tokio::runtime::Handle::try_current().map_err(|_| StartError::NoRuntime)?;
         let links = Links::open(&config)?;
+        let door = match &config.local {
+            Local::Off => None,
+            Local::At(address) => Some(Door::open(address)?),
+        };
         let shared = Arc::new(Shared::new(&config, links));
         runtime.spawn(Driver::new(shared.clone()));
+        if let Some(door) = door {
+            tracing::info!(place = door.place(), "components of this host may attach");
+            let node = (config.subsystem, config.node);
+            runtime.spawn(Reception::new(shared.clone(), node, config.max_message).run(door));
+        }
         Ok(Self {
             config: Arc::new(config),
             guard: Arc::new(Guard(shared)),
@@ -107,7 +125,7 @@ impl Node {
     /// A number that names no single component, or is attached already.
     pub fn attach(&self, component: u8) -> Result<Port, AttachError> {
         let id = JausId::new(self.config.subsystem, self.config.node, component);
-        let mailbox = self.shared().lock().attach(id)?;
+        let mailbox = self.shared().lock().attach(id, None)?;
         Ok(Port::new(id, mailbox, self.guard.clone()))
     }
 
@@ -146,6 +164,12 @@ impl Node {
             .iter()
             .map(|(id, mailbox)| (*id, mailbox.counters()))
             .collect()
+    }
+
+    /// News from now on about components: who comes, goes, or reads nothing.
+    #[must_use]
+    pub fn component_events(&self) -> ComponentEvents {
+        ComponentEvents(self.shared().lock().attendance.subscribe())
     }
 
     /// News from now on: peers learned and moved, id conflicts, acknowledgements.
@@ -211,5 +235,23 @@ impl Events {
     #[must_use]
     pub const fn missed(&self) -> u64 {
         self.missed
+    }
+}
+
+/// A listener to the news about a node's components. One that falls behind by more than 256 misses
+/// the oldest.
+#[derive(Debug)]
+pub struct ComponentEvents(broadcast::Receiver<ComponentEvent>);
+
+impl ComponentEvents {
+    /// Waits for the next event; `None` when the node is gone.
+    pub async fn recv(&mut self) -> Option<ComponentEvent> {
+        loop {
+            match self.0.recv().await {
+                Ok(event) => return Some(event),
+                Err(broadcast::error::RecvError::Lagged(_)) => {}
+                Err(broadcast::error::RecvError::Closed) => return None,
+            }
+        }
     }
 }

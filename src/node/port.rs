@@ -1,13 +1,19 @@
-//! A component's door to the node: it sends here and reads its mailbox.
+//! A component's door to the node: it sends here and reads its mailbox. The node is in the same
+//! process, or in another one of the same host.
 
 use std::sync::Arc;
 use std::task::{Context, Poll};
 
+use tokio::sync::oneshot;
+
+use super::attendance::Departure;
+use super::awaiting::Waiter;
 use super::core::Shared;
+use super::host::{HostEvents, Line};
 use super::mailbox::{Mailbox, MailboxCounters};
-use super::{Guard, SendError};
+use super::{Guard, SendError, Undelivered};
 use crate::address::JausId;
-use crate::endpoint::{MessageHandle, Outgoing, Received};
+use crate::endpoint::{self, MessageHandle, Outgoing, Received};
 
 /// An attached component, until it is dropped.
 ///
@@ -17,20 +23,27 @@ use crate::endpoint::{MessageHandle, Outgoing, Received};
 pub struct Port {
     sender: Sender,
     mailbox: Arc<Mailbox>,
-    /// Keeps the node running.
-    _guard: Arc<Guard>,
+    /// Keeps a node of the same process running.
+    _guard: Option<Arc<Guard>>,
 }
 
 impl Port {
     pub(super) fn new(id: JausId, mailbox: Arc<Mailbox>, guard: Arc<Guard>) -> Self {
-        let sender = Sender {
-            id,
-            shared: guard.0.clone(),
-        };
+        let way = Way::Here(guard.0.clone());
         Self {
-            sender,
+            sender: Sender { id, way },
             mailbox,
-            _guard: guard,
+            _guard: Some(guard),
+        }
+    }
+
+    pub(super) fn to_host(line: Arc<Line>) -> Self {
+        let (id, mailbox) = (line.id(), line.mailbox().clone());
+        let way = Way::Host(line);
+        Self {
+            sender: Sender { id, way },
+            mailbox,
+            _guard: None,
         }
     }
 
@@ -48,13 +61,22 @@ impl Port {
         self.sender.send(message)
     }
 
+    /// Sends a message and waits for its acknowledgement; see [`Sender::deliver`].
+    ///
+    /// # Errors
+    /// Those of [`Sender::deliver`].
+    pub async fn deliver(&self, message: Outgoing) -> Result<(), Undelivered> {
+        self.sender.deliver(message).await
+    }
+
     /// A way to send that can be given to other tasks.
     #[must_use]
     pub fn sender(&self) -> Sender {
         self.sender.clone()
     }
 
-    /// Waits for the next message; `None` when the node has stopped.
+    /// Waits for the next message; `None` when the node has stopped. A component that is attached
+    /// to the node of its host waits for that to come back instead.
     ///
     /// Nothing is lost if the returned future is dropped.
     pub async fn recv(&mut self) -> Option<Received> {
@@ -76,11 +98,32 @@ impl Port {
     pub fn counters(&self) -> MailboxCounters {
         self.mailbox.counters()
     }
+
+    /// Whether the node is there; see [`Sender::is_connected`].
+    #[must_use]
+    pub fn is_connected(&self) -> bool {
+        self.sender.is_connected()
+    }
+
+    /// News from now on about the line to the host's node; none for a node in the same process.
+    #[must_use]
+    pub fn host_events(&self) -> HostEvents {
+        match &self.sender.way {
+            Way::Here(_) => HostEvents::none(),
+            Way::Host(line) => line.events(),
+        }
+    }
 }
 
 impl Drop for Port {
     fn drop(&mut self) {
-        self.sender.shared.lock().detach(self.sender.id);
+        match &self.sender.way {
+            Way::Here(shared) => {
+                let mut core = shared.lock();
+                core.detach(self.sender.id, &self.mailbox, Departure::Left);
+            }
+            Way::Host(line) => line.leave(),
+        }
     }
 }
 
@@ -88,7 +131,14 @@ impl Drop for Port {
 #[derive(Clone, Debug)]
 pub struct Sender {
     id: JausId,
-    shared: Arc<Shared>,
+    way: Way,
+}
+
+/// Where the node is.
+#[derive(Clone, Debug)]
+enum Way {
+    Here(Arc<Shared>),
+    Host(Arc<Line>),
 }
 
 impl Sender {
@@ -99,15 +149,59 @@ impl Sender {
     }
 
     /// Sends a message, up to the network's door: when this returns, the datagram is with the
-    /// operating system, or a local receiver has it in its mailbox.
+    /// operating system, or a local receiver has it in its mailbox. To the node of another
+    /// process, when this returns the message is on its way there; what that node finds wrong
+    /// with it comes as [`HostEvent::Rejected`](super::HostEvent::Rejected).
     ///
     /// # Errors
-    /// What the endpoint says is wrong with the message; [`SendError::UnknownSource`] also when
-    /// its source is not this component, or the node has stopped.
+    /// What the endpoint says is wrong with the message; also when its source is not this
+    /// component, or the node has stopped. [`SendError::NotConnected`] while the host's node is
+    /// gone: nothing is kept for later, because commands that come late do harm.
     pub fn send(&self, message: Outgoing) -> Result<MessageHandle, SendError> {
-        if message.source != self.id {
-            return Err(SendError::UnknownSource(message.source));
+        self.check_source(&message)?;
+        match &self.way {
+            Way::Here(shared) => shared.lock().send(message, None),
+            Way::Host(line) => line.send(message, None),
         }
-        self.shared.lock().send(message)
+    }
+
+    /// Sends a message that wants an acknowledgement, and waits for that. Dropping the future
+    /// forgets the message, which may still arrive.
+    ///
+    /// # Errors
+    /// [`Undelivered`] says what was not acknowledged, and why.
+    pub async fn deliver(&self, mut message: Outgoing) -> Result<(), Undelivered> {
+        self.check_source(&message)?;
+        message.acknowledge = true;
+        let (tell, told) = oneshot::channel();
+        match &self.way {
+            Way::Here(shared) => shared.lock().send(message, Some(Waiter::Here(tell))),
+            Way::Host(line) => line.send(message, Some(tell)),
+        }?;
+        told.await.unwrap_or(Err(Undelivered::Lost))
+    }
+
+    /// Waits until the host's node has taken all that was sent. A node of the same process takes
+    /// everything at once.
+    pub async fn flushed(&self) {
+        if let Way::Host(line) = &self.way {
+            line.flushed().await;
+        }
+    }
+
+    /// Whether the host's node is there. One of the same process always is, until it is stopped.
+    #[must_use]
+    pub fn is_connected(&self) -> bool {
+        match &self.way {
+            Way::Here(shared) => !*shared.stopped.borrow(),
+            Way::Host(line) => line.is_connected(),
+        }
+    }
+
+    fn check_source(&self, message: &Outgoing) -> Result<(), SendError> {
+        if message.source == self.id {
+            return Ok(());
+        }
+        Err(endpoint::SendError::UnknownSource(message.source).into())
     }
 }

@@ -1,0 +1,142 @@
+//! Where the node of a host is found: a socket in the file system, or a port of loopback.
+
+use std::fmt;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Where a node serves the component processes of its host: `default`, the path of a socket, or a
+/// port of loopback such as `127.0.0.1:3795`.
+///
+/// The default is `jaus/node.sock` in the user's runtime directory (`$XDG_RUNTIME_DIR`, else
+/// `/run/user/UID`), or `/tmp/jaus-UID/node.sock` where there is none; on systems without Unix
+/// sockets the port 127.0.0.1:37940.
+///
+/// A Unix socket is for the processes of one user (and of root), and the operating system says who
+/// is at the other end. **A port of loopback is open to everybody who can run a program on the
+/// host**: use it where there is nothing else.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Address {
+    /// The usual place.
+    #[default]
+    Default,
+    /// A Unix stream socket.
+    Path(PathBuf),
+    /// A TCP port of loopback.
+    Tcp(SocketAddr),
+}
+
+/// Whether a node serves other processes: `off`, or an [`Address`].
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Local {
+    /// It does not.
+    #[default]
+    Off,
+    /// It does, there.
+    At(Address),
+}
+
+/// Not the address of a local link.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` is no address of a local link: write `default`, the path of a socket such as \
+     /run/jaus/node.sock or ./node.sock, or a port of loopback such as 127.0.0.1:37940"
+)]
+pub struct InvalidAddress(String);
+
+impl FromStr for Address {
+    type Err = InvalidAddress;
+
+    fn from_str(text: &str) -> Result<Self, InvalidAddress> {
+        let wrong = || InvalidAddress(text.to_owned());
+        if text == "default" {
+            return Ok(Self::Default);
+        }
+        if text.contains('/') && !text.ends_with('/') {
+            return Ok(Self::Path(text.into()));
+        }
+        let port: SocketAddr = text.parse().map_err(|_| wrong())?;
+        let usable = port.ip().is_loopback() && port.port() != 0;
+        usable.then_some(Self::Tcp(port)).ok_or_else(wrong)
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Default => f.pad("default"),
+            Self::Path(path) => path.display().fmt(f),
+            Self::Tcp(port) => port.fmt(f),
+        }
+    }
+}
+
+impl FromStr for Local {
+    type Err = InvalidAddress;
+
+    fn from_str(text: &str) -> Result<Self, InvalidAddress> {
+        match text {
+            "off" => Ok(Self::Off),
+            text => text.parse().map(Self::At),
+        }
+    }
+}
+
+impl fmt::Display for Local {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Off => f.pad("off"),
+            Self::At(address) => address.fmt(f),
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for Local {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        text.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl serde::Serialize for Local {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_local_link_is_off_or_at_the_usual_place_a_path_or_a_port_of_loopback() {
+        for text in [
+            "off",
+            "default",
+            "/run/jaus/x.sock",
+            "127.0.0.1:37940",
+            "[::1]:37940",
+        ] {
+            let local: Local = text.parse().unwrap();
+            assert_eq!(local.to_string(), text);
+        }
+    }
+
+    #[test]
+    fn what_others_could_reach_is_refused_with_what_would_do() {
+        for wrong in [
+            "",
+            "on",
+            "10.0.0.1:3794",
+            "0.0.0.0:3794",
+            "127.0.0.1:0",
+            "/run/",
+        ] {
+            let error = wrong.parse::<Local>().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{wrong}`")), "{error}");
+            assert!(error.contains("127.0.0.1:37940"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! What can go wrong on a local link, said so that a person can put it right.
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use super::record::RecordError;
+
+/// Why a node cannot serve the component processes of its host, or a component cannot reach it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Nobody listens there.
+    #[error(
+        "no node serves components at {place}: start one with `jaus node --local` (or `local = …` \
+         in its settings), or give the component a node of its own"
+    )]
+    NoNode {
+        /// Where it was looked for.
+        place: String,
+    },
+    /// Another node has the socket.
+    #[error(
+        "another node{} serves the components at {}: end it, or choose another path for one of \
+         the two", process(*pid), path.display()
+    )]
+    Served {
+        /// The socket.
+        path: PathBuf,
+        /// The process of the other node, if the system tells.
+        pid: Option<u32>,
+    },
+    /// The port is in use.
+    #[error("the TCP port {0} is taken: choose another for the local link")]
+    PortTaken(SocketAddr),
+    /// There is a file of another kind in the socket's place.
+    #[error(
+        "{} is in the way of the local link's socket and is no socket: choose another path, or \
+         move it", .0.display()
+    )]
+    NoSocket(PathBuf),
+    /// Others could put their own socket in the place of ours.
+    #[error(
+        "the directory {} of the local link's socket is not safe: {why}. {remedy}",
+        directory.display()
+    )]
+    UnsafeDirectory {
+        /// The directory.
+        directory: PathBuf,
+        /// What is wrong with it.
+        why: String,
+        /// What to do.
+        remedy: String,
+    },
+    /// Whoever listens there belongs to another user, and could be anybody.
+    #[error(
+        "what serves components at {place} belongs to user {uid} and not to us (user {own}) or \
+         root: attach as that user, or choose another address"
+    )]
+    Foreign {
+        /// Where.
+        place: String,
+        /// Whose it is.
+        uid: u32,
+        /// Who we are.
+        own: u32,
+    },
+    /// The other side said something that is not in the protocol.
+    #[error("the other side of the local link cannot be understood: {0}")]
+    Record(#[from] RecordError),
+    /// The other side is gone.
+    #[error("the connection was closed by the other side")]
+    Closed,
+    /// It did not answer.
+    #[error(
+        "what listens at {place} does not greet: it hangs, or it is no node; look who it is \
+         (`ss -xlp`, `ss -tlp`)"
+    )]
+    Mute {
+        /// Where.
+        place: String,
+    },
+    /// This system has no Unix sockets.
+    #[error("this system has no Unix sockets: use a port of loopback such as 127.0.0.1:37940")]
+    NoUnixSockets,
+    /// Anything else that the operating system refuses.
+    #[error("{doing} failed: {source}")]
+    Io {
+        /// What was attempted.
+        doing: String,
+        /// The operating system's words.
+        source: io::Error,
+    },
+}
+
+impl Error {
+    pub(crate) fn io(doing: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
+        |source| Self::Io {
+            doing: doing.into(),
+            source,
+        }
+    }
+}
+
+fn process(pid: Option<u32>) -> String {
+    pid.map_or_else(String::new, |pid| format!(" (process {pid})"))
+}

@@ -1,0 +1,243 @@
+//! The door in the file system: directory and socket with their rights, and stale sockets.
+
+use std::fs::{self, DirBuilder, Metadata, Permissions};
+use std::io::{self, ErrorKind};
+use std::os::unix::fs::{DirBuilderExt, FileTypeExt, MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+
+use tokio::net::{UnixListener, UnixStream};
+
+use super::Error;
+use super::door::Guest;
+use super::stream::{own_uid, pid_of, unix_halves};
+
+/// A Unix socket that is removed when the node ends.
+#[derive(Debug)]
+pub(crate) struct UnixDoor {
+    listener: UnixListener,
+    path: PathBuf,
+    /// Device and number of the socket's file: another may have taken its place.
+    file: (u64, u64),
+    owner: u32,
+}
+
+impl UnixDoor {
+    pub(super) fn open(path: &Path) -> Result<Self, Error> {
+        let owner = own_uid()?;
+        check_directory(parent(path), owner, 0o022)?;
+        let listener = bind(path)?;
+        let doing = || format!("setting the rights of {}", path.display());
+        let rights = Permissions::from_mode(0o600);
+        fs::set_permissions(path, rights).map_err(Error::io(doing()))?;
+        let metadata = fs::symlink_metadata(path).map_err(Error::io(doing()))?;
+        Ok(Self {
+            listener,
+            path: path.to_owned(),
+            file: (metadata.dev(), metadata.ino()),
+            owner,
+        })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) async fn accept(&self) -> Result<Guest, Error> {
+        let accepted = self.listener.accept().await;
+        let (stream, _) = accepted.map_err(Error::io("accepting a component"))?;
+        let credentials = stream
+            .peer_cred()
+            .map_err(Error::io("asking the system whose component that is"))?;
+        if !may_enter(credentials.uid(), self.owner) {
+            return Err(Error::Foreign {
+                place: self.path.display().to_string(),
+                uid: credentials.uid(),
+                own: self.owner,
+            });
+        }
+        let pid = pid_of(&credentials);
+        let (read, write) = unix_halves(stream);
+        Ok(Guest { read, write, pid })
+    }
+}
+
+impl Drop for UnixDoor {
+    fn drop(&mut self) {
+        let is_ours = |file: Metadata| (file.dev(), file.ino()) == self.file;
+        if fs::symlink_metadata(&self.path).is_ok_and(is_ours) {
+            // A file that stays is recognised as stale by the next node.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// The owner's components and root's.
+pub(super) const fn may_enter(uid: u32, owner: u32) -> bool {
+    uid == owner || uid == 0
+}
+
+/// The usual path of the socket, whether it exists or not.
+pub(super) fn default_path() -> Result<PathBuf, Error> {
+    Ok(default_directory()?.join("node.sock"))
+}
+
+/// The usual path, in a directory that exists and is the owner's alone.
+pub(super) fn make_default() -> Result<PathBuf, Error> {
+    let directory = default_directory()?;
+    match DirBuilder::new().mode(0o700).create(&directory) {
+        Err(error) if error.kind() != ErrorKind::AlreadyExists => {
+            return Err(Error::io(format!("making {}", directory.display()))(error));
+        }
+        _ => check_directory(&directory, own_uid()?, 0o077)?,
+    }
+    Ok(directory.join("node.sock"))
+}
+
+fn default_directory() -> Result<PathBuf, Error> {
+    let given = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
+    if let Some(directory) = given.filter(|directory| directory.is_absolute()) {
+        return Ok(directory.join("jaus"));
+    }
+    let uid = own_uid()?;
+    let of_user = PathBuf::from(format!("/run/user/{uid}"));
+    if of_user.is_dir() {
+        return Ok(of_user.join("jaus"));
+    }
+    Ok(PathBuf::from(format!("/tmp/jaus-{uid}")))
+}
+
+fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if parent.as_os_str().is_empty() => Path::new("."),
+        Some(parent) => parent,
+        None => path,
+    }
+}
+
+/// Makes sure that nobody else can put anything into the directory: it is ours or root's, and
+/// none of the rights in `forbidden` is given, unless only owners can remove what is theirs.
+fn check_directory(directory: &Path, own: u32, forbidden: u32) -> Result<(), Error> {
+    let unsafe_because = |why: String, remedy: String| {
+        Err(Error::UnsafeDirectory {
+            directory: directory.to_owned(),
+            why,
+            remedy,
+        })
+    };
+    let doing = || format!("looking at {}", directory.display());
+    let metadata = if forbidden == 0o077 {
+        // The directory that we make ourselves may be no link to elsewhere.
+        fs::symlink_metadata(directory)
+    } else {
+        fs::metadata(directory)
+    };
+    let metadata = match metadata {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            let remedy = format!("Make it: `mkdir -m 700 {}`", directory.display());
+            return unsafe_because("it does not exist".into(), remedy);
+        }
+        other => other.map_err(Error::io(doing()))?,
+    };
+    let (uid, mode) = (metadata.uid(), metadata.mode() & 0o7777);
+    if !metadata.is_dir() {
+        return unsafe_because("it is no directory".into(), "Choose another path.".into());
+    }
+    if uid != own && uid != 0 {
+        let why = format!("it belongs to user {uid}, and we are user {own}");
+        return unsafe_because(why, "Choose a directory of your own.".into());
+    }
+    let only_owners_remove = forbidden == 0o022 && mode & 0o1000 != 0;
+    if mode & forbidden != 0 && !only_owners_remove {
+        let why = format!("its mode is {mode:o}, so that others can change what is in it");
+        let remedy = format!("Close it: `chmod 700 {}`", directory.display());
+        return unsafe_because(why, remedy);
+    }
+    Ok(())
+}
+
+/// Listens, in the place of a dead node's socket if need be.
+fn bind(path: &Path) -> Result<UnixListener, Error> {
+    let failed = |source| Error::io(format!("listening at {}", path.display()))(source);
+    match UnixListener::bind(path) {
+        Err(error) if error.kind() == ErrorKind::AddrInUse => {}
+        bound => return bound.map_err(failed),
+    }
+    let served = |pid| {
+        let path = path.to_owned();
+        Err(Error::Served { path, pid })
+    };
+    match look(path)? {
+        Found::Nothing => {}
+        Found::Other => return Err(Error::NoSocket(path.to_owned())),
+        Found::Alive(pid) => return served(pid),
+        // Moved away first: between looking and removing, another node may have come.
+        Found::Dead => {
+            let aside = path.with_extension(format!("dead-{}", std::process::id()));
+            match fs::rename(path, &aside) {
+                Err(error) if error.kind() == ErrorKind::NotFound => {}
+                moved => moved.map_err(failed)?,
+            }
+            if let Found::Alive(pid) = look(&aside)? {
+                let _ = fs::rename(&aside, path);
+                return served(pid);
+            }
+            let _ = fs::remove_file(&aside);
+            tracing::info!(path = %path.display(), "replaced the socket of a node that is gone");
+        }
+    }
+    match UnixListener::bind(path) {
+        Err(error) if error.kind() == ErrorKind::AddrInUse => served(None),
+        bound => bound.map_err(failed),
+    }
+}
+
+/// What is in the place of our socket.
+enum Found {
+    Nothing,
+    Alive(Option<u32>),
+    Dead,
+    Other,
+}
+
+fn look(path: &Path) -> Result<Found, Error> {
+    let doing = || format!("looking at {}", path.display());
+    let metadata = match fs::symlink_metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
+        other => other.map_err(Error::io(doing()))?,
+    };
+    if !metadata.file_type().is_socket() {
+        return Ok(Found::Other);
+    }
+    match try_connect(path) {
+        Ok(stream) => {
+            let pid = stream.peer_cred().ok().and_then(|peer| pid_of(&peer));
+            Ok(Found::Alive(pid))
+        }
+        Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(Found::Dead),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(Found::Nothing),
+        // Somebody listens whose queue is full.
+        Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(Found::Alive(None)),
+        Err(error) => Err(Error::io(doing())(error)),
+    }
+}
+
+/// Connects without waiting.
+fn try_connect(path: &Path) -> io::Result<UnixStream> {
+    use socket2::{Domain, SockAddr, Socket, Type};
+    let socket = Socket::new(Domain::UNIX, Type::STREAM, None)?;
+    socket.set_nonblocking(true)?;
+    socket.connect(&SockAddr::unix(path)?)?;
+    let stream = std::os::unix::net::UnixStream::from(std::os::fd::OwnedFd::from(socket));
+    UnixStream::from_std(stream)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_owner_and_root_may_enter() {
+        assert!(may_enter(1000, 1000) && may_enter(0, 1000));
+        assert!(!may_enter(1001, 1000) && !may_enter(1000, 0));
+    }
+}

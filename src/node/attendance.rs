@@ -1,0 +1,137 @@
+//! Which components are attached, and from which process; the news about them.
+
+use std::collections::BTreeMap;
+
+use tokio::sync::broadcast;
+
+use crate::address::JausId;
+use crate::link::local::Process;
+
+/// Events kept for a slow listener.
+const KEPT: usize = 256;
+
+/// News about the components of a node.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum ComponentEvent {
+    /// A component was attached.
+    Attached {
+        /// Who.
+        id: JausId,
+        /// From where; `None`: from the node's own process.
+        process: Option<Process>,
+    },
+    /// A component is not attached any more.
+    Detached {
+        /// Who.
+        id: JausId,
+        /// Where it was.
+        process: Option<Process>,
+        /// Why.
+        why: Departure,
+    },
+    /// Somebody was not attached.
+    Refused {
+        /// Who it was.
+        process: Process,
+        /// What it was told.
+        why: String,
+    },
+    /// A component process reads nothing. Its messages wait, up to the bounds of its mailbox, and
+    /// nobody else's are concerned.
+    Stuck {
+        /// Who.
+        id: JausId,
+        /// Where it is.
+        process: Process,
+    },
+    /// A component process that was stuck reads again.
+    Resumed {
+        /// Who.
+        id: JausId,
+        /// Messages that it has lost in all.
+        dropped: u64,
+    },
+}
+
+/// Why a component is not attached any more.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub enum Departure {
+    /// It went on purpose.
+    Left,
+    /// Its process ended, or dropped the connection, without a word.
+    Vanished,
+    /// It said something that is not in the protocol, or the connection failed.
+    Failed(String),
+    /// The node has stopped.
+    Stopped,
+}
+
+/// Who is here.
+#[derive(Debug)]
+pub(super) struct Attendance {
+    /// Those of other processes.
+    guests: BTreeMap<JausId, Process>,
+    /// Gone when the node has stopped, which ends the listeners' streams.
+    events: Option<broadcast::Sender<ComponentEvent>>,
+}
+
+impl Attendance {
+    pub(super) fn new() -> Self {
+        Self {
+            guests: BTreeMap::new(),
+            events: Some(broadcast::Sender::new(KEPT)),
+        }
+    }
+
+    /// The process of a component, unless that is the node's own.
+    pub(super) fn process(&self, id: JausId) -> Option<&Process> {
+        self.guests.get(&id)
+    }
+
+    pub(super) fn arrive(&mut self, id: JausId, process: Option<Process>) {
+        if let Some(process) = &process {
+            tracing::info!(%id, %process, "component attached");
+            self.guests.insert(id, process.clone());
+        }
+        self.announce(ComponentEvent::Attached { id, process });
+    }
+
+    pub(super) fn depart(&mut self, id: JausId, why: Departure) {
+        let process = self.guests.remove(&id);
+        if let Some(process) = &process {
+            match &why {
+                Departure::Left | Departure::Stopped => {
+                    tracing::info!(%id, %process, "component detached");
+                }
+                why => tracing::warn!(%id, %process, ?why, "component lost"),
+            }
+        }
+        self.announce(ComponentEvent::Detached { id, process, why });
+    }
+
+    pub(super) fn announce(&self, event: ComponentEvent) {
+        if let Some(events) = &self.events {
+            // Nobody listening is no error.
+            let _ = events.send(event);
+        }
+    }
+
+    /// The node has stopped, and everybody goes.
+    pub(super) fn end(&mut self) {
+        for id in std::mem::take(&mut self.guests).into_keys() {
+            tracing::debug!(%id, "component detached: the node has stopped");
+        }
+        self.events = None;
+    }
+
+    pub(super) fn subscribe(&self) -> broadcast::Receiver<ComponentEvent> {
+        let ended = || broadcast::channel(1).1;
+        self.events
+            .as_ref()
+            .map_or_else(ended, broadcast::Sender::subscribe)
+    }
+}

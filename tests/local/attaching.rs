@@ -1,0 +1,174 @@
+//! A component on the host's node is like one of the node's own process.
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::component::{Component, Kind};
+use jaus::endpoint::Outgoing;
+use jaus::node::{ComponentEvent, Departure, HostError, HostEvent, SendError, Undelivered};
+use jaus::wire::{Broadcast, Priority};
+
+use crate::place::{Place, component_event, message, receive, within};
+
+#[tokio::test]
+async fn messages_go_both_ways_with_all_that_is_said_about_them() {
+    let place = Place::new();
+    let node = place.node();
+    let mut here = node.attach(1).unwrap();
+    let mut there = place.host().attach(33).await.unwrap();
+    assert_eq!(there.id(), JausId::new(101, 1, 33));
+
+    let urgent = Outgoing {
+        priority: Priority::SafetyCritical,
+        ..message(&there, here.id(), b"stop")
+    };
+    there.send(urgent.clone()).unwrap();
+    let heard = receive(&mut here).await;
+    assert_eq!((heard.source, heard.to), (there.id(), here.id()));
+    assert_eq!(
+        (heard.priority, &heard.payload),
+        (urgent.priority, &urgent.payload)
+    );
+
+    here.send(message(&here, JausId::EVERYONE, b"hello"))
+        .unwrap();
+    let heard = receive(&mut there).await;
+    assert_eq!((heard.source, heard.to), (here.id(), there.id()));
+    assert_eq!(
+        (heard.destination, heard.broadcast),
+        (JausId::EVERYONE, Broadcast::Global)
+    );
+    assert_eq!(heard.path, None);
+}
+
+#[tokio::test]
+async fn two_component_processes_talk_through_their_node_also_in_large_messages() {
+    let place = Place::new();
+    let mut config = place.config();
+    config.max_message = 16 << 20;
+    config.mailbox.octets = 40 << 20;
+    let _node = jaus::node::Node::start(config).unwrap();
+    let mut one = place.host().attach(1).await.unwrap();
+    let mut two = place.host().attach(2).await.unwrap();
+    for length in [0, 1, 4000, 8190, 8192, 20_000, 100_000, (16 << 20) - 2] {
+        let body: Vec<u8> = (0..length).map(|at| (at % 251) as u8).collect();
+        one.send(message(&one, two.id(), &body)).unwrap();
+        let heard = receive(&mut two).await;
+        assert!(heard.payload[2..] == body[..], "{length} octets");
+        two.send(message(&two, one.id(), &body)).unwrap();
+        let heard = receive(&mut one).await;
+        assert!(heard.payload[2..] == body[..], "{length} octets back");
+    }
+}
+
+#[tokio::test]
+async fn a_sender_learns_whether_its_message_has_arrived() {
+    let place = Place::new();
+    let node = place.node();
+    let here = node.attach(1).unwrap();
+    let there = place.host().attach(33).await.unwrap();
+    let nobody = JausId::new(101, 1, 200);
+
+    assert_eq!(
+        within(there.deliver(message(&there, here.id(), b"x"))).await,
+        Ok(())
+    );
+    assert_eq!(
+        within(here.deliver(message(&here, there.id(), b"x"))).await,
+        Ok(())
+    );
+    for port in [&here, &there] {
+        let outcome = within(port.deliver(message(port, nobody, b"x"))).await;
+        let Err(Undelivered::NotAcknowledged { destination, .. }) = outcome else {
+            panic!("{outcome:?}");
+        };
+        assert_eq!(destination, nobody);
+    }
+}
+
+#[tokio::test]
+async fn what_cannot_be_sent_is_told_at_once_or_by_the_node() {
+    let place = Place::new();
+    let _node = place.node();
+    let port = place.host().attach(33).await.unwrap();
+    let mut events = port.host_events();
+    let to = JausId::new(101, 1, 1);
+
+    let short = Outgoing::new(port.id(), to, Bytes::from_static(&[1]));
+    assert!(matches!(port.send(short), Err(SendError::Endpoint(_))));
+    let long = port.send(message(&port, to, vec![0; 1 << 20])).unwrap_err();
+    assert!(long.to_string().contains("524288"), "{long}");
+    let forged = Outgoing {
+        source: to,
+        ..message(&port, to, b"x")
+    };
+    assert!(matches!(port.send(forged), Err(SendError::Endpoint(_))));
+
+    let nobody = JausId::new(101, 1, 0);
+    let handle = port.send(message(&port, nobody, b"x")).unwrap();
+    let Some(HostEvent::Rejected {
+        message: rejected,
+        why,
+    }) = within(events.recv()).await
+    else {
+        panic!("no word of the message to nobody");
+    };
+    assert_eq!(rejected, handle);
+    assert!(why.contains("names nobody"), "{why}");
+    let outcome = within(port.deliver(message(&port, nobody, b"x"))).await;
+    assert_eq!(outcome, Err(Undelivered::Rejected(why)));
+}
+
+#[tokio::test]
+async fn a_second_claimant_is_told_who_has_the_id() {
+    let place = Place::new();
+    let node = place.node();
+    let _own = node.attach(1).unwrap();
+    let first = place.host().name("planner").attach(33).await.unwrap();
+    let pid = std::process::id();
+
+    let refused = |error: HostError| match error {
+        HostError::Refused { words, .. } => words,
+        other => panic!("{other}"),
+    };
+    let words = refused(place.host().attach(33).await.unwrap_err());
+    assert!(words.contains("101.1.33 is held by \"planner\""), "{words}");
+    assert!(words.contains(&format!("process {pid}")), "{words}");
+    let words = refused(place.host().attach(1).await.unwrap_err());
+    assert!(words.contains("held by the node itself"), "{words}");
+    let words = refused(place.host().attach(255).await.unwrap_err());
+    assert!(
+        words.contains("101.1.255 does not name one component"),
+        "{words}"
+    );
+    assert!(node.attach(33).is_err());
+
+    let mut events = node.component_events();
+    drop(first);
+    let gone = |event: &ComponentEvent| matches!(event, ComponentEvent::Detached { .. });
+    let gone = component_event(&mut events, gone).await;
+    let ComponentEvent::Detached { process, why, .. } = gone else {
+        panic!()
+    };
+    assert_eq!(
+        (process.unwrap().name.as_str(), why),
+        ("planner", Departure::Left)
+    );
+    within(place.host().attach(33)).await.unwrap();
+}
+
+#[tokio::test]
+async fn an_attached_component_is_found_and_answers() {
+    let place = Place::new();
+    let node = place.node();
+    let port = place.host().attach(33).await.unwrap();
+    let rover = Component::builder(Kind::Vehicle, "Rover")
+        .live_on(port)
+        .unwrap();
+    let desk = Component::builder(Kind::Vehicle, "Desk")
+        .attach(&node, 1)
+        .unwrap();
+    let found = within(desk.find("urn:jaus:jss:core:Liveness"))
+        .await
+        .unwrap();
+    assert_eq!(found, rover.id());
+}

@@ -1,0 +1,91 @@
+//! A directory for a socket, a node behind it, and waiting with a limit.
+
+use std::fs::{DirBuilder, remove_dir_all};
+use std::os::unix::fs::DirBuilderExt;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::endpoint::{Outgoing, Received};
+use jaus::link::Group;
+use jaus::node::{Address, ComponentEvent, ComponentEvents, Config, Host, Node, Port};
+
+/// Longer than anything takes; reached only when a test fails.
+pub(crate) const LIMIT: Duration = Duration::from_secs(20);
+
+/// A directory that is removed when the test ends.
+#[derive(Debug)]
+pub(crate) struct Place(PathBuf);
+
+impl Place {
+    pub(crate) fn new() -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let name = format!("jaus-test-{}-{number}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        DirBuilder::new().mode(0o700).create(&path).unwrap();
+        Self(path)
+    }
+
+    pub(crate) fn path(&self) -> PathBuf {
+        self.0.join("node.sock")
+    }
+
+    pub(crate) fn address(&self) -> Address {
+        Address::Path(self.path())
+    }
+
+    pub(crate) fn host(&self) -> Host {
+        Host::at(self.address())
+    }
+
+    /// A node that stays on this host and hears nobody by multicast.
+    pub(crate) fn config(&self) -> Config {
+        Config::loopback(101, 1)
+            .group(Group::Off)
+            .local(self.address())
+    }
+
+    pub(crate) fn node(&self) -> Node {
+        Node::start(self.config()).unwrap()
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let _ = remove_dir_all(&self.0);
+    }
+}
+
+/// What must happen some day.
+pub(crate) async fn within<T>(what: impl Future<Output = T>) -> T {
+    let waited = tokio::time::timeout(LIMIT, what).await;
+    waited.expect("it did not happen in time")
+}
+
+pub(crate) async fn receive(port: &mut Port) -> Received {
+    within(port.recv()).await.expect("an attached component")
+}
+
+pub(crate) async fn component_event(
+    events: &mut ComponentEvents,
+    wanted: impl Fn(&ComponentEvent) -> bool,
+) -> ComponentEvent {
+    within(async {
+        loop {
+            let event = events.recv().await.expect("a running node");
+            if wanted(&event) {
+                return event;
+            }
+        }
+    })
+    .await
+}
+
+/// A message from a port, with code 4D00h, which belongs to nobody.
+pub(crate) fn message(from: &Port, to: JausId, body: impl AsRef<[u8]>) -> Outgoing {
+    let payload = [&[0x00, 0x4D], body.as_ref()].concat();
+    Outgoing::new(from.id(), to, Bytes::from(payload))
+}
