@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::link::udp::{PortTaken, Settings, UdpLink};
-use jaus::link::{Error, Group, Interface, Interfaces, Slab};
+use jaus::link::{Error, Group, Interface, Interfaces, Ip, Slab};
 use jaus::wire::Priority;
 
 /// Longer than anything takes; reached only when a test fails.
@@ -27,7 +27,7 @@ fn free_port() -> u16 {
 }
 
 fn loopback() -> Interface {
-    Interfaces::Loopback.choose().unwrap().remove(0)
+    Interfaces::Loopback.choose(Ip::V4).unwrap().remove(0)
 }
 
 /// A free unicast port and a group of the test's own.
@@ -81,6 +81,44 @@ async fn a_link_does_not_hear_itself() {
     // What a sent itself lies before what b sent, in the same socket's queue.
     assert_eq!(a.counters().own_echo, 1);
     assert_eq!(a.counters().received, 1);
+}
+
+#[tokio::test]
+async fn links_with_ipv6_addresses_talk_and_leave_ipv4_to_others() {
+    let Ok(loopback6) = Interfaces::Loopback.choose(Ip::V6) else {
+        eprintln!("*** SKIPPED: this host has no IPv6");
+        return;
+    };
+    let mut a = UdpLink::open(&loopback6[0], &settings()).unwrap();
+    // Another node with the same port, but of IPv4.
+    let port = a.local().port();
+    let same_port = Settings { port, ..settings() };
+    let mut four = UdpLink::open(&loopback(), &same_port).unwrap();
+    let mut b = UdpLink::open(&loopback6[0], &settings()).unwrap();
+
+    b.send_to(a.local(), Priority::Standard, &Bytes::from_static(b"six"));
+    let (peer, datagram) = receive(&mut a).await;
+    assert_eq!((peer, &datagram[..]), (b.local(), &b"six"[..]));
+    assert!(peer.is_ipv6() && a.group().is_none());
+    a.send_to(peer, Priority::Standard, &Bytes::from_static(b"answer"));
+    assert_eq!(receive(&mut b).await.1, &b"answer"[..]);
+
+    let sender = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    sender
+        .send_to(b"four", (Ipv4Addr::LOCALHOST, port))
+        .unwrap();
+    assert_eq!(receive(&mut four).await.1, &b"four"[..]);
+
+    let error = UdpLink::open(&loopback6[0], &same_port).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains(&format!("UDP port {port} of ::1 is taken")),
+        "{text}"
+    );
+    assert!(
+        !cfg!(target_os = "linux") || text.contains("by this very process"),
+        "{text}"
+    );
 }
 
 #[tokio::test]
@@ -183,7 +221,9 @@ async fn a_second_node_on_the_same_address_and_port_is_refused_and_told_what_to_
         "{text}"
     );
 
-    let other_address = Interfaces::Only(vec!["127.0.0.2".into()]).choose().unwrap();
+    let other_address = Interfaces::Only(vec!["127.0.0.2".into()])
+        .choose(Ip::V4)
+        .unwrap();
     let second = UdpLink::open(&other_address[0], &settings).unwrap();
     assert_eq!(second.local(), SocketAddr::from(([127, 0, 0, 2], port)));
 }
@@ -249,7 +289,9 @@ async fn a_group_that_is_none_is_refused() {
 #[test]
 fn an_interface_that_does_not_exist_is_refused_with_a_list_of_those_that_do() {
     for wanted in ["nosuch0", "203.0.113.77"] {
-        let error = Interfaces::Only(vec![wanted.into()]).choose().unwrap_err();
+        let error = Interfaces::Only(vec![wanted.into()])
+            .choose(Ip::V4)
+            .unwrap_err();
         let text = error.to_string();
         assert!(
             text.contains(&format!("`{wanted}`")) && text.contains("127.0.0.1"),

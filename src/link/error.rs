@@ -1,11 +1,11 @@
 //! What can go wrong when a link is opened, said so that a person can put it right.
 
 use std::io;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, SocketAddr};
 
 use super::group::InvalidGroup;
 use super::holder::Holder;
-use super::interface::{Available, Interface};
+use super::interface::{Available, Interface, Ip};
 
 /// Why a link could not be opened. Nothing is left half open.
 #[derive(Debug, thiserror::Error)]
@@ -31,16 +31,30 @@ pub enum Error {
         /// What else there is.
         available: Available,
     },
+    /// The interface has addresses, but none of the version of IP that is wanted.
+    #[error(
+        "the network interface `{wanted}` has no {} address: give it one, or set `ip` to another \
+         version; there are: {available}",
+        ip.name()
+    )]
+    NoAddress {
+        /// As it was given.
+        wanted: String,
+        /// What was looked for.
+        ip: Ip,
+        /// What could have been given.
+        available: Available,
+    },
     /// No interface is left to open a link on.
     #[error("no network interface can be used; there are: {0}")]
     NoInterface(Available),
-    /// Multicast was asked for and none of the chosen interfaces carries it.
+    /// Multicast was asked for and none of the chosen interfaces carries it, nor broadcasts.
     #[error(
         "none of the chosen interfaces carries multicast ({0}), so this node could find nobody: \
          choose another interface, or name peers by address, or turn the group off"
     )]
     NoMulticast(Available),
-    /// The group is not an IPv4 multicast address with a port.
+    /// The group is not a multicast address with a port.
     #[error(transparent)]
     InvalidGroup(#[from] InvalidGroup),
     /// The unicast address and port are in use.
@@ -83,7 +97,7 @@ pub enum Error {
     },
     /// The address went away between listing the interfaces and binding to one.
     #[error("the address {0} is not (or no longer) an address of this host")]
-    AddressGone(Ipv4Addr),
+    AddressGone(IpAddr),
     /// Anything else the operating system refuses.
     #[error("{doing} failed: {source}")]
     Io {

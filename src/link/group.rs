@@ -1,7 +1,8 @@
-//! The multicast group, by which nodes that do not know each other meet.
+//! The multicast groups, one of each version of IP, by which nodes that do not know each other
+//! meet.
 
 use std::fmt;
-use std::net::{Ipv4Addr, SocketAddrV4};
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV4, SocketAddrV6};
 use std::str::FromStr;
 
 /// The port that IANA assigned to JAUS, for UDP and TCP.
@@ -11,63 +12,129 @@ pub const STANDARD_PORT: u16 = 3794;
 pub const STANDARD_GROUP: SocketAddrV4 =
     SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), STANDARD_PORT);
 
+/// The multicast group that this implementation uses with IPv6; the standard names none.
+///
+/// `ff12::efff:1` is temporary, which RFC 4291 wants of a group that IANA has not assigned, and
+/// link-local, so it needs neither routers nor any other address than the one that every
+/// interface has, and it cannot leave the network. Its last 32 bits are those of the IPv4 group
+/// and lie in the range that RFC 3307 leaves to applications. Where routers are to carry it on,
+/// `[ff15::efff:1]` (site) does, and each interface must be named by its global address.
+pub const STANDARD_GROUP6: SocketAddrV6 = SocketAddrV6::new(
+    Ipv6Addr::new(0xFF12, 0, 0, 0, 0, 0, 0xEFFF, 1),
+    STANDARD_PORT,
+    0,
+    0,
+);
+
 /// The multicast group of a link: `239.255.0.1`, which means port 3794, `239.255.0.1:3794`, or
 /// `off` for unicast alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
+pub enum Group<A = SocketAddrV4> {
     /// No multicast.
     Off,
     /// This group and port, joined on every interface that carries multicast.
-    At(SocketAddrV4),
+    At(A),
 }
+
+/// The multicast group of a link with IPv6: `ff12::efff:1`, `[ff12::efff:1]:3794` or `off`.
+pub type Group6 = Group<SocketAddrV6>;
 
 /// Not a multicast group.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}` is no multicast group: write an address from 224.0.0.0 to 239.255.255.255, with a port \
-     if it is not 3794, or `off`; the usual group for JAUS is 239.255.0.1:3794"
+    "`{given}` is no multicast group: write an address from {range}, with a port if it is not \
+     3794, or `off`; the usual group for JAUS is {usual}"
 )]
-pub struct InvalidGroup(String);
+pub struct InvalidGroup {
+    given: String,
+    range: &'static str,
+    usual: SocketAddr,
+}
 
-impl Group {
+/// The addresses of one version of IP.
+pub trait GroupAddress: Copy + Into<SocketAddr> + FromStr + fmt::Display {
+    /// The range of its multicast addresses, for people.
+    const RANGE: &'static str;
+    /// The usual group.
+    const USUAL: Self;
+
+    /// Reads an address without a port, which is then 3794.
+    fn of_ip(text: &str) -> Option<Self>;
+}
+
+impl GroupAddress for SocketAddrV4 {
+    const RANGE: &'static str = "224.0.0.0 to 239.255.255.255";
+    const USUAL: Self = STANDARD_GROUP;
+
+    fn of_ip(text: &str) -> Option<Self> {
+        let ip = text.parse().ok()?;
+        Some(Self::new(ip, STANDARD_PORT))
+    }
+}
+
+impl GroupAddress for SocketAddrV6 {
+    const RANGE: &'static str = "ff00:: to ffff:…";
+    const USUAL: Self = STANDARD_GROUP6;
+
+    fn of_ip(text: &str) -> Option<Self> {
+        let ip = text.parse().ok()?;
+        Some(Self::new(ip, STANDARD_PORT, 0, 0))
+    }
+}
+
+impl<A: GroupAddress> Group<A> {
     /// Whether the address is a multicast address and the port is not 0.
     ///
     /// # Errors
     /// [`InvalidGroup`], with what can be.
     pub fn validate(self) -> Result<(), InvalidGroup> {
-        match self {
-            Self::At(group) if !group.ip().is_multicast() || group.port() == 0 => {
-                Err(InvalidGroup(group.to_string()))
+        match self.address() {
+            Some(group) if !group.ip().is_multicast() || group.port() == 0 => {
+                Err(Self::invalid(&group.to_string()))
             }
             _ => Ok(()),
         }
     }
-}
 
-impl Default for Group {
-    fn default() -> Self {
-        Self::At(STANDARD_GROUP)
+    /// The address and port, unless it is off.
+    #[must_use]
+    pub fn address(self) -> Option<SocketAddr> {
+        match self {
+            Self::Off => None,
+            Self::At(group) => Some(group.into()),
+        }
+    }
+
+    fn invalid(given: &str) -> InvalidGroup {
+        InvalidGroup {
+            given: given.to_owned(),
+            range: A::RANGE,
+            usual: A::USUAL.into(),
+        }
     }
 }
 
-impl FromStr for Group {
+impl<A: GroupAddress> Default for Group<A> {
+    fn default() -> Self {
+        Self::At(A::USUAL)
+    }
+}
+
+impl<A: GroupAddress> FromStr for Group<A> {
     type Err = InvalidGroup;
 
     fn from_str(text: &str) -> Result<Self, InvalidGroup> {
         if text == "off" {
             return Ok(Self::Off);
         }
-        let standard = |ip: Ipv4Addr| SocketAddrV4::new(ip, STANDARD_PORT);
-        let address = text.parse().or_else(|_| text.parse().map(standard));
-        let group = address
-            .ok()
-            .map(Self::At)
-            .filter(|group| group.validate().is_ok());
-        group.ok_or_else(|| InvalidGroup(text.to_owned()))
+        let group = text.parse().ok().or_else(|| A::of_ip(text)).map(Self::At);
+        group
+            .filter(|group| group.validate().is_ok())
+            .ok_or_else(|| Self::invalid(text))
     }
 }
 
-impl fmt::Display for Group {
+impl<A: GroupAddress> fmt::Display for Group<A> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Off => f.pad("off"),
@@ -77,7 +144,7 @@ impl fmt::Display for Group {
 }
 
 #[cfg(feature = "serde")]
-impl<'de> serde::Deserialize<'de> for Group {
+impl<'de, A: GroupAddress> serde::Deserialize<'de> for Group<A> {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = String::deserialize(deserializer)?;
         text.parse().map_err(serde::de::Error::custom)
@@ -85,7 +152,7 @@ impl<'de> serde::Deserialize<'de> for Group {
 }
 
 #[cfg(feature = "serde")]
-impl serde::Serialize for Group {
+impl<A: GroupAddress> serde::Serialize for Group<A> {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
@@ -101,15 +168,33 @@ mod tests {
         assert_eq!(named("239.255.0.9").unwrap(), "239.255.0.9:3794");
         assert_eq!(named("239.255.0.1:4000").unwrap(), "239.255.0.1:4000");
         assert_eq!(named("off").unwrap(), "off");
-        assert_eq!(Group::default().to_string(), "239.255.0.1:3794");
+        assert_eq!(<Group>::default().to_string(), "239.255.0.1:3794");
+        let named = |text: &str| text.parse::<Group6>().map(|group| group.to_string());
+        assert_eq!(named("ff15::efff:1").unwrap(), "[ff15::efff:1]:3794");
+        assert_eq!(named("[ff12::9]:4000").unwrap(), "[ff12::9]:4000");
+        assert_eq!(named("off").unwrap(), "off");
+        assert_eq!(Group6::default().to_string(), "[ff12::efff:1]:3794");
     }
 
     #[test]
     fn what_is_no_group_is_refused_with_what_would_be() {
-        for wrong in ["", "none", "10.0.0.1", "239.255.0.1:0", "239.255.0.1:99999"] {
+        let four = [
+            "",
+            "none",
+            "10.0.0.1",
+            "239.255.0.1:0",
+            "239.255.0.1:99999",
+            "ff12::1",
+        ];
+        for wrong in four {
             let error = wrong.parse::<Group>().unwrap_err().to_string();
             assert!(error.contains(&format!("`{wrong}`")), "{error}");
             assert!(error.contains("224.0.0.0 to 239.255.255.255"), "{error}");
+        }
+        for wrong in ["", "fe80::1", "[ff12::1]:0", "239.255.0.1"] {
+            let error = wrong.parse::<Group6>().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{wrong}`")), "{error}");
+            assert!(error.contains("[ff12::efff:1]:3794"), "{error}");
         }
     }
 }

@@ -5,13 +5,14 @@
 //!
 //! # Several nodes on one host
 //!
-//! A link has two sockets, because the two kinds of datagram want opposite things:
+//! A link has a socket for each kind of datagram, because they want opposite things:
 //!
 //! * the **unicast socket** is bound to one address of the interface and the node's port, for
 //!   itself alone. Everything leaves through it, so peers answer to it. Were it shared, each
 //!   datagram would reach only one of the sharers, and nobody could say which;
-//! * the **group socket** is bound to the multicast group and the group's port, shared
-//!   (`SO_REUSEADDR`). Every sharer gets a copy of every datagram.
+//! * a **group socket** is bound to the multicast group (or to the network's broadcast address,
+//!   where that is used) and the group's port, shared (`SO_REUSEADDR`). Every sharer gets a copy of
+//!   every datagram.
 //!
 //! So the rule is: **all nodes of a host share the group, and each has an address and port of
 //! its own.** The first takes the standard port 3794; a second one on the same address gets
@@ -34,7 +35,9 @@ mod socket_table;
 pub mod udp;
 
 pub use error::Error;
-pub use group::{Group, InvalidGroup, STANDARD_GROUP, STANDARD_PORT};
+pub use group::{
+    Group, Group6, GroupAddress, InvalidGroup, STANDARD_GROUP, STANDARD_GROUP6, STANDARD_PORT,
+};
 pub use holder::Holder;
-pub use interface::{Available, Interface, Interfaces};
+pub use interface::{Available, Interface, Interfaces, Ip, Place};
 pub use slab::Slab;

@@ -3,13 +3,12 @@
 //! Elsewhere there is no such table, and nothing is found.
 
 use std::fs;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 /// One socket, as far as we are concerned.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Entry {
-    /// `None` for an IPv6 address other than "all".
-    ip: Option<Ipv4Addr>,
+    ip: IpAddr,
     port: u16,
     /// The user it belongs to.
     pub(super) uid: u32,
@@ -20,12 +19,11 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    /// Whether this socket is bound to the address, or to its port of all addresses.
+    /// Whether this socket is bound to the address, or to its port of all addresses. IPv6's "all"
+    /// keeps IPv4 sockets out too.
     pub(super) fn keeps_from(&self, address: SocketAddr) -> bool {
-        self.port == address.port()
-            && self
-                .ip
-                .is_some_and(|ip| ip.is_unspecified() || IpAddr::V4(ip) == address.ip())
+        let all = self.ip.is_unspecified() && (self.ip.is_ipv6() || address.is_ipv4());
+        self.port == address.port() && (all || self.ip == address.ip())
     }
 }
 
@@ -49,7 +47,7 @@ fn read(table: &str) -> impl Iterator<Item = Entry> + '_ {
         let columns: Vec<&str> = line.split_whitespace().collect();
         let (ip, port) = columns.get(1)?.split_once(':')?;
         Some(Entry {
-            ip: ipv4(ip),
+            ip: address(ip)?,
             port: u16::from_str_radix(port, 16).ok()?,
             uid: columns.get(7)?.parse().ok()?,
             inode: columns.get(9)?.parse().ok()?,
@@ -58,15 +56,17 @@ fn read(table: &str) -> impl Iterator<Item = Entry> + '_ {
     })
 }
 
-/// The table shows addresses as hexadecimal words in the host's byte order. IPv6's "all" keeps
-/// IPv4 sockets out too.
-fn ipv4(word: &str) -> Option<Ipv4Addr> {
-    if word.bytes().all(|digit| digit == b'0') {
-        return Some(Ipv4Addr::UNSPECIFIED);
+/// The table shows addresses as hexadecimal words in the host's byte order.
+fn address(words: &str) -> Option<IpAddr> {
+    let word = |at: usize| u32::from_str_radix(words.get(at..at + 8)?, 16).ok();
+    if words.len() == 8 {
+        return Some(Ipv4Addr::from(word(0)?.to_ne_bytes()).into());
     }
-    u32::from_str_radix(word, 16)
-        .ok()
-        .map(|word| Ipv4Addr::from(word.to_ne_bytes()))
+    let mut octets = [0; 16];
+    for (i, four) in octets.chunks_exact_mut(4).enumerate() {
+        four.copy_from_slice(&word(8 * i)?.to_ne_bytes());
+    }
+    Some(Ipv6Addr::from(octets).into())
 }
 
 #[cfg(test)]
@@ -77,6 +77,8 @@ mod tests {
     const TABLE: &str = "   sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode ref pointer drops
   107: 0100007F:0ED2 00000000:0000 07 00000000:00000000 00:00000000 00000000  1000        0 4242 2 0000000000000000 9
   108: 00000000:0035 00000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 77 2 0000000000000000 0
+  109: 00000000000000000000000001000000:0ED2 00000000000000000000000000000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 66 2 0000000000000000 0
+  110: 00000000000000000000000000000000:0ED3 00000000000000000000000000000000:0000 07 00000000:00000000 00:00000000 00000000     0        0 67 2 0000000000000000 0
 garbage
 ";
 
@@ -92,12 +94,16 @@ garbage
     fn the_socket_bound_to_the_address_or_to_all_is_found() {
         assert_eq!(in_the_way("127.0.0.1:3794"), [4242]);
         assert_eq!(in_the_way("10.0.0.1:53"), [77]);
+        assert_eq!(in_the_way("[::1]:3794"), [66]);
+        assert_eq!(in_the_way("[fe80::1]:3795"), [67]);
+        assert_eq!(in_the_way("10.0.0.1:3795"), [67]);
     }
 
     #[test]
     fn a_socket_of_another_address_or_port_is_not_blamed() {
         assert!(in_the_way("127.0.0.2:3794").is_empty());
-        assert!(in_the_way("127.0.0.1:3795").is_empty());
+        assert!(in_the_way("127.0.0.1:3796").is_empty());
+        assert!(in_the_way("[::1]:53").is_empty());
     }
 
     #[test]

@@ -5,18 +5,21 @@
 //! subsystem = 101
 //! node = 1
 //! interfaces = ["eth0", "10.0.3.2"]    # or "all" (the default), or "loopback"
+//! ip = "4"                             # the default; or "6", or "both"
 //! port = 3794                          # 0: any free one
 //! port_taken = "use-free"              # or "refuse" (the default)
 //! group = "239.255.0.1:3794"           # or "off"
+//! group6 = "[ff12::efff:1]:3794"       # the same for IPv6
+//! broadcast = "auto"                   # where there is no multicast; or "on", or "off"
 //! ttl = 16
-//! peers = ["192.168.7.2", "192.168.7.3:3795"]
+//! peers = ["192.168.7.2", "192.168.7.3:3795", "[fe80::2%eth0]:3794"]
 //!
 //! [mailbox]
 //! messages = 1024
 //! ```
 
 use std::fmt;
-use std::net::{IpAddr, SocketAddr, SocketAddrV4};
+use std::net::{SocketAddr, SocketAddrV4};
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
@@ -24,8 +27,8 @@ use super::mailbox::MailboxLimits;
 use crate::address::{JausId, ParseIdError};
 use crate::endpoint;
 use crate::link::local::{Address, Local};
-use crate::link::udp::{self, PortTaken};
-use crate::link::{Group, Interfaces, InvalidGroup, STANDARD_PORT};
+use crate::link::udp::{self, Broadcasts, PortTaken};
+use crate::link::{Group, Group6, Interfaces, InvalidGroup, Ip, Place};
 
 /// A UDP datagram holds 65507 octets, of which one and fourteen are headers.
 const PAYLOAD_LIMITS: RangeInclusive<usize> = 64..=65_492;
@@ -51,12 +54,18 @@ pub struct Config {
     pub node: u8,
     /// The interfaces to open links on.
     pub interfaces: Interfaces,
+    /// The versions of IP that are used on them.
+    pub ip: Ip,
     /// The UDP port of this node; 0 takes any free one.
     pub port: u16,
     /// What to do if the port is taken.
     pub port_taken: PortTaken,
     /// The multicast group, by which nodes find each other.
     pub group: Group,
+    /// The same with IPv6.
+    pub group6: Group6,
+    /// When the broadcast address of a network is used instead of the group, or beside it.
+    pub broadcast: Broadcasts,
     /// How many routers multicast may pass.
     pub ttl: u8,
     /// How many octets of received datagrams the kernel is asked to hold for each socket.
@@ -91,9 +100,12 @@ impl Config {
             subsystem,
             node,
             interfaces: Interfaces::All,
+            ip: Ip::default(),
             port: udp.port,
             port_taken: udp.port_taken,
             group: udp.group,
+            group6: udp.group6,
+            broadcast: udp.broadcast,
             ttl: udp.ttl,
             receive_buffer: udp.receive_buffer,
             peers: Vec::new(),
@@ -115,10 +127,17 @@ impl Config {
         }
     }
 
-    /// Uses only these interfaces, each by name or IPv4 address.
+    /// Uses only these interfaces, each by name or address.
     #[must_use]
     pub fn interfaces<S: Into<String>>(mut self, only: impl IntoIterator<Item = S>) -> Self {
         self.interfaces = Interfaces::Only(only.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Uses these versions of IP on the interfaces.
+    #[must_use]
+    pub const fn ip(mut self, ip: Ip) -> Self {
+        self.ip = ip;
         self
     }
 
@@ -178,7 +197,7 @@ impl Config {
         if self.mailbox.messages == 0 {
             return Err(ConfigError::Mailbox);
         }
-        self.group.validate().map_err(ConfigError::Group)
+        self.udp().validate().map_err(ConfigError::Group)
     }
 
     /// The endpoint's settings; its bounds leave room for two of the longest messages.
@@ -201,6 +220,8 @@ impl Config {
             port: self.port,
             port_taken: self.port_taken,
             group: self.group,
+            group6: self.group6,
+            broadcast: self.broadcast,
             ttl: self.ttl,
             receive_buffer: self.receive_buffer,
         }
@@ -208,14 +229,14 @@ impl Config {
 }
 
 /// A peer that is spoken to by unicast from the start: `10.0.0.2`, which means port 3794,
-/// `10.0.0.2:3795`, or with its id in front `102.1.1@10.0.0.2`.
+/// `10.0.0.2:3795`, `[fe80::2%eth0]:3794`, or with its id in front `102.1.1@10.0.0.2`.
 ///
 /// With an id (which may hold the wildcards 65535 and 255) its messages go there before it was
 /// heard, and its address is never learned anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Peer {
     id: Option<JausId>,
-    address: SocketAddr,
+    place: Place,
 }
 
 impl Peer {
@@ -225,10 +246,10 @@ impl Peer {
         self.id
     }
 
-    /// The address and port.
+    /// The address and port. With an interface (`%eth0`) it holds as long as that interface does.
     #[must_use]
-    pub const fn address(self) -> SocketAddr {
-        self.address
+    pub fn address(self) -> SocketAddr {
+        self.place.address()
     }
 }
 
@@ -243,12 +264,10 @@ impl FromStr for Peer {
             ),
             None => (None, text),
         };
-        let standard = |ip: IpAddr| SocketAddr::new(ip, STANDARD_PORT);
-        let address = place.parse().or_else(|_| place.parse().map(standard)).ok();
-        let one_host = |a: &SocketAddr| !a.ip().is_unspecified() && !a.ip().is_multicast();
-        address
-            .filter(|a| a.is_ipv4() && a.port() != 0 && one_host(a))
-            .map(|address| Self { id, address })
+        let place: Option<Place> = place.parse().ok();
+        place
+            .filter(|place| !place.lacks_zone())
+            .map(|place| Self { id, place })
             .ok_or_else(|| ConfigError::Peer(text.to_owned()))
     }
 }
@@ -258,7 +277,7 @@ impl fmt::Display for Peer {
         if let Some(id) = self.id {
             write!(f, "{id}@")?;
         }
-        self.address.fmt(f)
+        self.place.fmt(f)
     }
 }
 
@@ -266,7 +285,7 @@ impl From<SocketAddrV4> for Peer {
     fn from(address: SocketAddrV4) -> Self {
         Self {
             id: None,
-            address: address.into(),
+            place: SocketAddr::V4(address).into(),
         }
     }
 }
@@ -303,8 +322,9 @@ pub enum ConfigError {
     PeerId(ParseIdError),
     /// Not the address of a peer.
     #[error(
-        "`{0}` is no peer's address: write an IPv4 address of one host, with a port if it is not \
-         3794, such as 192.168.7.2 or 192.168.7.2:3795"
+        "`{0}` is no peer's address: write an address of one host, with a port if it is not 3794, \
+         such as 192.168.7.2, 192.168.7.2:3795, [fd00::2]:3795 or (IPv6's link-local addresses \
+         need the interface) [fe80::2%eth0]:3794"
     )]
     Peer(String),
 }
@@ -442,6 +462,20 @@ mod toml_tests {
             toml::from_str::<Config>("interfaces = \"all\"").unwrap(),
             Config::default()
         );
+    }
+
+    #[test]
+    fn versions_of_ip_and_broadcasts_are_chosen_by_words() {
+        let text = "ip = \"both\"\ngroup6 = \"ff15::efff:1\"\nbroadcast = \"off\"\n\
+                    peers = [\"[fe80::2%eth0]:9\"]";
+        let config: Config = toml::from_str(text).unwrap();
+        assert_eq!((config.ip, config.broadcast), (Ip::Both, Broadcasts::Off));
+        assert_eq!(config.group6.to_string(), "[ff15::efff:1]:3794");
+        assert_eq!(config.peers[0].to_string(), "[fe80::2%eth0]:9");
+        assert!(error("ip = \"5\"").contains("expected one of `4`, `6`, `both`"));
+        assert!(error("broadcast = \"yes\"").contains("`auto`, `on`, `off`"));
+        assert!(error("group6 = \"239.255.0.1\"").contains("[ff12::efff:1]:3794"));
+        assert!(error("peers = [\"fe80::2\"]").contains("[fe80::2%eth0]:3794"));
     }
 
     #[test]

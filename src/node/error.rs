@@ -1,6 +1,6 @@
 //! What can go wrong with a node: at its start, when sending, when attaching from elsewhere.
 
-use std::net::Ipv4Addr;
+use std::net::IpAddr;
 
 use super::{ConfigError, Peer};
 use crate::address::JausId;
@@ -30,7 +30,7 @@ pub enum StartError {
         /// The peer.
         peer: Peer,
         /// The address of this host that leads to it.
-        local: Ipv4Addr,
+        local: IpAddr,
         /// The interfaces that were chosen.
         chosen: link::Available,
     },

@@ -5,13 +5,13 @@
 //! those that came and closes those that went.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::{IpAddr, SocketAddr};
 use std::time::Duration;
 
 use super::{Config, Peer, StartError};
 use crate::endpoint::{LinkId, Path, StaticPeer};
 use crate::link::udp::UdpLink;
-use crate::link::{Available, Error, Group, Interface, Interfaces, interface};
+use crate::link::{Available, Error, Interface, Interfaces, interface};
 
 /// The time between two looks at the host's interfaces.
 pub(super) const INTERVAL: Duration = Duration::from_secs(2);
@@ -23,18 +23,22 @@ pub(super) struct Links {
     open: BTreeMap<LinkId, UdpLink>,
     next: LinkId,
     /// Addresses where a link could not be opened; said once.
-    refused: BTreeSet<Ipv4Addr>,
+    refused: BTreeSet<SocketAddr>,
 }
 
 impl Links {
     /// Opens a link on every chosen interface. Nothing stays open if one fails.
     pub(super) fn open(config: &Config) -> Result<Self, StartError> {
-        let mut chosen = config.interfaces.choose()?;
+        let mut chosen = config.interfaces.choose(config.ip)?;
         for &peer in &config.peers {
             lead_to(peer, &config.interfaces, &mut chosen)?;
         }
-        let deaf = !chosen.iter().any(|interface| interface.multicast);
-        if config.group != Group::Off && deaf && config.peers.is_empty() {
+        let udp = config.udp();
+        let deaf = chosen.iter().all(|interface| udp.is_deaf_on(interface));
+        // The network of a board that has just started may come yet.
+        let alone = chosen.iter().all(Interface::is_loopback);
+        let waits = alone && config.interfaces == Interfaces::All;
+        if deaf && !waits && config.peers.is_empty() {
             return Err(Error::NoMulticast(Available(chosen)).into());
         }
         let mut links = Self {
@@ -75,7 +79,7 @@ impl Links {
     /// `None` if nothing has changed.
     pub(super) fn follow(&mut self) -> Option<Vec<LinkId>> {
         let available = interface::list().ok()?;
-        let mut wanted = self.config.interfaces.present(&available);
+        let mut wanted = self.config.interfaces.present(&available, self.config.ip);
         for &peer in &self.config.peers {
             // Out of reach just now; it was not when the node started.
             let _ = lead_to(peer, &self.config.interfaces, &mut wanted);
@@ -123,11 +127,11 @@ impl Links {
     fn try_add(&mut self, interface: &Interface) -> bool {
         match self.add(interface) {
             Ok(()) => {
-                self.refused.remove(&interface.address);
+                self.refused.remove(&interface.at(0));
                 true
             }
             Err(error) => {
-                if self.refused.insert(interface.address) {
+                if self.refused.insert(interface.at(0)) {
                     tracing::warn!(%interface, %error, "no link on an interface that came up");
                 }
                 false
@@ -185,8 +189,8 @@ impl Links {
 fn way_to<'a>(
     peer: SocketAddr,
     mut interfaces: impl Iterator<Item = &'a Interface>,
-) -> Option<Ipv4Addr> {
-    let near = |i: &&Interface| matches!(peer.ip(), IpAddr::V4(v4) if i.reaches(v4));
+) -> Option<IpAddr> {
+    let near = |i: &&Interface| i.reaches(peer);
     let near = interfaces.find(near).map(|interface| interface.address);
     near.or_else(|| interface::local_address_for(peer))
 }
@@ -226,9 +230,10 @@ mod tests {
             name: name.into(),
             index: 1,
             address: address.into(),
-            netmask: [255, 255, 255, 255].into(),
+            prefix: 32,
             up: true,
             multicast: true,
+            broadcast: None,
         }
     }
 
@@ -254,7 +259,7 @@ mod tests {
     fn the_interface_that_leads_to_a_peer_is_added_when_all_are_wanted() {
         let mut chosen = vec![interface("eth0", [10, 0, 0, 5])];
         lead_to(peer(), &Interfaces::All, &mut chosen).unwrap();
-        assert_eq!(chosen[1].address.octets(), [127, 0, 0, 1]);
+        assert_eq!(chosen[1].address, IpAddr::from([127, 0, 0, 1]));
     }
 
     #[test]

@@ -12,6 +12,9 @@ pub(crate) const LIMIT: Duration = Duration::from_secs(30);
 /// Set for a process that plays a node; says which.
 pub(crate) const ROLE: &str = "JAUS_TEST_ROLE";
 
+/// Set for a process that plays a node with other settings than the usual.
+pub(crate) const SETTINGS: &str = "JAUS_TEST_SETTINGS";
+
 /// Set for a test that was started again in a user namespace.
 const INSIDE: &str = "JAUS_TEST_IN_USER_NAMESPACE";
 
@@ -53,6 +56,26 @@ impl TwoHosts {
         Ok(())
     }
 
+    /// The link-local IPv6 address of an interface, as the other end of the cable writes it.
+    pub(crate) fn link_local(&self, host: usize, cable: &str) -> String {
+        let shown = [
+            "-n",
+            &self.names[host],
+            "-6",
+            "-o",
+            "address",
+            "show",
+            "dev",
+            cable,
+        ];
+        let output = Command::new("ip").args(shown).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        let address = text
+            .split_whitespace()
+            .find_map(|word| word.strip_suffix("/64"));
+        format!("{}%{cable}", address.unwrap())
+    }
+
     /// Runs `ip` on one of the two hosts.
     pub(crate) fn ip(&self, host: usize, arguments: &[&str]) {
         ip(&[&["-n", &self.names[host]], arguments].concat()).unwrap();
@@ -60,6 +83,11 @@ impl TwoHosts {
 
     /// Starts this test binary in the role of a node on one of the two hosts.
     pub(crate) fn start(&self, host: usize, role: &str) -> Process {
+        self.start_with(host, role, "")
+    }
+
+    /// The same with settings, such as `ip=6 group=off`.
+    pub(crate) fn start_with(&self, host: usize, role: &str, settings: &str) -> Process {
         let mut child = Command::new("ip")
             .args(["netns", "exec", &self.names[host]])
             .arg(std::env::current_exe().unwrap())
@@ -70,6 +98,7 @@ impl TwoHosts {
                 "--test-threads=1",
             ])
             .env(ROLE, role)
+            .env(SETTINGS, settings)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();

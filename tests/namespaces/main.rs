@@ -13,6 +13,7 @@
 )]
 
 mod hosts;
+mod links;
 mod roles;
 
 use std::time::{Duration, Instant};

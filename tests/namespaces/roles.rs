@@ -6,15 +6,39 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::component::{Change, Component, Kind};
 use jaus::endpoint::Outgoing;
+use jaus::link::Ip;
+use jaus::link::udp::Broadcasts;
 use jaus::node::{Config, Node};
 use jaus::wire::Priority;
+
+use super::hosts::SETTINGS;
+
+/// The usual settings, but for those in the environment.
+fn config(subsystem: u16) -> Config {
+    let mut config = Config::new(subsystem, 1);
+    let settings = std::env::var(SETTINGS).unwrap_or_default();
+    for setting in settings.split_whitespace() {
+        match setting.split_once('=').unwrap() {
+            ("ip", "6") => config.ip = Ip::V6,
+            ("ip", "both") => config.ip = Ip::Both,
+            ("group", group) => config.group = group.parse().unwrap(),
+            ("group6", group) => config.group6 = group.parse().unwrap(),
+            ("broadcast", "on") => config.broadcast = Broadcasts::On,
+            ("broadcast", "off") => config.broadcast = Broadcasts::Off,
+            ("port", port) => config.port = port.parse().unwrap(),
+            ("peer", peer) => config.peers.push(peer.parse().unwrap()),
+            _ => panic!("no setting: {setting}"),
+        }
+    }
+    config
+}
 
 /// Messages that the flood is made of.
 pub(crate) const FLOOD: usize = 2000;
 
 /// Answers whatever it hears, until it is killed.
 pub(crate) async fn echo() {
-    let node = Node::start(Config::new(101, 1)).unwrap();
+    let node = Node::start(config(101)).unwrap();
     let mut port = node.attach(33).unwrap();
     println!("\nlistening on {}", node.links()[0].local);
     while let Some(message) = port.recv().await {
@@ -26,7 +50,7 @@ pub(crate) async fn echo() {
 
 /// Asks everyone until somebody answers.
 pub(crate) async fn call() {
-    let node = Node::start(Config::new(102, 1)).unwrap();
+    let node = Node::start(config(102)).unwrap();
     let mut port = node.attach(1).unwrap();
     let query_identification = Bytes::from_static(&[0x00, 0x2B, 0x02]);
     let answer = loop {
@@ -46,7 +70,7 @@ pub(crate) async fn call() {
 
 /// Counts what comes, and says when the urgent message came.
 pub(crate) async fn sink() {
-    let node = Node::start(Config::new(101, 1)).unwrap();
+    let node = Node::start(config(101)).unwrap();
     let mut port = node.attach(33).unwrap();
     println!("\nlistening on {}", node.links()[0].local);
     let mut usual = 0;
@@ -66,7 +90,7 @@ pub(crate) async fn sink() {
 
 /// Sends far more than the network takes, and then something urgent.
 pub(crate) async fn flood() {
-    let node = Node::start(Config::new(102, 1)).unwrap();
+    let node = Node::start(config(102)).unwrap();
     let port = node.attach(1).unwrap();
     let picture = Bytes::from(vec![0; 1400]);
     let usual = Outgoing::new(port.id(), JausId::EVERYONE, picture);
@@ -87,7 +111,7 @@ pub(crate) const ANNOUNCEMENTS: u8 = 10;
 
 /// Prints the number of every announcement that it hears.
 pub(crate) async fn listen() {
-    let node = Node::start(Config::new(101, 1)).unwrap();
+    let node = Node::start(config(101)).unwrap();
     let mut port = node.attach(33).unwrap();
     println!("\nlistening on {} links", node.links().len());
     while let Some(message) = port.recv().await {
@@ -97,7 +121,7 @@ pub(crate) async fn listen() {
 
 /// Announces a number to everyone, and then the next.
 pub(crate) async fn announce() {
-    let node = Node::start(Config::new(102, 1)).unwrap();
+    let node = Node::start(config(102)).unwrap();
     let port = node.attach(1).unwrap();
     for number in 0..ANNOUNCEMENTS {
         let payload = Bytes::copy_from_slice(&[0x02, 0x42, number]);
@@ -110,7 +134,7 @@ pub(crate) async fn announce() {
 
 /// A vehicle that offers the core services, until it is killed.
 pub(crate) async fn vehicle() {
-    let node = Node::start(Config::new(101, 1)).unwrap();
+    let node = Node::start(config(101)).unwrap();
     let rover = Component::builder(Kind::Vehicle, "Rover")
         .attach(&node, 33)
         .unwrap();
@@ -120,7 +144,7 @@ pub(crate) async fn vehicle() {
 /// An operator that looks for vehicles, until it is killed.
 pub(crate) async fn operator() {
     let started = Instant::now();
-    let node = Node::start(Config::new(102, 1)).unwrap();
+    let node = Node::start(config(102)).unwrap();
     let desk = Component::builder(Kind::OperatorControlUnit, "Desk")
         .attach(&node, 1)
         .unwrap();

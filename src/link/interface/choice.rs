@@ -1,0 +1,363 @@
+//! Which of the host's interfaces and addresses a node uses.
+
+#[cfg(feature = "serde")]
+use std::fmt;
+use std::net::{IpAddr, SocketAddr};
+
+use super::{Available, Interface, Place, list};
+use crate::link::Error;
+
+/// The versions of IP that are used on the interfaces chosen. An interface or a peer that is named
+/// by its address is used whatever its version.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Ip {
+    /// IPv4, which is all that other implementations speak.
+    #[default]
+    #[cfg_attr(feature = "serde", serde(rename = "4"))]
+    V4,
+    /// IPv6.
+    #[cfg_attr(feature = "serde", serde(rename = "6"))]
+    V6,
+    /// Both. A peer that is heard both ways is answered the way it was heard last.
+    #[cfg_attr(feature = "serde", serde(rename = "both"))]
+    Both,
+}
+
+impl Ip {
+    const fn includes(self, address: IpAddr) -> bool {
+        match self {
+            Self::V4 => address.is_ipv4(),
+            Self::V6 => address.is_ipv6(),
+            Self::Both => true,
+        }
+    }
+
+    pub(in crate::link) const fn name(self) -> &'static str {
+        match self {
+            Self::V4 => "IPv4",
+            Self::V6 => "IPv6",
+            Self::Both => "IP",
+        }
+    }
+}
+
+/// The interfaces that a node opens links on.
+///
+/// On each of them one address of each [`Ip`] version is used: with IPv4 the first; with IPv6 the
+/// link-local one (`fe80::…`), which every interface has and by which neighbours meet without any
+/// set-up, or else the first. Another address is chosen by naming it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Interfaces {
+    /// Every interface that is up and has an address, without loopback. Nodes of one host hear
+    /// each other there too. A host that has nothing else uses loopback.
+    #[default]
+    All,
+    /// Only the loopback interface: nothing leaves this host and no network is needed.
+    Loopback,
+    /// The interfaces named, each by name (`eth0`) or by an address of this host, such as
+    /// `10.0.3.2`, `fd00::2` or `fe80::1%eth0`. Any address in 127.0.0.0/8 stands for the loopback
+    /// interface with that address.
+    Only(Vec<String>),
+}
+
+impl Interfaces {
+    /// The interfaces of this host that are meant.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchInterface`], [`Error::NoAddress`], [`Error::InterfaceDown`] or
+    /// [`Error::NoInterface`], each with what exists instead.
+    pub fn choose(&self, ip: Ip) -> Result<Vec<Interface>, Error> {
+        self.choose_from(&list()?, ip)
+    }
+
+    fn choose_from(&self, available: &[Interface], ip: Ip) -> Result<Vec<Interface>, Error> {
+        if let Self::Only(wanted) = self {
+            wanted
+                .iter()
+                .try_for_each(|name| named(name, available, ip).map(drop))?;
+        }
+        let chosen = self.present(available, ip);
+        if chosen.is_empty() {
+            return Err(Error::NoInterface(Available(available.to_vec())));
+        }
+        Ok(chosen)
+    }
+
+    /// Those of the available interfaces that are meant and are up. May be none.
+    #[must_use]
+    pub fn present(&self, available: &[Interface], ip: Ip) -> Vec<Interface> {
+        let mut chosen: Vec<Interface> = Vec::new();
+        match self {
+            Self::All => {
+                let up: Vec<_> = available.iter().filter(|i| i.up).collect();
+                chosen.extend(usual(up.into_iter().filter(|i| !i.is_loopback()), ip));
+                if chosen.is_empty() {
+                    return Self::Loopback.present(available, ip);
+                }
+            }
+            Self::Loopback => {
+                let loopback = available.iter().filter(|i| i.up && i.is_loopback());
+                chosen.extend(usual(loopback, ip));
+            }
+            Self::Only(wanted) => {
+                let found = wanted
+                    .iter()
+                    .filter_map(|name| named(name, available, ip).ok());
+                for interface in found.flatten() {
+                    if !chosen.iter().any(|c| c.at(0) == interface.at(0)) {
+                        chosen.push(interface);
+                    }
+                }
+            }
+        }
+        chosen
+    }
+}
+
+/// One address of each version that is meant, of each interface.
+fn usual<'a>(addresses: impl Iterator<Item = &'a Interface>, ip: Ip) -> Vec<Interface> {
+    let mut chosen: Vec<Interface> = Vec::new();
+    for address in addresses.filter(|i| ip.includes(i.address)) {
+        let same = |c: &&mut Interface| {
+            c.index == address.index && c.address.is_ipv4() == address.address.is_ipv4()
+        };
+        match chosen.iter_mut().find(same) {
+            None => chosen.push(address.clone()),
+            Some(other) if address.is_link_local() && !other.is_link_local() => {
+                *other = address.clone();
+            }
+            Some(_) => {}
+        }
+    }
+    chosen
+}
+
+/// The addresses of the interface that was asked for, which must be up.
+fn named(wanted: &str, available: &[Interface], ip: Ip) -> Result<Vec<Interface>, Error> {
+    let all = || Available(available.to_vec());
+    let of_name = |i: &&Interface| i.name == wanted;
+    let found = match wanted.parse::<Place>() {
+        Ok(place) => by_address(place, available).into_iter().collect(),
+        Err(_) => usual(available.iter().filter(of_name).filter(|i| i.up), ip),
+    };
+    if let Some(down) = found.iter().find(|i| !i.up) {
+        return Err(Error::InterfaceDown {
+            interface: down.clone(),
+            available: all(),
+        });
+    }
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    Err(match available.iter().find(of_name) {
+        None => Error::NoSuchInterface {
+            wanted: wanted.to_owned(),
+            available: all(),
+        },
+        Some(down) if !down.up => Error::InterfaceDown {
+            interface: down.clone(),
+            available: all(),
+        },
+        Some(_) => Error::NoAddress {
+            wanted: wanted.to_owned(),
+            ip,
+            available: all(),
+        },
+    })
+}
+
+fn by_address(place: Place, available: &[Interface]) -> Option<Interface> {
+    let address = place.address();
+    let is_meant = |i: &&Interface| {
+        let scope = match (i.at(address.port()), address) {
+            (SocketAddr::V6(own), SocketAddr::V6(wanted)) => {
+                wanted.scope_id() == 0 || own.scope_id() == wanted.scope_id()
+            }
+            _ => true,
+        };
+        i.address == address.ip() && scope
+    };
+    let loopback = || {
+        let of_ipv4 = |i: &&Interface| i.is_loopback() && i.address.is_ipv4();
+        let v4 = address.is_ipv4() && address.ip().is_loopback();
+        available.iter().find(of_ipv4).filter(|_| v4)
+    };
+    let found = available.iter().find(is_meant).or_else(loopback)?;
+    Some(Interface {
+        address: address.ip(),
+        ..found.clone()
+    })
+}
+
+#[cfg(feature = "serde")]
+impl serde::Serialize for Interfaces {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::All => serializer.serialize_str("all"),
+            Self::Loopback => serializer.serialize_str("loopback"),
+            Self::Only(names) => names.serialize(serializer),
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for Interfaces {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(WordOrNames)
+    }
+}
+
+#[cfg(feature = "serde")]
+struct WordOrNames;
+
+#[cfg(feature = "serde")]
+impl<'de> serde::de::Visitor<'de> for WordOrNames {
+    type Value = Interfaces;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("\"all\", \"loopback\" or a list of names or addresses such as [\"eth0\"]")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, word: &str) -> Result<Interfaces, E> {
+        match word {
+            "all" => Ok(Interfaces::All),
+            "loopback" => Ok(Interfaces::Loopback),
+            _ => Err(E::invalid_value(serde::de::Unexpected::Str(word), &self)),
+        }
+    }
+
+    fn visit_seq<A: serde::de::SeqAccess<'de>>(self, mut seq: A) -> Result<Interfaces, A::Error> {
+        let mut names = Vec::new();
+        while let Some(name) = seq.next_element()? {
+            names.push(name);
+        }
+        Ok(Interfaces::Only(names))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn interface(name: &str, index: u32, address: &str) -> Interface {
+        let address: IpAddr = address.parse().unwrap();
+        Interface {
+            name: name.into(),
+            index,
+            address,
+            prefix: if address.is_ipv4() { 24 } else { 64 },
+            up: true,
+            multicast: true,
+            broadcast: None,
+        }
+    }
+
+    fn host() -> Vec<Interface> {
+        vec![
+            interface("lo", 1, "127.0.0.1"),
+            interface("eth0", 2, "10.0.0.5"),
+            interface("eth0", 2, "10.0.1.5"),
+            Interface {
+                up: false,
+                ..interface("wlan0", 3, "10.0.2.5")
+            },
+            Interface {
+                multicast: false,
+                ..interface("wg0", 4, "10.9.0.1")
+            },
+            interface("lo", 1, "::1"),
+            interface("eth0", 2, "fd00::5"),
+            interface("eth0", 2, "fe80::5"),
+            interface("eth1", 5, "fe80::5"),
+            interface("eth2", 6, "fd00::6"),
+        ]
+    }
+
+    fn names(chosen: &[Interface]) -> Vec<String> {
+        chosen
+            .iter()
+            .map(|i| format!("{}={}", i.name, i.address))
+            .collect()
+    }
+
+    fn only<const N: usize>(names: [&str; N]) -> Interfaces {
+        Interfaces::Only(names.map(String::from).into())
+    }
+
+    #[test]
+    fn all_means_one_address_of_each_interface_that_is_up_without_loopback() {
+        let chosen = |ip| names(&Interfaces::All.choose_from(&host(), ip).unwrap());
+        assert_eq!(chosen(Ip::V4), ["eth0=10.0.0.5", "wg0=10.9.0.1"]);
+        let six = ["eth0=fe80::5", "eth1=fe80::5", "eth2=fd00::6"];
+        assert_eq!(chosen(Ip::V6), six);
+        assert_eq!(chosen(Ip::Both)[2..], six);
+    }
+
+    #[test]
+    fn a_host_without_network_uses_loopback() {
+        let host = [host()[0].clone(), host()[5].clone()];
+        let chosen = |ip| names(&Interfaces::All.choose_from(&host, ip).unwrap());
+        assert_eq!(chosen(Ip::V4), ["lo=127.0.0.1"]);
+        assert_eq!(chosen(Ip::V6), ["lo=::1"]);
+        assert_eq!(chosen(Ip::Both), ["lo=127.0.0.1", "lo=::1"]);
+    }
+
+    #[test]
+    fn interfaces_are_chosen_by_name_or_address_and_only_once() {
+        let wanted = only(["eth0", "10.0.1.5", "127.0.0.7", "eth0"]);
+        assert_eq!(
+            names(&wanted.choose_from(&host(), Ip::V4).unwrap()),
+            ["eth0=10.0.0.5", "eth0=10.0.1.5", "lo=127.0.0.7"]
+        );
+        let wanted = only(["eth0", "fd00::5", "fe80::5%5", "::1"]);
+        let chosen = wanted.choose_from(&host(), Ip::Both).unwrap();
+        assert_eq!(chosen[3].index, 5);
+        assert_eq!(
+            names(&chosen),
+            [
+                "eth0=10.0.0.5",
+                "eth0=fe80::5",
+                "eth0=fd00::5",
+                "eth1=fe80::5",
+                "lo=::1"
+            ]
+        );
+    }
+
+    #[test]
+    fn an_unknown_interface_is_an_error_that_lists_what_exists() {
+        let error = only(["eth9"]).choose_from(&host(), Ip::V4).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("`eth9`"), "{text}");
+        assert!(
+            text.contains("eth0 10.0.0.5") && text.contains("wlan0 10.0.2.5 (down)"),
+            "{text}"
+        );
+        assert!(text.contains("wg0 10.9.0.1 (no multicast)"), "{text}");
+    }
+
+    #[test]
+    fn an_interface_without_an_address_of_the_version_wanted_is_said_to_lack_it() {
+        let error = only(["wg0"]).choose_from(&host(), Ip::V6).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("`wg0` has no IPv6 address"), "{text}");
+    }
+
+    #[test]
+    fn an_interface_that_is_down_is_said_to_be_down() {
+        for wanted in ["wlan0", "10.0.2.5"] {
+            let error = only([wanted]).choose_from(&host(), Ip::V4).unwrap_err();
+            assert!(matches!(error, Error::InterfaceDown { .. }), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_host_without_any_address_is_told_so() {
+        let error = Interfaces::All.choose_from(&[], Ip::V4).unwrap_err();
+        assert!(
+            error.to_string().contains("none with an address"),
+            "{error}"
+        );
+    }
+}

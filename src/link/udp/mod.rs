@@ -1,0 +1,169 @@
+//! The UDP link of one network interface: a unicast socket, and one for each address by which
+//! everyone is reached: the multicast group, the network's broadcast address, or both.
+//!
+//! See the [module above](super) for why there are several. Errors of a single datagram (an ICMP
+//! answer, a full network queue, a route that is missing just now) are counted and traced and
+//! never end the link.
+
+mod open;
+mod receive;
+mod send;
+mod settings;
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use bytes::Bytes;
+use tokio::net::UdpSocket;
+
+pub use settings::{Broadcasts, PortTaken, Settings};
+
+use super::backlog::{Backlog, Bounds};
+use super::socket_table::{self, Entry};
+use super::{Error, Interface};
+
+/// What a link has done since it was opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Counters {
+    /// Datagrams received, without our own.
+    pub received: u64,
+    /// Octets in them.
+    pub received_octets: u64,
+    /// Our own datagrams for everyone, heard again and ignored.
+    pub own_echo: u64,
+    /// Datagrams sent, each copy to a peer counted.
+    pub sent: u64,
+    /// Octets in them.
+    pub sent_octets: u64,
+    /// Errors while receiving, such as ICMP answers to what we sent.
+    pub receive_errors: u64,
+    /// Datagrams that the operating system refused to send.
+    pub send_errors: u64,
+    /// Datagrams dropped because the network was slower than this node for too long.
+    pub send_overflows: u64,
+}
+
+/// What waits in a link while the kernel's send buffer is full.
+const OUTBOX: Bounds = Bounds {
+    items: 2048,
+    octets: 4 << 20,
+};
+
+/// The sockets of one interface. Must be opened within a tokio runtime.
+#[derive(Debug)]
+pub struct UdpLink {
+    interface: Interface,
+    local: SocketAddr,
+    /// The unicast socket, which sends everything, and then those of `groups`, which only hear.
+    sockets: Vec<UdpSocket>,
+    groups: Vec<SocketAddr>,
+    peers: Vec<SocketAddr>,
+    outbox: Backlog<(SocketAddr, Bytes)>,
+    /// The socket that is read first the next time.
+    turn: usize,
+    last_error: Option<io::ErrorKind>,
+    counters: Counters,
+}
+
+impl UdpLink {
+    /// Opens the link of `interface`. An interface without multicast and broadcast gets a link for
+    /// unicast alone.
+    ///
+    /// # Errors
+    /// [`Error::PortTaken`], [`Error::GroupTaken`], [`Error::InvalidGroup`],
+    /// [`Error::Permission`], [`Error::AddressGone`] or [`Error::Io`].
+    pub fn open(interface: &Interface, settings: &Settings) -> Result<Self, Error> {
+        settings.validate()?;
+        let unicast = open::unicast(interface, settings)?;
+        let local = unicast
+            .local_addr()
+            .map_err(open::io_error("reading the local address"))?;
+        let groups = settings.addresses_of_all(interface);
+        let mut sockets = vec![unicast];
+        for &group in &groups {
+            sockets.push(open::group(interface, group, settings)?);
+        }
+        tracing::info!(%interface, %local, ?groups, "link opened");
+        Ok(Self {
+            interface: interface.clone(),
+            local,
+            sockets,
+            groups,
+            peers: Vec::new(),
+            outbox: Backlog::new(OUTBOX),
+            turn: 0,
+            last_error: None,
+            counters: Counters::default(),
+        })
+    }
+
+    /// The address that this link sends from, and that peers answer to.
+    #[must_use]
+    pub const fn local(&self) -> SocketAddr {
+        self.local
+    }
+
+    /// The interface that it was opened on.
+    #[must_use]
+    pub const fn interface(&self) -> &Interface {
+        &self.interface
+    }
+
+    /// The multicast group that it has joined, or the broadcast address that it uses instead.
+    #[must_use]
+    pub fn group(&self) -> Option<SocketAddr> {
+        self.groups.first().copied()
+    }
+
+    /// What it has done so far.
+    #[must_use]
+    pub const fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// How many datagrams the kernel dropped because this process did not read them in time, if
+    /// it tells (Linux does). Reads a table of all sockets: nothing to ask every second.
+    #[must_use]
+    pub fn kernel_drops(&self) -> Option<u64> {
+        let files: Vec<PathBuf> = self.sockets.iter().filter_map(file).collect();
+        let ours = |entry: &Entry| files.contains(&socket_table::file_of(entry.inode).into());
+        let table = socket_table::all();
+        let drops: Vec<u64> = table.iter().filter(|e| ours(e)).map(|e| e.drops).collect();
+        (!drops.is_empty()).then(|| drops.iter().sum())
+    }
+
+    /// Names the peers that get a unicast copy of everything sent to the group, for networks that
+    /// do not carry multicast.
+    pub fn set_peers(&mut self, peers: Vec<SocketAddr>) {
+        self.peers = peers;
+    }
+
+    fn unicast(&self) -> &UdpSocket {
+        // The first, which `open` put there.
+        &self.sockets[0]
+    }
+
+    /// Warns when the kind of error is a new one, so that a broken network cannot fill a log.
+    fn report(&mut self, doing: &str, peer: Option<SocketAddr>, error: &io::Error) {
+        let interface = &self.interface.name;
+        if self.last_error.replace(error.kind()) == Some(error.kind()) {
+            tracing::debug!(interface, doing, ?peer, %error, "datagram lost");
+        } else {
+            tracing::warn!(interface, doing, ?peer, %error, "datagram lost");
+        }
+    }
+}
+
+/// What the socket's file descriptor links to: its number in the kernel.
+#[cfg(unix)]
+fn file(socket: &UdpSocket) -> Option<PathBuf> {
+    use std::os::fd::AsRawFd;
+    std::fs::read_link(format!("/proc/self/fd/{}", socket.as_raw_fd())).ok()
+}
+
+#[cfg(not(unix))]
+fn file(_: &UdpSocket) -> Option<PathBuf> {
+    None
+}

@@ -1,0 +1,179 @@
+//! Opening the sockets of a UDP link, and what is said when that fails.
+
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+
+use socket2::{Domain, InterfaceIndexOrAddress, Protocol, Socket, Type};
+use tokio::net::UdpSocket;
+
+use super::{PortTaken, Settings};
+use crate::link::{Error, Holder, Interface};
+
+/// The socket that sends everything, bound to one address for itself alone.
+pub(super) fn unicast(interface: &Interface, settings: &Settings) -> Result<UdpSocket, Error> {
+    let wanted = interface.at(settings.port);
+    let socket = new_socket(wanted)?;
+    if let Err(e) = socket.bind(&wanted.into()) {
+        let taken = e.kind() == io::ErrorKind::AddrInUse;
+        if !taken || settings.port_taken == PortTaken::Refuse {
+            return Err(bind_error(wanted, e));
+        }
+        let free = interface.at(0);
+        socket.bind(&free.into()).map_err(|e| bind_error(free, e))?;
+        tracing::warn!(%wanted, "port taken, using a free one instead");
+    }
+    for group in settings.addresses_of_all(interface) {
+        let error = |source| Error::Io {
+            doing: format!("setting up {group} on {interface}"),
+            source,
+        };
+        prepare_sending(&socket, group.ip(), interface, settings).map_err(error)?;
+    }
+    finish(socket, settings.receive_buffer)
+}
+
+/// Lets a socket send to everyone at `group`.
+fn prepare_sending(
+    socket: &Socket,
+    group: IpAddr,
+    interface: &Interface,
+    settings: &Settings,
+) -> io::Result<()> {
+    let hops = settings.ttl.into();
+    // Other nodes of this host shall hear it too.
+    match (group, interface.address) {
+        (IpAddr::V6(_), _) => {
+            socket.set_multicast_if_v6(interface.index)?;
+            socket.set_multicast_hops_v6(hops)?;
+            socket.set_multicast_loop_v6(true)
+        }
+        (IpAddr::V4(v4), IpAddr::V4(own)) if v4.is_multicast() => {
+            socket.set_multicast_if_v4(&own)?;
+            socket.set_multicast_ttl_v4(hops)?;
+            socket.set_multicast_loop_v4(true)
+        }
+        _ => socket.set_broadcast(true),
+    }
+}
+
+/// A socket that hears what is sent to everyone at `group`, shared with other nodes of the host.
+pub(super) fn group(
+    interface: &Interface,
+    group: SocketAddr,
+    settings: &Settings,
+) -> Result<UdpSocket, Error> {
+    let socket = new_socket(group)?;
+    socket
+        .set_reuse_address(true)
+        .map_err(io_error("sharing the multicast port"))?;
+    // Bound to the group itself, the socket leaves unicast to this port to the unicast socket.
+    let local = match group {
+        _ if !cfg!(windows) => group,
+        SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, group.port()).into(),
+        SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, group.port()).into(),
+    };
+    socket.bind(&local.into()).map_err(|e| match e.kind() {
+        io::ErrorKind::AddrInUse => Error::GroupTaken {
+            group,
+            holder: Holder::of(group),
+        },
+        _ => bind_error(group, e),
+    })?;
+    join(&socket, group.ip(), interface).map_err(|source| Error::Io {
+        doing: format!("joining the multicast group {} on {interface}", group.ip()),
+        source,
+    })?;
+    finish(socket, settings.receive_buffer)
+}
+
+/// Joins the group on this interface. Without `multicast_all` Linux would also deliver what other
+/// sockets of this host joined on other interfaces.
+fn join(socket: &Socket, group: IpAddr, interface: &Interface) -> io::Result<()> {
+    match group {
+        IpAddr::V4(v4) if v4.is_multicast() => {
+            #[cfg(target_os = "linux")]
+            socket.set_multicast_all_v4(false)?;
+            let on = InterfaceIndexOrAddress::Index(interface.index);
+            socket.join_multicast_v4_n(&v4, &on)
+        }
+        IpAddr::V6(v6) => {
+            // Newer than the rest (Linux 4.20), and not needed where the group's address names the
+            // interface.
+            #[cfg(target_os = "linux")]
+            let _ = socket.set_multicast_all_v6(false);
+            socket.join_multicast_v6(&v6, interface.index)
+        }
+        // A broadcast address needs no joining.
+        IpAddr::V4(_) => Ok(()),
+    }
+}
+
+fn new_socket(address: SocketAddr) -> Result<Socket, Error> {
+    let socket = Socket::new(
+        Domain::for_address(address),
+        Type::DGRAM,
+        Some(Protocol::UDP),
+    )
+    .map_err(|e| match e.kind() {
+        io::ErrorKind::PermissionDenied => Error::Permission {
+            doing: "opening a UDP socket".into(),
+            port: 0,
+            source: e,
+        },
+        _ => io_error("opening a UDP socket")(e),
+    })?;
+    if address.is_ipv6() {
+        // The links of IPv4 have sockets of their own.
+        socket
+            .set_only_v6(true)
+            .map_err(io_error("keeping IPv4 out of an IPv6 socket"))?;
+    }
+    Ok(socket)
+}
+
+fn finish(socket: Socket, receive_buffer: usize) -> Result<UdpSocket, Error> {
+    // Linux answers with twice the size in force: the other half is its own bookkeeping.
+    let granted = socket
+        .set_recv_buffer_size(receive_buffer)
+        .and_then(|()| socket.recv_buffer_size())
+        .map_err(io_error("setting the receive buffer size"))?;
+    if granted < receive_buffer {
+        tracing::info!(
+            wanted = receive_buffer,
+            granted,
+            "the kernel limits the receive buffer; raise net.core.rmem_max against losses in bursts"
+        );
+    } else {
+        tracing::debug!(granted, "receive buffer");
+    }
+    socket
+        .set_nonblocking(true)
+        .and_then(|()| UdpSocket::from_std(socket.into()))
+        .map_err(io_error("handing the socket to the runtime"))
+}
+
+fn bind_error(address: SocketAddr, source: io::Error) -> Error {
+    match source.kind() {
+        io::ErrorKind::AddrInUse => Error::PortTaken {
+            address,
+            holder: Holder::of(address),
+        },
+        io::ErrorKind::PermissionDenied => Error::Permission {
+            doing: format!("binding to UDP {address}"),
+            port: address.port(),
+            source,
+        },
+        io::ErrorKind::AddrNotAvailable => Error::AddressGone(address.ip()),
+        _ => Error::Io {
+            doing: format!("binding to UDP {address}"),
+            source,
+        },
+    }
+}
+
+pub(super) fn io_error(doing: &'static str) -> impl Fn(io::Error) -> Error {
+    move |source| Error::Io {
+        doing: doing.into(),
+        source,
+    }
+}
