@@ -1,0 +1,48 @@
+//! Child processes: this program again, in a role.
+
+use std::env;
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use crate::roles::Role;
+
+/// A running child, ended when dropped.
+pub(crate) struct Process {
+    child: Child,
+    /// What it said when it was ready, such as an address.
+    pub(crate) ready: String,
+}
+
+impl Process {
+    /// Starts a child and waits until it is ready.
+    pub(crate) fn start(role: &Role) -> Self {
+        let this = env::current_exe().expect("the path of this program");
+        let mut child = Command::new(this)
+            .env(Role::VARIABLE, role.to_words())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("a child process");
+        let output = child.stdout.take().expect("its output is piped");
+        let mut ready = String::new();
+        BufReader::new(output)
+            .read_line(&mut ready)
+            .expect("a word from the child");
+        assert!(!ready.is_empty(), "the child {role:?} died at once");
+        Self {
+            child,
+            ready: ready.trim().to_owned(),
+        }
+    }
+
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,85 @@
+//! What the transport costs between processes, beside what the machine can do at best.
+//!
+//! ```text
+//! cargo bench --bench transport                     everything; takes a few minutes
+//! cargo bench --bench transport -- round --quick    what has "round" in its name, few repetitions
+//! ```
+//!
+//! Every figure stands next to a baseline of the same run (raw UDP, a raw Unix socket, a copy in
+//! memory), because a machine that others share is never twice the same: read the ratios. The
+//! program starts itself as child processes for the other components and nodes, all on loopback,
+//! and prints Markdown. What was measured, where and when, is kept in `docs/performance.md`.
+
+#![expect(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "a benchmark: it owns clock and sockets, and ends at the first surprise"
+)]
+
+mod baseline;
+mod child;
+mod idle;
+mod one_way;
+mod place;
+mod report;
+mod roles;
+mod round_trip;
+
+use std::env;
+
+/// How much to measure.
+#[derive(Clone, Copy)]
+struct Effort {
+    /// How often each measurement is repeated, turn about with the others.
+    runs: usize,
+    /// Round trips in one run.
+    round_trips: usize,
+    /// Seconds of sending in one run.
+    seconds: f64,
+    /// Seconds of watching an idle node.
+    idle_seconds: f64,
+}
+
+const THOROUGH: Effort = Effort {
+    runs: 7,
+    round_trips: 5000,
+    seconds: 1.0,
+    idle_seconds: 20.0,
+};
+
+const QUICK: Effort = Effort {
+    runs: 3,
+    round_trips: 1000,
+    seconds: 0.3,
+    idle_seconds: 5.0,
+};
+
+fn main() {
+    if let Some(role) = roles::of_this_process() {
+        return role.play();
+    }
+    let mut effort = THOROUGH;
+    let mut filter = String::new();
+    for argument in env::args().skip(1) {
+        match argument.as_str() {
+            "--quick" => effort = QUICK,
+            // What cargo passes to every benchmark.
+            "--bench" => {}
+            _ => filter = argument,
+        }
+    }
+    let wanted = |name: &str| name.contains(&filter);
+    report::machine();
+    if wanted("round trip") {
+        round_trip::measure(effort);
+    }
+    if wanted("one way") {
+        one_way::measure(effort);
+    }
+    if wanted("idle") {
+        idle::measure(effort);
+    }
+    report::machine();
+}

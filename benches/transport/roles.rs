@@ -1,0 +1,126 @@
+//! What a child process of the benchmark does.
+
+use std::env;
+
+use jaus::address::JausId;
+use jaus::endpoint::{Outgoing, Received};
+
+use crate::place::{self, Place};
+use crate::{baseline, idle};
+
+/// The code of all messages here: an experimental one, which no service takes.
+pub(crate) const CODE: [u8; 2] = [0x01, 0xD7];
+/// The code of the message that asks a sink how much came, and of its answer.
+pub(crate) const COUNT: [u8; 2] = [0x02, 0xD7];
+
+/// A role, with what it needs to know.
+#[derive(Clone, Debug)]
+pub(crate) enum Role {
+    /// Sends datagrams back.
+    UdpEcho,
+    /// Counts datagrams.
+    UdpSink,
+    /// Sends octets back.
+    UnixEcho,
+    /// A component that sends messages back.
+    Echo(JausId, Place),
+    /// A component that counts messages.
+    Sink(JausId, Place),
+    /// A node for other processes, that serves this socket.
+    Node(JausId, Place),
+    /// An idle node with so many components.
+    Idle(usize),
+}
+
+impl Role {
+    /// The environment variable that names the role.
+    pub(crate) const VARIABLE: &str = "JAUS_BENCH_ROLE";
+
+    pub(crate) fn to_words(&self) -> String {
+        match self {
+            Self::UdpEcho => "udp-echo".into(),
+            Self::UdpSink => "udp-sink".into(),
+            Self::UnixEcho => "unix-echo".into(),
+            Self::Echo(id, place) => format!("echo {id} {place}"),
+            Self::Sink(id, place) => format!("sink {id} {place}"),
+            Self::Node(id, place) => format!("node {id} {place}"),
+            Self::Idle(components) => format!("idle {components}"),
+        }
+    }
+
+    fn from_words(words: &str) -> Option<Self> {
+        let words: Vec<_> = words.split(' ').collect();
+        let component = |id: &str, place: &str| Some((id.parse().ok()?, place.parse().ok()?));
+        Some(match words[..] {
+            ["udp-echo"] => Self::UdpEcho,
+            ["udp-sink"] => Self::UdpSink,
+            ["unix-echo"] => Self::UnixEcho,
+            ["echo", id, place] => component(id, place).map(|(id, at)| Self::Echo(id, at))?,
+            ["sink", id, place] => component(id, place).map(|(id, at)| Self::Sink(id, at))?,
+            ["node", id, place] => component(id, place).map(|(id, at)| Self::Node(id, at))?,
+            ["idle", components] => Self::Idle(components.parse().ok()?),
+            _ => return None,
+        })
+    }
+
+    /// Does it, for as long as the process lives.
+    pub(crate) fn play(self) {
+        match self {
+            Self::UdpEcho => baseline::udp_echo(),
+            Self::UdpSink => baseline::udp_sink(),
+            Self::UnixEcho => baseline::unix_echo(),
+            Self::Echo(id, place) => runtime().block_on(echo(id, place)),
+            Self::Sink(id, place) => runtime().block_on(sink(id, place)),
+            Self::Node(id, place) => runtime().block_on(node(id, place)),
+            Self::Idle(components) => runtime().block_on(idle::stay(components)),
+        }
+    }
+}
+
+/// The role of this process; none for the one that the user has started.
+pub(crate) fn of_this_process() -> Option<Role> {
+    let words = env::var(Role::VARIABLE).ok()?;
+    Some(Role::from_words(&words).unwrap_or_else(|| panic!("{words} is no role")))
+}
+
+/// One thread for node, components and sockets, as a component on a small board has it.
+pub(crate) fn runtime() -> tokio::runtime::Runtime {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .expect("a runtime")
+}
+
+async fn echo(id: JausId, place: Place) {
+    let mut component = place.attach(id).await;
+    println!("ready");
+    while let Some(message) = component.port.recv().await {
+        let answer = Outgoing::new(id, message.source, message.payload);
+        component.port.send(answer).expect("sent");
+    }
+}
+
+async fn sink(id: JausId, place: Place) {
+    let mut component = place.attach(id).await;
+    println!("ready");
+    let mut count = 0u64;
+    while let Some(message) = component.port.recv().await {
+        if is(&message, COUNT) {
+            let answer = [&COUNT[..], &count.to_le_bytes()].concat();
+            let answer = Outgoing::new(id, message.source, answer.into());
+            component.port.send(answer).expect("sent");
+        } else if is(&message, CODE) {
+            count += 1;
+        }
+    }
+}
+
+async fn node(id: JausId, place: Place) {
+    let _node = place::serve(id, &place).await;
+    println!("ready");
+    std::future::pending().await
+}
+
+pub(crate) fn is(message: &Received, code: [u8; 2]) -> bool {
+    message.payload.starts_with(&code)
+}

@@ -1,0 +1,139 @@
+//! The time from a component to another and back, in processes of their own.
+
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::endpoint::Outgoing;
+use tokio::runtime::Runtime;
+use tokio::time::timeout;
+
+use crate::Effort;
+use crate::baseline::{UdpEcho, UnixEcho};
+use crate::child::Process;
+use crate::place::{Component, Setting};
+use crate::report::{self, median, micros, percentile, ratio, spread};
+use crate::roles::{self, CODE, Role};
+
+const LENGTHS: [usize; 2] = [64, 1024];
+
+/// Something that goes to and fro.
+trait Pair {
+    fn name(&self) -> &str;
+    fn round_trip(&mut self, message: &Bytes) -> Duration;
+}
+
+impl Pair for UdpEcho {
+    fn name(&self) -> &str {
+        "raw UDP echo"
+    }
+
+    fn round_trip(&mut self, message: &Bytes) -> Duration {
+        Self::round_trip(self, message)
+    }
+}
+
+impl Pair for UnixEcho {
+    fn name(&self) -> &str {
+        "raw Unix socket echo"
+    }
+
+    fn round_trip(&mut self, message: &Bytes) -> Duration {
+        Self::round_trip(self, message)
+    }
+}
+
+/// A component here and one in another process, which sends back what it gets.
+struct Components {
+    name: &'static str,
+    runtime: Runtime,
+    ours: Component,
+    theirs: JausId,
+    _others: Vec<Process>,
+}
+
+impl Components {
+    fn start(setting: Setting) -> Self {
+        let (mut others, [here, there]) = setting.start();
+        let [ours, theirs] = setting.ids();
+        others.push(Process::start(&Role::Echo(theirs, there)));
+        let runtime = roles::runtime();
+        let ours = runtime.block_on(here.attach(ours));
+        Self {
+            name: setting.name(),
+            runtime,
+            ours,
+            theirs,
+            _others: others,
+        }
+    }
+}
+
+impl Pair for Components {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn round_trip(&mut self, message: &Bytes) -> Duration {
+        let (port, theirs) = (&mut self.ours.port, self.theirs);
+        self.runtime.block_on(async {
+            loop {
+                let start = Instant::now();
+                port.send(Outgoing::new(port.id(), theirs, message.clone()))
+                    .expect("sent");
+                // The first may go astray while the two do not know each other.
+                if let Ok(answer) = timeout(Duration::from_secs(1), port.recv()).await {
+                    assert!(answer.is_some(), "the node has stopped");
+                    return start.elapsed();
+                }
+            }
+        })
+    }
+}
+
+pub(crate) fn measure(effort: Effort) {
+    for length in LENGTHS {
+        let mut message = vec![0; length];
+        message[..2].copy_from_slice(&CODE);
+        let message = Bytes::from(message);
+        let mut pairs: Vec<Box<dyn Pair>> =
+            vec![Box::new(UdpEcho::start()), Box::new(UnixEcho::start())];
+        for setting in Setting::ALL.into_iter().take(1) {
+            pairs.push(Box::new(Components::start(setting)));
+        }
+        let mut medians = vec![Vec::new(); pairs.len()];
+        let mut tails = vec![Vec::new(); pairs.len()];
+        for run in 0..=effort.runs {
+            for (pair, (medians, tails)) in pairs.iter_mut().zip(medians.iter_mut().zip(&mut tails))
+            {
+                let times: Vec<_> = (0..effort.round_trips)
+                    .map(|_| micros(pair.round_trip(&message)))
+                    .collect();
+                // The first run only warms up.
+                if run > 0 {
+                    medians.push(median(&times));
+                    tails.push(percentile(&times, 99));
+                }
+            }
+        }
+        report::head(
+            &format!("Round trip, {length} octets (µs)"),
+            [
+                "between",
+                "median",
+                "p99",
+                "median to raw UDP",
+                "p99 to median",
+            ],
+        );
+        for (pair, (medians_of, tails)) in pairs.iter().zip(medians.iter().zip(&tails)) {
+            report::row([
+                pair.name(),
+                &spread(medians_of, 1),
+                &spread(tails, 1),
+                &ratio(medians_of, &medians[0]),
+                &ratio(tails, medians_of),
+            ]);
+        }
+    }
+}
