@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use tokio::sync::{broadcast, mpsc, watch};
+use tokio::sync::{mpsc, watch};
 
 use super::Component;
 use super::driver::{Driver, Publisher};
 use super::handle::Shared;
+use super::watch::Outlet;
 use crate::address::JausId;
 use crate::node::{self, Node, Port};
 use crate::service::{
@@ -136,8 +137,8 @@ impl Builder {
         let stack = self.stack(id);
         let (commands, inbox) = mpsc::channel(Shared::COMMANDS);
         let (directory, directories) = watch::channel(Arc::new(stack.directory().clone()));
-        let changes = broadcast::Sender::new(Shared::CHANGES);
-        let messages = broadcast::Sender::new(Shared::MESSAGES);
+        let changes = Arc::new(Outlet::new(Shared::CHANGES));
+        let messages = Arc::new(Outlet::new(Shared::MESSAGES));
         let publisher = Publisher {
             directory,
             changes: changes.clone(),
@@ -147,8 +148,8 @@ impl Builder {
             sender: port.sender(),
             commands,
             directories,
-            changes: changes.downgrade(),
-            messages: messages.downgrade(),
+            changes,
+            messages,
         };
         tokio::spawn(Driver::new(stack, port, inbox, publisher, patience).run());
         Ok(Component::new(shared))

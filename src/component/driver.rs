@@ -6,8 +6,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
-use tokio::sync::{broadcast, mpsc, oneshot, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 
+use super::watch::Outlet;
 use crate::address::JausId;
 use crate::endpoint::Received;
 use crate::node::{self, Port};
@@ -39,8 +40,15 @@ pub(super) enum Answer {
 /// What the application may read and listen to.
 pub(super) struct Publisher {
     pub(super) directory: watch::Sender<Arc<Directory>>,
-    pub(super) changes: broadcast::Sender<Change>,
-    pub(super) messages: broadcast::Sender<Received>,
+    pub(super) changes: Arc<Outlet<Change>>,
+    pub(super) messages: Arc<Outlet<Received>>,
+}
+
+impl Drop for Publisher {
+    fn drop(&mut self) {
+        self.changes.end();
+        self.messages.end();
+    }
 }
 
 pub(super) struct Driver {
@@ -132,8 +140,7 @@ impl Driver {
                         changed = true;
                         self.publisher.directory.send_replace(self.snapshot());
                     }
-                    // An error means that nobody listens.
-                    let _ = self.publisher.changes.send(change);
+                    self.publisher.changes.send(change);
                 }
                 Event::Answer(inquiry, answer) => {
                     let answer = answer.map_or_else(Answer::None, Answer::Report);
@@ -142,10 +149,7 @@ impl Driver {
                         let _ = reply.send(answer);
                     }
                 }
-                Event::Message(message) => {
-                    // As above.
-                    let _ = self.publisher.messages.send(message);
-                }
+                Event::Message(message) => self.publisher.messages.send(message),
             }
         }
         self.forget_the_impatient();

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tokio::sync::{broadcast, mpsc, oneshot, watch};
+use tokio::sync::{mpsc, oneshot, watch};
 
 use super::driver::{Answer, Command};
-use super::watch::Listener;
+use super::watch::Outlet;
 use super::{Builder, FindError, Messages, QueryError, SendError, Watch};
 use crate::address::JausId;
 use crate::codec::Message;
@@ -25,8 +25,8 @@ pub(super) struct Shared {
     pub(super) sender: node::Sender,
     pub(super) commands: mpsc::Sender<Command>,
     pub(super) directories: watch::Receiver<Arc<Directory>>,
-    pub(super) changes: broadcast::WeakSender<Change>,
-    pub(super) messages: broadcast::WeakSender<Received>,
+    pub(super) changes: Arc<Outlet<Change>>,
+    pub(super) messages: Arc<Outlet<Received>>,
 }
 
 impl Shared {
@@ -68,15 +68,13 @@ impl Component {
     /// The changes of the directory from now on.
     #[must_use]
     pub fn watch(&self) -> Watch {
-        let changes = self.shared.changes.upgrade();
-        Watch::new(Listener::new(changes.map(|changes| changes.subscribe())))
+        Watch::new(self.shared.changes.listen())
     }
 
     /// The messages from now on that no service handles.
     #[must_use]
     pub fn messages(&self) -> Messages {
-        let messages = self.shared.messages.upgrade();
-        Messages::new(Listener::new(messages.map(|messages| messages.subscribe())))
+        Messages::new(self.shared.messages.listen())
     }
 
     /// Sends a message and forgets it.

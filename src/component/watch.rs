@@ -1,8 +1,10 @@
 //! What an application can listen to: changes of the directory, and messages that no service
 //! handles.
 
-use tokio::sync::broadcast::Receiver;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use tokio::sync::broadcast::error::RecvError;
+use tokio::sync::broadcast::{Receiver, Sender};
 
 use crate::endpoint::Received;
 use crate::service::Change;
@@ -14,6 +16,65 @@ pub struct Watch(Listener<Change>);
 /// Messages that no service of the component handles, from when it was asked for.
 #[derive(Debug)]
 pub struct Messages(Listener<Received>);
+
+/// Where listeners get their news. It takes no memory while nobody listens, because most of a
+/// node's components have no listener.
+#[derive(Debug)]
+pub(super) struct Outlet<T> {
+    state: Mutex<State<T>>,
+    capacity: usize,
+}
+
+#[derive(Debug)]
+enum State<T> {
+    Quiet,
+    Heard(Sender<T>),
+    Ended,
+}
+
+impl<T: Clone> Outlet<T> {
+    /// An outlet that keeps so many news for a slow listener.
+    pub(super) const fn new(capacity: usize) -> Self {
+        Self {
+            state: Mutex::new(State::Quiet),
+            capacity,
+        }
+    }
+
+    pub(super) fn listen(&self) -> Listener<T> {
+        let mut state = self.lock();
+        if matches!(*state, State::Quiet) {
+            *state = State::Heard(Sender::new(self.capacity));
+        }
+        let receiver = match &*state {
+            State::Heard(sender) => Some(sender.subscribe()),
+            State::Quiet | State::Ended => None,
+        };
+        Listener {
+            receiver,
+            missed: 0,
+        }
+    }
+
+    pub(super) fn send(&self, news: T) {
+        let mut state = self.lock();
+        // An error means that the last listener has gone.
+        if let State::Heard(sender) = &*state
+            && sender.send(news).is_err()
+        {
+            *state = State::Quiet;
+        }
+    }
+
+    /// Nothing more will come: listeners get what is left, and then the end.
+    pub(super) fn end(&self) {
+        *self.lock() = State::Ended;
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State<T>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
 
 /// A receiver that counts what it was too slow for.
 #[derive(Debug)]
@@ -58,14 +119,6 @@ impl Messages {
 }
 
 impl<T: Clone> Listener<T> {
-    /// A listener; to nothing if the sender is gone.
-    pub(super) const fn new(receiver: Option<Receiver<T>>) -> Self {
-        Self {
-            receiver,
-            missed: 0,
-        }
-    }
-
     async fn next(&mut self) -> Option<T> {
         let receiver = self.receiver.as_mut()?;
         loop {

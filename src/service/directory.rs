@@ -3,16 +3,18 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 
 use crate::address::JausId;
 use crate::codec::ServiceId;
 
 /// The tree of everything that discovery has found, the own component included.
 ///
-/// What it holds is small, and it is cheap to clone, so that applications can keep a copy.
+/// What it holds is small, and it is cheap to clone, so that applications can keep a copy: copies
+/// share what has not changed since.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Directory {
-    subsystems: BTreeMap<u16, Subsystem>,
+    subsystems: BTreeMap<u16, Arc<Subsystem>>,
 }
 
 /// A vehicle, an operator station, or another thing with a number of its own.
@@ -36,8 +38,8 @@ pub struct Component {
     pub id: JausId,
     /// Kind and name, once it told.
     pub identification: Option<Identification>,
-    /// What it offers, once it or its subsystem told.
-    pub services: Option<Vec<Offer>>,
+    /// What it offers, once it or its subsystem told. Components that offer the same share a list.
+    pub services: Option<Arc<[Offer]>>,
 }
 
 /// Kind and name, as Report Identification (4B00h) tells them.
@@ -95,18 +97,20 @@ impl Directory {
     pub fn subsystems(&self) -> impl Iterator<Item = (u16, &Subsystem)> {
         self.subsystems
             .iter()
-            .map(|(&id, subsystem)| (id, subsystem))
+            .map(|(&id, subsystem)| (id, &**subsystem))
     }
 
     /// One subsystem.
     #[must_use]
     pub fn subsystem(&self, id: u16) -> Option<&Subsystem> {
-        self.subsystems.get(&id)
+        self.subsystems.get(&id).map(|subsystem| &**subsystem)
     }
 
     /// All components of all subsystems, in order of their ids.
     pub fn components(&self) -> impl Iterator<Item = &Component> {
-        self.subsystems.values().flat_map(Subsystem::components)
+        self.subsystems
+            .values()
+            .flat_map(|subsystem| subsystem.components())
     }
 
     /// One component.
@@ -148,25 +152,26 @@ impl Directory {
 
     /// Adds a component of which nothing but the id is known. Says whether it is new.
     pub(super) fn insert(&mut self, id: JausId) -> bool {
-        let node = self
-            .subsystems
-            .entry(id.subsystem())
-            .or_default()
-            .nodes
-            .entry(id.node());
-        let components = &mut node.or_default().components;
-        let before = components.len();
-        components.entry(id.component()).or_insert(Component {
+        if self.component(id).is_some() {
+            return false;
+        }
+        let subsystem = self.subsystems.entry(id.subsystem()).or_default();
+        let node = Arc::make_mut(subsystem).nodes.entry(id.node()).or_default();
+        let component = Component {
             id,
             identification: None,
             services: None,
-        });
-        components.len() > before
+        };
+        node.components.insert(id.component(), component);
+        true
     }
 
     /// Removes a component, and its node and subsystem if they are empty then.
     pub(super) fn remove(&mut self, id: JausId) {
-        let Some(subsystem) = self.subsystems.get_mut(&id.subsystem()) else {
+        if self.component(id).is_none() {
+            return;
+        }
+        let Some(subsystem) = self.subsystem_mut(id) else {
             return;
         };
         if let Some(node) = subsystem.nodes.get_mut(&id.node()) {
@@ -182,46 +187,52 @@ impl Directory {
 
     /// Names a level of a component that is in the tree. Says whether that is news.
     pub(super) fn identify(&mut self, level: Level, id: JausId, told: Identification) -> bool {
-        let Some(subsystem) = self.subsystems.get_mut(&id.subsystem()) else {
+        if self.identification(level, id) == Some(&told) {
+            return false;
+        }
+        let slot = match level {
+            Level::Subsystem => self.subsystem_mut(id).map(|it| &mut it.identification),
+            Level::Node => self.node_mut(id).map(|it| &mut it.identification),
+            Level::Component => self.component_mut(id).map(|it| &mut it.identification),
+        };
+        let Some(slot) = slot else {
             return false;
         };
-        let slot = if level == Level::Subsystem {
-            &mut subsystem.identification
-        } else {
-            let Some(node) = subsystem.nodes.get_mut(&id.node()) else {
-                return false;
-            };
-            if level == Level::Node {
-                &mut node.identification
-            } else {
-                let Some(component) = node.components.get_mut(&id.component()) else {
-                    return false;
-                };
-                &mut component.identification
-            }
-        };
-        let told = Some(told);
-        let news = *slot != told;
-        *slot = told;
-        news
+        *slot = Some(told);
+        true
     }
 
     /// Sets the services of a component that is in the tree. Says whether that is news.
     pub(super) fn set_services(&mut self, id: JausId, mut services: Vec<Offer>) -> bool {
         services.sort_unstable();
         services.dedup();
-        let nodes = self
-            .subsystems
-            .get_mut(&id.subsystem())
-            .map(|subsystem| &mut subsystem.nodes);
-        let node = nodes.and_then(|nodes| nodes.get_mut(&id.node()));
-        let Some(component) = node.and_then(|node| node.components.get_mut(&id.component())) else {
+        let known = self.component(id).map(|component| &component.services);
+        if known.is_none_or(|known| known.as_deref() == Some(&services[..])) {
             return false;
-        };
-        let services = Some(services);
-        let news = component.services != services;
-        component.services = services;
-        news
+        }
+        // A node's components mostly offer the same.
+        let same = |list: &&Arc<[Offer]>| ***list == services[..];
+        let mut lists = self.components().filter_map(|it| it.services.as_ref());
+        let known = lists.find(same).cloned();
+        drop(lists);
+        let list = known.unwrap_or_else(|| services.into());
+        if let Some(component) = self.component_mut(id) {
+            component.services = Some(list);
+        }
+        true
+    }
+
+    /// The subsystem of `id`, for changes; copied first if a copy of the directory shares it.
+    fn subsystem_mut(&mut self, id: JausId) -> Option<&mut Subsystem> {
+        self.subsystems.get_mut(&id.subsystem()).map(Arc::make_mut)
+    }
+
+    fn node_mut(&mut self, id: JausId) -> Option<&mut Node> {
+        self.subsystem_mut(id)?.nodes.get_mut(&id.node())
+    }
+
+    fn component_mut(&mut self, id: JausId) -> Option<&mut Component> {
+        self.node_mut(id)?.components.get_mut(&id.component())
     }
 }
 
@@ -269,10 +280,15 @@ impl Node {
 }
 
 impl Component {
+    /// What it offers; nothing as long as it has not told.
+    pub fn offered(&self) -> impl Iterator<Item = &Offer> {
+        self.services.iter().flat_map(|services| services.iter())
+    }
+
     /// Whether it says that it offers a service, whatever the version.
     #[must_use]
     pub fn offers(&self, urn: &str) -> bool {
-        self.services.iter().flatten().any(|offer| offer.urn == urn)
+        self.offered().any(|offer| offer.urn == urn)
     }
 }
 

@@ -321,8 +321,9 @@ fn add_filtered(reports: &mut Vec<ReportServiceList>, component: &Component, fil
         ComponentRec, ComponentSeq, NodeRec, NodeSeq, ServiceRec, SubsystemRec, SubsystemSeq,
     };
 
-    let services = component.services.iter().flatten();
-    let passed = services.filter(|offer| filters.iter().any(|filter| offer.urn.contains(filter)));
+    let passed = component
+        .offered()
+        .filter(|offer| filters.iter().any(|filter| offer.urn.contains(filter)));
     let service_list: Vec<_> = passed
         .map(|offer| ServiceRec {
             uri: Text::from(offer.urn.as_str()),
