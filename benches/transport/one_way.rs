@@ -6,6 +6,7 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::Outgoing;
 use jaus::node::Port;
+use jaus::wire::Priority;
 use tokio::time::{sleep, timeout};
 
 use crate::child::Process;
@@ -57,7 +58,7 @@ pub(crate) fn measure(effort: Effort) {
                 seconds,
             };
             note(format!("raw UDP, datagrams of {datagram}"), raw);
-            for setting in Setting::ALL.into_iter().take(1) {
+            for setting in Setting::ALL {
                 for acknowledge in [false, true] {
                     let how = if acknowledge { ", acknowledged" } else { "" };
                     let flow = flow(setting, length, acknowledge, time);
@@ -121,19 +122,21 @@ fn flow(setting: Setting, length: usize, acknowledge: bool, time: Duration) -> F
             }
             tokio::task::yield_now().await;
         }
-        let mut received = 0;
+        let (mut received, mut unchanged) = (0, 0);
         let mut seconds = start.elapsed().as_secs_f64();
         loop {
             let now = count(port, theirs).await;
-            if now == received && received > 0 || now == sent {
+            if now > received {
                 received = now;
+                unchanged = 0;
+                seconds = start.elapsed().as_secs_f64();
+            } else {
+                unchanged += 1;
+            }
+            if received == sent || unchanged == 20 {
                 break;
             }
-            received = now;
-            seconds = start.elapsed().as_secs_f64();
-            if received < sent {
-                sleep(Duration::from_millis(20)).await;
-            }
+            sleep(Duration::from_millis(10)).await;
         }
         Flow {
             sent,
@@ -146,7 +149,9 @@ fn flow(setting: Setting, length: usize, acknowledge: bool, time: Duration) -> F
 /// Asks the sink how many messages came.
 async fn count(port: &mut Port, sink: JausId) -> u64 {
     for _ in 0..50 {
-        let question = Outgoing::new(port.id(), sink, Bytes::from_static(&COUNT));
+        let mut question = Outgoing::new(port.id(), sink, Bytes::from_static(&COUNT));
+        // Before the crowd, or it would be dropped with it.
+        question.priority = Priority::High;
         if port.send(question).is_ok()
             && let Ok(Some(answer)) = timeout(Duration::from_millis(300), port.recv()).await
             && let Some((code, count)) = answer.payload.split_first_chunk::<2>()
@@ -155,7 +160,7 @@ async fn count(port: &mut Port, sink: JausId) -> u64 {
         {
             return u64::from_le_bytes(count);
         }
-        tokio::task::yield_now().await;
+        sleep(Duration::from_millis(10)).await;
     }
     panic!("the sink does not say how many came");
 }

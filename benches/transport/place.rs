@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use jaus::address::JausId;
-use jaus::node::{Config, Node, Port};
+use jaus::link::local::Address;
+use jaus::node::{Config, Host, Node, Port};
 
 use crate::child::Process;
 use crate::roles::Role;
@@ -56,7 +57,7 @@ impl FromStr for Place {
 /// An attached component, with the node if it has one of its own.
 pub(crate) struct Component {
     pub(crate) port: Port,
-    pub(crate) node: Option<Node>,
+    _node: Option<Node>,
 }
 
 impl Place {
@@ -68,10 +69,14 @@ impl Place {
                 let port = node.attach(id.component()).expect("a free number");
                 Component {
                     port,
-                    node: Some(node),
+                    _node: Some(node),
                 }
             }
-            Self::On(path) => todo!("{path:?}"),
+            Self::On(path) => {
+                let host = Host::at(Address::Path(path.clone()));
+                let port = host.attach(id.component()).await.expect("a place there");
+                Component { port, _node: None }
+            }
         }
     }
 }
@@ -135,9 +140,9 @@ impl Setting {
 }
 
 /// Starts a node that serves other processes.
-pub(crate) async fn serve(id: JausId, place: &Place) -> Node {
+pub(crate) fn serve(id: JausId, place: &Place) -> Node {
     let Place::On(path) = place else {
         panic!("a node for others needs a socket");
     };
-    todo!("{path:?} {id}")
+    Node::start(settings(id).local(Address::Path(path.clone()))).expect("a node for others")
 }

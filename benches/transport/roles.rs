@@ -107,7 +107,8 @@ async fn sink(id: JausId, place: Place) {
     while let Some(message) = component.port.recv().await {
         if is(&message, COUNT) {
             let answer = [&COUNT[..], &count.to_le_bytes()].concat();
-            let answer = Outgoing::new(id, message.source, answer.into());
+            let mut answer = Outgoing::new(id, message.source, answer.into());
+            answer.priority = message.priority;
             component.port.send(answer).expect("sent");
         } else if is(&message, CODE) {
             count += 1;
@@ -116,9 +117,9 @@ async fn sink(id: JausId, place: Place) {
 }
 
 async fn node(id: JausId, place: Place) {
-    let _node = place::serve(id, &place).await;
+    let _node = place::serve(id, &place);
     println!("ready");
-    std::future::pending().await
+    std::future::pending::<()>().await;
 }
 
 pub(crate) fn is(message: &Received, code: [u8; 2]) -> bool {

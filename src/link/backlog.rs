@@ -73,7 +73,7 @@ impl<T> Backlog<T> {
 
     /// Takes out the oldest of the most urgent items.
     pub(crate) fn pop(&mut self) -> Option<T> {
-        let taken = self.queues.iter_mut().rev().find_map(VecDeque::pop_front);
+        let taken = self.queues.iter_mut().rev().find_map(take_first);
         self.account(taken)
     }
 
@@ -92,6 +92,18 @@ impl<T> Backlog<T> {
         self.octets -= octets;
         Some(item)
     }
+}
+
+/// The memory, in items, that an empty queue keeps. A burst may need more, but a node has many
+/// components whose only burst is the discovery at its beginning.
+const KEPT: usize = 32;
+
+fn take_first<T>(queue: &mut VecDeque<T>) -> Option<T> {
+    let first = queue.pop_front()?;
+    if queue.is_empty() && queue.capacity() > 2 * KEPT {
+        queue.shrink_to(KEPT);
+    }
+    Some(first)
 }
 
 #[cfg(test)]
