@@ -13,6 +13,7 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
 use bytes::Bytes;
+use jaus::endpoint::{LinkId, To, Transmit};
 use jaus::link::udp::{PortTaken, Settings, UdpLink};
 use jaus::link::{Error, Group, Interface, Interfaces, Ip, Slab};
 use jaus::wire::Priority;
@@ -197,6 +198,58 @@ async fn the_longest_datagram_arrives_whole() {
     let longest = Bytes::from(vec![7; 65_507]);
     a.send_to(b.local(), Priority::Standard, &longest);
     assert_eq!(receive(&mut b).await.1, longest);
+}
+
+/// Several datagrams at once, as the endpoint gives them out.
+fn train(link: &UdpLink, octets: Bytes, segment: usize) -> Transmit {
+    Transmit {
+        link: LinkId(0),
+        to: To::Peer(link.local().into()),
+        priority: Priority::Standard,
+        payload: octets,
+        segment: Some(segment),
+    }
+}
+
+#[tokio::test]
+async fn a_train_arrives_as_the_datagrams_that_it_is_made_of() {
+    // Less than what a receive buffer of the usual size holds at once.
+    let octets: Bytes = (0..90_500_u32).map(|i| (i * 7 % 251) as u8).collect();
+    for (sends, receives) in [(true, true), (true, false), (false, true), (false, false)] {
+        let with = |batch| Settings {
+            batch,
+            ..settings()
+        };
+        let mut a = UdpLink::open(&loopback(), &with(sends)).unwrap();
+        let mut b = UdpLink::open(&loopback(), &with(receives)).unwrap();
+        a.transmit(&train(&b, octets.clone(), 1000));
+        // Shorter than a datagram of the train, and as long as one.
+        a.transmit(&train(&b, octets.slice(..999), 1000));
+        a.transmit(&train(&b, octets.slice(..1000), 1000));
+        for datagram in octets.chunks(1000).chain([&octets[..999], &octets[..1000]]) {
+            let (from, received) = receive(&mut b).await;
+            assert_eq!(from, a.local());
+            assert!(received == datagram, "{sends} {receives}");
+        }
+        assert_eq!((a.counters().sent, b.counters().received), (93, 93));
+        assert_eq!(a.counters().sent_octets, b.counters().received_octets);
+    }
+}
+
+#[tokio::test]
+async fn a_train_to_everyone_reaches_everyone_whole() {
+    let settings = settings();
+    let mut a = UdpLink::open(&loopback(), &settings).unwrap();
+    let mut b = UdpLink::open(&loopback(), &settings).unwrap();
+    let octets = Bytes::from(vec![7; 10_100]);
+    let to_all = Transmit {
+        to: To::Group,
+        ..train(&b, octets, 1000)
+    };
+    a.transmit(&to_all);
+    for length in [[1000; 10].as_slice(), &[100]].concat() {
+        assert_eq!(receive(&mut b).await.1.len(), length);
+    }
 }
 
 #[tokio::test]

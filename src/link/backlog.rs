@@ -71,6 +71,15 @@ impl<T> Backlog<T> {
             .map(|(_, item)| item)
     }
 
+    /// The same, to be changed in its place.
+    pub(crate) fn first_mut(&mut self) -> Option<&mut T> {
+        self.queues
+            .iter_mut()
+            .rev()
+            .find_map(VecDeque::front_mut)
+            .map(|(_, item)| item)
+    }
+
     /// Takes out the oldest of the most urgent items.
     pub(crate) fn pop(&mut self) -> Option<T> {
         let taken = self.queues.iter_mut().rev().find_map(take_first);

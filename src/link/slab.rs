@@ -9,7 +9,7 @@ use std::io;
 use bytes::{Bytes, BytesMut};
 
 /// No UDP datagram is longer; with this much room none is ever cut short.
-const LONGEST: usize = 65_536;
+pub(super) const LONGEST: usize = 65_536;
 /// Up to this length copying (under a microsecond) is cheaper than a new buffer.
 const SMALL: usize = LONGEST / 4;
 
@@ -43,6 +43,16 @@ impl Slab {
             std::mem::take(&mut self.free).freeze()
         };
         Ok((result, datagram))
+    }
+
+    /// Room for several datagrams, to copy them out of. Memory that nothing was ever written to
+    /// costs nothing.
+    #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+    pub(super) fn room_for(&mut self, datagrams: usize) -> &mut [u8] {
+        if self.free.len() != datagrams * LONGEST {
+            self.free = BytesMut::zeroed(datagrams * LONGEST);
+        }
+        &mut self.free
     }
 }
 

@@ -224,6 +224,7 @@ impl Config {
             broadcast: self.broadcast,
             ttl: self.ttl,
             receive_buffer: self.receive_buffer,
+            ..udp::Settings::default()
         }
     }
 }

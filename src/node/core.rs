@@ -19,7 +19,7 @@ use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
 use crate::address::JausId;
 use crate::endpoint::{
-    AttachError, Endpoint, Event, LinkProfile, MessageHandle, Outgoing, Path, Received, Remote, To,
+    AttachError, Endpoint, Event, LinkProfile, MessageHandle, Outgoing, Path, Received, Remote,
     Transmit,
 };
 use crate::link::Slab;
@@ -110,9 +110,13 @@ impl Core {
     /// Tells the endpoint which links there are. A node's own multicast may come back to it on
     /// any of them, so each is told all addresses.
     fn announce_links(&mut self) {
-        for (id, _) in self.links.iter() {
+        for (id, link) in self.links.iter() {
             let own = self.links.iter().map(|(_, link)| link.local());
-            self.endpoint.add_link(id, LinkProfile::judp(own));
+            let profile = LinkProfile {
+                max_segments: link.max_segments(),
+                ..LinkProfile::judp(own)
+            };
+            self.endpoint.add_link(id, profile);
         }
         self.endpoint.set_static_peers(self.links.static_peers());
     }
@@ -244,15 +248,8 @@ impl Core {
     }
 
     fn transmit(&mut self, transmit: &Transmit) {
-        let Some(link) = self.links.get_mut(transmit.link) else {
-            return;
-        };
-        match transmit.to {
-            To::Peer(Remote::Socket(peer)) => {
-                link.send_to(peer, transmit.priority, &transmit.payload);
-            }
-            To::Peer(Remote::Line) => {}
-            To::Group => link.send_to_group(transmit.priority, &transmit.payload),
+        if let Some(link) = self.links.get_mut(transmit.link) {
+            link.transmit(transmit);
         }
     }
 

@@ -2,6 +2,7 @@
 //! that come and go.
 
 use crate::hosts::{TwoHosts, on_two_hosts};
+use crate::roles::CARS;
 
 /// A caller on host 1 is answered by an echo that runs on host 0.
 fn answers(hosts: &TwoHosts, settings: &str, address: &str) {
@@ -123,5 +124,18 @@ fn a_cable_that_was_out_is_used_again() {
         let caller = hosts.start_with(1, "caller", "ip=6");
         let answer = caller.says("answered by");
         assert!(answer.starts_with("101.1.33 at [fe80::"), "{answer}");
+    });
+}
+
+#[test]
+fn a_train_of_datagrams_that_do_not_fit_a_frame_arrives_all_the_same() {
+    let test = "links::a_train_of_datagrams_that_do_not_fit_a_frame_arrives_all_the_same";
+    on_two_hosts(test, |hosts| {
+        let station = hosts.start(0, "station");
+        station.says("listening on");
+        let train = hosts.start(1, "train");
+        assert_eq!(train.says("sent"), format!("{} with 0 errors", 4 * CARS));
+        assert_eq!(station.says("arrived").parse(), Ok(CARS));
+        assert_eq!(station.says("arrived").parse(), Ok(3 * CARS));
     });
 }

@@ -157,6 +157,8 @@ fn a_process_that_plays_a_node() {
             "listener" => roles::listen().await,
             "announcer" => roles::announce().await,
             "vehicle" => roles::vehicle().await,
+            "train" => roles::train().await,
+            "station" => roles::station().await,
             "operator" => roles::operator().await,
             other => panic!("unknown role {other}"),
         }

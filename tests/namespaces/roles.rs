@@ -1,13 +1,15 @@
 //! What the processes do that play nodes. They print what the tests wait for.
 
+use std::future::poll_fn;
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::component::{Change, Component, Kind};
-use jaus::endpoint::Outgoing;
-use jaus::link::Ip;
-use jaus::link::udp::Broadcasts;
+use jaus::endpoint::{LinkId, Outgoing, To, Transmit};
+use jaus::link::udp::{self, Broadcasts, UdpLink};
+use jaus::link::{Interface, Interfaces, Ip, Slab};
 use jaus::node::{Config, Node};
 use jaus::wire::Priority;
 
@@ -165,4 +167,51 @@ async fn tell_changes(component: &Component, since: Instant) {
             _ => {}
         }
     }
+}
+
+/// Octets of a datagram of the train: more than fit a frame.
+const CAR: usize = 3000;
+/// Datagrams of the train.
+pub(crate) const CARS: usize = 20;
+
+/// Sends a train of datagrams that do not fit a frame, and one that would if that has been learned.
+pub(crate) async fn train() {
+    let mut link = UdpLink::open(&cable(), &udp::Settings::default()).unwrap();
+    let mut transmit = Transmit {
+        link: LinkId(0),
+        to: To::Peer(SocketAddr::from(([10, 213, 77, 1], 3794)).into()),
+        priority: Priority::Standard,
+        payload: vec![7; CARS * CAR].into(),
+        segment: Some(CAR),
+    };
+    println!("\nstarted");
+    link.transmit(&transmit);
+    transmit.segment = Some(CAR / 3);
+    link.transmit(&transmit);
+    println!(
+        "sent {} with {} errors",
+        link.counters().sent,
+        link.counters().send_errors
+    );
+    std::future::pending::<()>().await;
+}
+
+/// Counts the datagrams of both trains.
+pub(crate) async fn station() {
+    let mut link = UdpLink::open(&cable(), &udp::Settings::default()).unwrap();
+    println!("\nlistening on {}", link.local());
+    let mut slab = Slab::new();
+    for (count, length) in [(CARS, CAR), (3 * CARS, CAR / 3)] {
+        for _ in 0..count {
+            let (_, datagram) = poll_fn(|cx| link.poll_recv(cx, &mut slab)).await;
+            assert_eq!(datagram.len(), length);
+        }
+        println!("arrived {count}");
+    }
+    std::future::pending::<()>().await;
+}
+
+fn cable() -> Interface {
+    let cable = Interfaces::Only(vec!["jaus0".into()]);
+    cable.choose(Ip::V4).unwrap().remove(0)
 }

@@ -5,11 +5,14 @@
 //! answer, a full network queue, a route that is missing just now) are counted and traced and
 //! never end the link.
 
+#[cfg(all(feature = "udp-batch", target_os = "linux"))]
+mod batch;
 mod open;
 mod receive;
 mod send;
 mod settings;
 
+use std::collections::VecDeque;
 use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -51,6 +54,11 @@ const OUTBOX: Bounds = Bounds {
     octets: 4 << 20,
 };
 
+const CAN_BATCH: bool = cfg!(all(feature = "udp-batch", target_os = "linux"));
+
+/// The most datagrams that Linux takes with one call.
+const LONGEST_TRAIN: usize = 64;
+
 /// The sockets of one interface. Must be opened within a tokio runtime.
 #[derive(Debug)]
 pub struct UdpLink {
@@ -60,7 +68,13 @@ pub struct UdpLink {
     sockets: Vec<UdpSocket>,
     groups: Vec<SocketAddr>,
     peers: Vec<SocketAddr>,
-    outbox: Backlog<(SocketAddr, Bytes)>,
+    outbox: Backlog<send::Train>,
+    /// Several datagrams to one peer leave with one call if each has no more octets than this.
+    train_limit: usize,
+    /// Whether several datagrams are fetched with one call.
+    batch: bool,
+    /// Fetched already; all from one call.
+    arrived: VecDeque<(SocketAddr, Bytes)>,
     /// The socket that is read first the next time.
     turn: usize,
     last_error: Option<io::ErrorKind>,
@@ -85,6 +99,11 @@ impl UdpLink {
         for &group in &groups {
             sockets.push(open::group(interface, group, settings)?);
         }
+        let batch = CAN_BATCH && settings.batch;
+        #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+        if batch {
+            sockets.iter().for_each(batch::prepare);
+        }
         tracing::info!(%interface, %local, ?groups, "link opened");
         Ok(Self {
             interface: interface.clone(),
@@ -93,6 +112,9 @@ impl UdpLink {
             groups,
             peers: Vec::new(),
             outbox: Backlog::new(OUTBOX),
+            train_limit: if batch { usize::MAX } else { 0 },
+            batch,
+            arrived: VecDeque::new(),
             turn: 0,
             last_error: None,
             counters: Counters::default(),
@@ -121,6 +143,12 @@ impl UdpLink {
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         &self.counters
+    }
+
+    /// How many datagrams to one peer are best given to [`transmit`](Self::transmit) at once.
+    #[must_use]
+    pub const fn max_segments(&self) -> usize {
+        if self.batch { LONGEST_TRAIN } else { 1 }
     }
 
     /// How many datagrams the kernel dropped because this process did not read them in time, if

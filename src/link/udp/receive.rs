@@ -16,34 +16,45 @@ impl UdpLink {
         cx: &mut Context<'_>,
         slab: &mut Slab,
     ) -> Poll<(SocketAddr, Bytes)> {
+        loop {
+            if let Some((peer, datagram)) = self.arrived.pop_front() {
+                if peer == self.local {
+                    self.counters.own_echo += 1;
+                    continue;
+                }
+                self.counters.received += 1;
+                self.counters.received_octets += datagram.len() as u64;
+                return Poll::Ready((peer, datagram));
+            }
+            ready!(self.poll_fetch(cx, slab));
+        }
+    }
+
+    /// Fetches what has arrived at one of the sockets.
+    fn poll_fetch(&mut self, cx: &mut Context<'_>, slab: &mut Slab) -> Poll<()> {
         // Turn about, so that a flood on one socket does not silence the others.
         self.turn = (self.turn + 1) % self.sockets.len();
         for i in 0..self.sockets.len() {
             let socket = (self.turn + i) % self.sockets.len();
-            if let Poll::Ready(datagram) = self.poll_recv_from(socket, cx, slab) {
-                return Poll::Ready(datagram);
+            if self.poll_fetch_from(socket, cx, slab).is_ready() {
+                return Poll::Ready(());
             }
         }
         Poll::Pending
     }
 
-    fn poll_recv_from(
+    fn poll_fetch_from(
         &mut self,
         socket: usize,
         cx: &mut Context<'_>,
         slab: &mut Slab,
-    ) -> Poll<(SocketAddr, Bytes)> {
+    ) -> Poll<()> {
         loop {
-            let socket = &self.sockets[socket];
-            match slab.receive(|free| socket.try_recv_buf_from(free)) {
-                Ok(((_, peer), _)) if peer == self.local => self.counters.own_echo += 1,
-                Ok(((_, peer), datagram)) => {
-                    self.counters.received += 1;
-                    self.counters.received_octets += datagram.len() as u64;
-                    return Poll::Ready((peer, datagram));
-                }
+            match self.fetch(socket, slab) {
+                Ok(()) => return Poll::Ready(()),
                 Err(e) if e.kind() == io::ErrorKind::WouldBlock => {
-                    if ready!(socket.poll_recv_ready(cx)).is_err() {
+                    if ready!(self.sockets[socket].poll_recv_ready(cx)).is_err() {
+                        // The runtime is shutting down.
                         return Poll::Pending;
                     }
                 }
@@ -57,5 +68,16 @@ impl UdpLink {
                 }
             }
         }
+    }
+
+    fn fetch(&mut self, socket: usize, slab: &mut Slab) -> io::Result<()> {
+        let socket = &self.sockets[socket];
+        #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+        if self.batch {
+            return super::batch::receive(socket, slab, &mut self.arrived);
+        }
+        let ((_, peer), datagram) = slab.receive(|free| socket.try_recv_buf_from(free))?;
+        self.arrived.push_back((peer, datagram));
+        Ok(())
     }
 }

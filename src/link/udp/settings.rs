@@ -51,6 +51,9 @@ pub struct Settings {
     pub ttl: u8,
     /// How many octets of received datagrams the kernel is asked to hold for each socket.
     pub receive_buffer: usize,
+    /// Whether the kernel is given and asked for several datagrams at once, where it can (Linux,
+    /// feature `udp-batch`).
+    pub batch: bool,
 }
 
 impl Default for Settings {
@@ -63,6 +66,7 @@ impl Default for Settings {
             broadcast: Broadcasts::default(),
             ttl: 16,
             receive_buffer: 4 << 20,
+            batch: true,
         }
     }
 }
