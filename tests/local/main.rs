@@ -12,3 +12,5 @@
 mod attaching;
 mod door;
 mod place;
+mod processes;
+mod records;

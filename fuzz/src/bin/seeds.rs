@@ -30,6 +30,8 @@ fn main() -> Result<()> {
         write(&corpus.join("generated"), &name, &[&octets])?;
         write(&corpus.join("judp"), &name, &[&[0], &datagram(&octets)])?;
     }
+    write(&corpus.join("local"), "component", &[&[0, 1], &component()])?;
+    write(&corpus.join("local"), "node", &[&[1, 30], &node()])?;
     for entry in jsidl::catalogue::entries() {
         let name = entry.path.replace('/', "-");
         write(&corpus.join("jsidl_text"), &name, &[entry.text.as_bytes()])?;
@@ -58,6 +60,84 @@ fn datagram(payload: &[u8]) -> Vec<u8> {
     let (source, destination) = (JausId::new(1, 1, 2), JausId::new(1, 1, 1));
     let frame = Frame::new(source, destination, payload.to_vec().into());
     judp::encode(&frame).expect("a short message").into()
+}
+
+/// What a component says to its host's node: a greeting, a message, and a long one.
+fn component() -> Vec<u8> {
+    use jaus::address::JausId;
+    use jaus::link::local::record::{Hello, Request, Send, VERSION, Want};
+    use jaus::wire::{Broadcast, Priority};
+    let mut octets = Vec::new();
+    let want = Want::Id(JausId::new(101, 1, 33));
+    let name = "rover".to_owned();
+    let version = VERSION;
+    Request::Hello(Hello {
+        version,
+        want,
+        name,
+    })
+    .encode_head(&mut octets);
+    for payload in [vec![0x02, 0x22], vec![0x4D; 5000]] {
+        let send = Request::Send(Send {
+            handle: 1,
+            destination: JausId::new(101, 1, 1),
+            priority: Priority::High,
+            broadcast: Broadcast::None,
+            acknowledge: true,
+            payload: payload.into(),
+        });
+        if let Some(payload) = send.encode_head(&mut octets).cloned() {
+            octets.extend_from_slice(&payload);
+        }
+    }
+    Request::Leave.encode_head(&mut octets);
+    octets
+}
+
+/// What the node says to a component: welcome, a message from the network, and outcomes.
+fn node() -> Vec<u8> {
+    use jaus::address::JausId;
+    use jaus::endpoint::{LinkId, Path};
+    use jaus::link::local::record::{Delivery, Reply, Silence, Welcome};
+    use jaus::wire::{Broadcast, Priority};
+    let id = JausId::new(101, 1, 33);
+    let peer = std::net::SocketAddr::from(([10, 0, 0, 2], 3794)).into();
+    let replies = [
+        Reply::Welcome(Welcome {
+            id,
+            max_message: 1 << 20,
+        }),
+        Reply::Deliver(Delivery {
+            source: JausId::new(42, 1, 1),
+            destination: id,
+            priority: Priority::Standard,
+            broadcast: Broadcast::Global,
+            path: Some(Path {
+                link: LinkId(0),
+                peer,
+            }),
+            payload: vec![0x02, 0x42].into(),
+        }),
+        Reply::Acknowledged { handle: 1, by: id },
+        Reply::NotAcknowledged {
+            handle: 2,
+            destination: id,
+            reason: Silence::TimedOut,
+            acknowledged: 5,
+            length: 10,
+        },
+        Reply::Rejected {
+            handle: 3,
+            words: "no".to_owned(),
+        },
+    ];
+    let mut octets = Vec::new();
+    for reply in &replies {
+        if let Some(payload) = reply.encode_head(&mut octets).cloned() {
+            octets.extend_from_slice(&payload);
+        }
+    }
+    octets
 }
 
 fn write(directory: &Path, name: &str, parts: &[&[u8]]) -> Result<()> {

@@ -76,10 +76,11 @@ impl Assembler {
         self.limit = limit;
     }
 
-    /// The beginning of a record, to which the octets that come next must be appended before all
-    /// goes to [`take`](Self::take). It is at most 4 KiB.
-    pub fn begun(&mut self) -> &mut Vec<u8> {
-        &mut self.begun
+    /// The beginning of a record, after which the octets that come next must stand when all goes to
+    /// [`take`](Self::take). It is at most 4 KiB.
+    #[must_use]
+    pub fn begun(&self) -> &[u8] {
+        &self.begun
     }
 
     /// Where the next octets are best read to, if a large record has begun: so many and not more.
