@@ -1,6 +1,7 @@
 //! Which components are attached, and from which process; the news about them.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use tokio::sync::broadcast;
 
@@ -70,6 +71,17 @@ pub enum Departure {
     Stopped,
 }
 
+impl fmt::Display for Departure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Left => f.pad("has left"),
+            Self::Vanished => f.pad("is gone without a word: its process has ended"),
+            Self::Failed(why) => write!(f, "was sent away: {why}"),
+            Self::Stopped => f.pad("went with the node"),
+        }
+    }
+}
+
 /// Who is here.
 #[derive(Debug)]
 pub(super) struct Attendance {
@@ -107,7 +119,7 @@ impl Attendance {
                 Departure::Left | Departure::Stopped => {
                     tracing::info!(%id, %process, "component detached");
                 }
-                why => tracing::warn!(%id, %process, ?why, "component lost"),
+                why => tracing::warn!(%id, %process, %why, "component lost"),
             }
         }
         self.announce(ComponentEvent::Detached { id, process, why });

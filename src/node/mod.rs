@@ -74,6 +74,7 @@ use crate::link::{Interface, udp};
 #[derive(Clone, Debug)]
 pub struct Node {
     config: Arc<Config>,
+    local_place: Option<Arc<str>>,
     guard: Arc<Guard>,
 }
 
@@ -102,6 +103,7 @@ impl Node {
         };
         let shared = Arc::new(Shared::new(&config, links));
         runtime.spawn(Driver::new(shared.clone()));
+        let local_place = door.as_ref().map(|door| door.place().into());
         if let Some(door) = door {
             tracing::info!(place = door.place(), "components of this host may attach");
             let node = (config.subsystem, config.node);
@@ -109,6 +111,7 @@ impl Node {
         }
         Ok(Self {
             config: Arc::new(config),
+            local_place,
             guard: Arc::new(Guard(shared)),
         })
     }
@@ -117,6 +120,12 @@ impl Node {
     #[must_use]
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    /// Where component processes of this host may attach, if they may.
+    #[must_use]
+    pub fn local_place(&self) -> Option<&str> {
+        self.local_place.as_deref()
     }
 
     /// Takes in a component, by its number within the node, 1 to 254.

@@ -198,6 +198,19 @@ impl Sender {
         }
     }
 
+    /// Waits until there is no connection to the node: it has stopped or is lost, or the component
+    /// is detached and its last words to the host's node are written.
+    pub async fn disconnected(&self) {
+        match &self.way {
+            Way::Here(shared) => {
+                let mut stopped = shared.stopped.subscribe();
+                // An error cannot be: the sender is in what we hold.
+                let _ = stopped.wait_for(|stopped| *stopped).await;
+            }
+            Way::Host(line) => line.disconnected().await,
+        }
+    }
+
     fn check_source(&self, message: &Outgoing) -> Result<(), SendError> {
         if message.source == self.id {
             return Ok(());

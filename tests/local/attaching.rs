@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::component::{Component, Kind};
+use jaus::component::{Component, Kind, Level};
 use jaus::endpoint::Outgoing;
 use jaus::node::{ComponentEvent, Departure, HostError, HostEvent, SendError, Undelivered};
 use jaus::wire::{Broadcast, Priority};
@@ -171,4 +171,31 @@ async fn an_attached_component_is_found_and_answers() {
         .await
         .unwrap();
     assert_eq!(found, rover.id());
+}
+
+#[tokio::test]
+async fn a_guest_that_passes_by_does_not_rename_the_vehicle() {
+    let place = Place::new();
+    let node = place.node();
+    let rover = Component::builder(Kind::Vehicle, "Rover")
+        .attach(&node, 1)
+        .unwrap();
+    let port = place.host().attach(33).await.unwrap();
+    let guest = Component::builder(Kind::OtherSubsystem, "").component_name("guest");
+    let guest = guest.live_on(port).unwrap();
+    let called = |component: &Component, level, id, wanted: &str| {
+        let directory = component.directory();
+        directory
+            .identification(level, id)
+            .is_some_and(|told| told.name == wanted)
+    };
+    within(async {
+        while !called(&rover, Level::Component, guest.id(), "guest")
+            || !called(&guest, Level::Subsystem, rover.id(), "Rover")
+        {
+            tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+        }
+    })
+    .await;
+    assert!(called(&rover, Level::Subsystem, rover.id(), "Rover"));
 }

@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::component::{Component, Kind};
-use jaus::node::Node;
 
 use crate::failure::{Failure, Outcome};
 use crate::network::Network;
@@ -22,6 +21,7 @@ use crate::tree;
     jaus discover --watch\n  \
     jaus discover --interface eth0 --seconds 10 --json | jq\n  \
     jaus discover --peer 192.168.7.2      where multicast does not reach\n  \
+    jaus discover --attach                beside the components of this host's node\n  \
     jaus discover --loopback              finds `jaus demo` in another terminal")]
 pub(crate) struct Discover {
     /// Go on, and print who comes, changes and goes; Ctrl-C ends it
@@ -45,11 +45,13 @@ const LOOK: Duration = Duration::from_secs(3);
 
 impl Discover {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        let (id, config) = self.network.for_a_moment()?;
         runtime::run(async {
-            let node = Node::start(config).map_err(Failure::of)?;
-            let component = Component::builder(Kind::OtherSubsystem, "jaus discover")
-                .attach(&node, id.component())
+            let (port, stay) = self.network.join_for_a_moment().await?;
+            // As a guest it has a name for itself alone, and none for the subsystem that it is in.
+            let subsystem = if stay.is_guest() { "" } else { "jaus discover" };
+            let component = Component::builder(Kind::OtherSubsystem, subsystem)
+                .component_name("jaus discover")
+                .live_on(port)
                 .map_err(Failure::of)?;
             let outcome = if self.watch {
                 self.watch(&component).await
@@ -58,7 +60,7 @@ impl Discover {
                 self.print_tree(&component)
             };
             drop(component);
-            node.shutdown().await;
+            stay.end().await;
             outcome
         })
     }

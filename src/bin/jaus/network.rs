@@ -4,13 +4,15 @@ use std::fs;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use jaus::address::JausId;
 use jaus::component::Kind;
+use jaus::link::local::record::Reason;
 use jaus::link::udp::PortTaken;
 use jaus::link::{Group, Interfaces};
-use jaus::node::{Config, Peer};
+use jaus::node::{Address, Config, Host, HostError, Node, Peer, Port, Sender};
 use serde::Deserialize;
 
 use crate::failure::Failure;
@@ -49,6 +51,18 @@ pub(crate) struct Network {
     /// ADDRESS, ADDRESS:PORT or ID@ADDRESS:PORT, for example 192.168.7.2 or 102.255.255@192.168.7.2
     #[arg(long, value_name = "PEER")]
     peer: Vec<Peer>,
+
+    /// Use the node of this host that serves components (`jaus node --local`) instead of a node of
+    /// our own; ADDRESS is where it does [default: the usual place]
+    #[arg(
+        long,
+        value_name = "ADDRESS",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "default",
+        conflicts_with_all = ["interface", "loopback", "port", "group", "ttl", "peer", "config"],
+    )]
+    attach: Option<Address>,
 
     /// Take the settings from a TOML file; flags come on top
     ///
@@ -145,11 +159,29 @@ impl Network {
 
     /// For a command that runs for a moment beside other nodes: a passing id, whatever the file
     /// says, and any free port unless a flag names one.
-    pub(crate) fn for_a_moment(&self) -> Result<(JausId, Config), Failure> {
+    fn for_a_moment(&self) -> Result<(JausId, Config), Failure> {
         let (_, node) = self.settings()?;
         let id = self.id.map_or_else(passing_id, |OwnId(id)| id);
         let node = self.with_flags(node.or_any_free_port(), id)?;
         Ok((id, node))
+    }
+
+    /// A component for a command that runs for a moment, on the host's node or on one of its own.
+    pub(crate) async fn join_for_a_moment(&self) -> Result<(Port, Stay), Failure> {
+        let Some(address) = &self.attach else {
+            let (id, config) = self.for_a_moment()?;
+            let node = Node::start(config).map_err(Failure::of)?;
+            let port = node.attach(id.component()).map_err(Failure::of)?;
+            return Ok((port, Stay::OnOurs(node)));
+        };
+        let host = Host::at(address.clone());
+        let port = match self.id {
+            Some(OwnId(id)) => host.attach_as(id).await,
+            None => attach_somewhere(&host).await,
+        };
+        let port = port.map_err(Failure::of)?;
+        let stay = Stay::AtHost(port.sender());
+        Ok((port, stay))
     }
 
     /// What the file says; without one, the usual settings.
@@ -194,6 +226,48 @@ fn read(path: &Path) -> Result<(Identity, Config), Failure> {
     let identity = own.try_into().map_err(wrong)?;
     let node = table.try_into().map_err(wrong)?;
     Ok((identity, node))
+}
+
+/// Where the component of a passing command lives.
+pub(crate) enum Stay {
+    OnOurs(Node),
+    AtHost(Sender),
+}
+
+impl Stay {
+    /// Whether it is a node that somebody else runs.
+    pub(crate) const fn is_guest(&self) -> bool {
+        matches!(self, Self::AtHost(_))
+    }
+
+    /// Ends it, once nobody holds the component any more.
+    #[expect(clippy::disallowed_methods, reason = "a farewell in real time")]
+    pub(crate) async fn end(self) {
+        match self {
+            Self::OnOurs(node) => node.shutdown().await,
+            Self::AtHost(sender) => {
+                // A node that does not listen need not be told.
+                let _ = tokio::time::timeout(FAREWELL, sender.disconnected()).await;
+            }
+        }
+    }
+}
+
+const FAREWELL: Duration = Duration::from_millis(250);
+
+/// Any number that is free on the host's node, for a command to which it does not matter.
+async fn attach_somewhere(host: &Host) -> Result<Port, HostError> {
+    const TRIES: usize = 5;
+    for _ in 1..TRIES {
+        match host.attach(passing_id().component()).await {
+            Err(HostError::Refused {
+                reason: Reason::Taken,
+                ..
+            }) => {}
+            result => return result,
+        }
+    }
+    host.attach(passing_id().component()).await
 }
 
 /// An id for a command that needs none of its own choice: subsystems from 60000 on, where nobody

@@ -7,7 +7,7 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind};
 use jaus::endpoint::Event;
-use jaus::node::{Events, Node};
+use jaus::node::{ComponentEvent, ComponentEvents, Events, Local, Node};
 
 use crate::failure::{Failure, Outcome};
 use crate::network::{Network, SubsystemKind};
@@ -23,6 +23,7 @@ use crate::tree;
 #[command(after_help = "Examples:\n  \
     jaus node --id 101.1.1 --name Rover --kind vehicle\n  \
     jaus node --id 102.1 --interface eth0 --port 3795\n  \
+    jaus node --id 101.1 --local          component processes of this host may attach\n  \
     jaus node --config node.toml --stats\n  \
     jaus node --loopback                  for trying things out on one computer")]
 pub(crate) struct NodeCommand {
@@ -42,6 +43,11 @@ pub(crate) struct NodeCommand {
     #[arg(long, value_enum)]
     kind: Option<SubsystemKind>,
 
+    /// Let component processes of this host attach to the node; ADDRESS is a socket's path, or a
+    /// port of loopback such as 127.0.0.1:37940 [default: the usual place]
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, require_equals = true, default_missing_value = "default")]
+    local: Option<Local>,
+
     #[command(flatten)]
     network: Network,
 }
@@ -51,14 +57,17 @@ const ID: JausId = JausId::new(101, 1, 1);
 
 impl NodeCommand {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        let (id, identity, config) = self.network.for_node(ID)?;
+        let (id, identity, mut config) = self.network.for_node(ID)?;
+        if let Some(local) = &self.local {
+            config.local = local.clone();
+        }
         let kind = self.kind.or(identity.kind);
         let kind = kind.map_or(Kind::OtherSubsystem, Kind::from);
         let name = self.name.clone().or(identity.name);
         let name = name.unwrap_or_else(|| "jaus node".to_owned());
         runtime::run(async {
             let node = Node::start(config).map_err(Failure::of)?;
-            let events = node.events();
+            let events = (node.events(), node.component_events());
             let component = Component::builder(kind, name)
                 .attach(&node, id.component())
                 .map_err(Failure::of)?;
@@ -78,7 +87,7 @@ impl NodeCommand {
     async fn watch(
         &self,
         component: &Component,
-        mut events: Events,
+        (mut events, mut arrivals): (Events, ComponentEvents),
         output: &mut Output,
     ) -> Result<Outcome, Failure> {
         let mut changes = component.watch();
@@ -95,6 +104,7 @@ impl NodeCommand {
                     Event::IdConflict { path, .. } if !conflicts.insert(path.peer) => None,
                     event => in_words(&event),
                 },
+                Some(event) = arrivals.recv() => arrival_in_words(&event),
                 else => return Err(Failure::new("the node has stopped")),
             };
             if let Some(words) = words {
@@ -119,6 +129,11 @@ fn introduce(node: &Node, component: &Component, output: &mut Output) -> Result<
             link.interface.name, link.local
         ))?;
     }
+    if let Some(place) = node.local_place() {
+        output.line(format_args!(
+            "components of this host may attach at {place}"
+        ))?;
+    }
     output.line("Ctrl-C ends it.\n")
 }
 
@@ -131,6 +146,29 @@ fn in_words(event: &Event) -> Option<String> {
         Event::IdConflict { id, path } => Some(format!(
             "somebody at {} has our id {id} too: one of us must choose another (--id)",
             path.peer
+        )),
+        _ => None,
+    }
+}
+
+/// News of the components of other processes.
+fn arrival_in_words(event: &ComponentEvent) -> Option<String> {
+    match event {
+        ComponentEvent::Attached {
+            id,
+            process: Some(process),
+        } => Some(format!("{id} is attached by {process}")),
+        ComponentEvent::Detached {
+            id,
+            process: Some(process),
+            why,
+        } => Some(format!("{id} of {process} {why}")),
+        ComponentEvent::Refused { process, why } => Some(format!("{process} was refused: {why}")),
+        ComponentEvent::Stuck { id, process } => Some(format!(
+            "{id} of {process} reads nothing; what it cannot keep is dropped"
+        )),
+        ComponentEvent::Resumed { id, dropped } => Some(format!(
+            "{id} reads again; {dropped} messages were dropped since it came"
         )),
         _ => None,
     }

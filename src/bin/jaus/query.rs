@@ -8,7 +8,7 @@ use bytes::Bytes;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
-use jaus::node::{Node, Port};
+use jaus::node::Port;
 use jaus::view::{Dictionary, Line, Request};
 use serde::Serialize;
 use tokio::time::{Instant, timeout_at};
@@ -63,12 +63,10 @@ impl Query {
                 self.message
             ))
         })?;
-        let (id, config) = self.network.for_a_moment()?;
         runtime::run(async {
-            let node = Node::start(config).map_err(Failure::of)?;
-            let port = node.attach(id.component()).map_err(Failure::of)?;
+            let (port, stay) = self.network.join_for_a_moment().await?;
             let outcome = self.ask(port, &query, report, &dictionary).await;
-            node.shutdown().await;
+            stay.end().await;
             outcome
         })
     }

@@ -453,13 +453,17 @@ fn put_delivery(to: &mut Vec<u8>, delivery: &Delivery) {
     }
 }
 
-/// Words for people; longer ones are cut at a character.
 fn put_words(to: &mut Vec<u8>, words: &str) {
+    to.extend_from_slice(cut(words).as_bytes());
+}
+
+/// Words for people, and no more than they like to read: 255 octets, up to a whole character.
+fn cut(words: &str) -> &str {
     let mut end = words.len().min(255);
     while !words.is_char_boundary(end) {
         end -= 1;
     }
-    to.extend_from_slice(&words.as_bytes()[..end]);
+    &words[..end]
 }
 
 const fn flags(priority: Priority, broadcast: Broadcast) -> u8 {
@@ -518,11 +522,19 @@ impl<'a> Fields<'a> {
         self.body.payload(at)
     }
 
-    /// All that is left, up to 255 octets of it, as text.
+    /// All that is left, up to 255 octets of it, as text that can be shown on any terminal.
     fn words(&mut self) -> String {
         let at = std::mem::replace(&mut self.at, self.body.octets().len());
         let rest = self.body.octets().get(at..).unwrap_or_default();
-        String::from_utf8_lossy(&rest[..rest.len().min(255)]).into_owned()
+        let shown = |c: char| {
+            if c.is_control() {
+                char::REPLACEMENT_CHARACTER
+            } else {
+                c
+            }
+        };
+        let words = String::from_utf8_lossy(&rest[..rest.len().min(255)]);
+        cut(&words.chars().map(shown).collect::<String>()).to_owned()
     }
 
     fn flags(&mut self, rest: u8) -> Result<(Priority, Broadcast, u8), RecordError> {

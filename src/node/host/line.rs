@@ -191,6 +191,13 @@ impl Line {
         }
     }
 
+    /// Ready when there is no connection, or none any more.
+    pub(in super::super) async fn disconnected(&self) {
+        let mut connected = self.connected.subscribe();
+        // An error cannot be: the sender is here.
+        let _ = connected.wait_for(|connected| !*connected).await;
+    }
+
     /// The component goes.
     pub(in super::super) fn leave(&self) {
         {
@@ -213,6 +220,12 @@ impl Line {
             inner.max_message = max_message;
         }
         self.connected.send_replace(true);
+    }
+
+    /// The component has gone, and the node knows it.
+    pub(super) fn handle_left(&self) {
+        self.lock().write = None;
+        self.connected.send_replace(false);
     }
 
     /// There is none any more. What was not written is lost, and nothing will be heard of what was.

@@ -86,7 +86,19 @@ impl Host {
     /// # Errors
     /// [`HostError`] says why the node cannot be reached, or does not want the component.
     pub async fn attach(&self, component: u8) -> Result<Port, HostError> {
-        let attached = self.greet(Want::Component(component)).await?;
+        self.attach_wanted(Want::Component(component)).await
+    }
+
+    /// Attaches a component by its full id, which must be one of the node's.
+    ///
+    /// # Errors
+    /// Those of [`attach`](Self::attach).
+    pub async fn attach_as(&self, id: JausId) -> Result<Port, HostError> {
+        self.attach_wanted(Want::Id(id)).await
+    }
+
+    async fn attach_wanted(&self, want: Want) -> Result<Port, HostError> {
+        let attached = self.greet(want).await?;
         let task = Task::new(self.clone(), attached);
         let line = task.line();
         tokio::spawn(task.run());

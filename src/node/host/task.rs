@@ -58,7 +58,9 @@ impl Task {
     pub(super) async fn run(mut self) {
         loop {
             let end = std::future::poll_fn(|cx| self.poll(cx)).await;
-            let End::Lost(error) = end else { return };
+            let End::Lost(error) = end else {
+                return self.line.handle_left();
+            };
             tracing::warn!(id = %self.line.id(), %error, "the node of this host is lost");
             self.line.handle_lost(error.to_string());
             let left = self.line.clone();

@@ -47,7 +47,8 @@ impl Discovery {
             4 => self.profile.identification(Level::Component),
             _ => return,
         };
-        if self.may_answer(now, received) {
+        // Who has no name for what it belongs to leaves the answer to those who have.
+        if !told.name.is_empty() && self.may_answer(now, received) {
             let report = ReportIdentification {
                 query_type: query.query_type.0.into(),
                 r#type: told.kind.code().into(),

@@ -115,6 +115,9 @@ impl Discovery {
             // Every component answers a call. Should they disagree, one has the say.
             return;
         }
+        if self.knows_better(level, source) {
+            return;
+        }
         let told = Identification {
             kind: Kind::from_code(report.r#type.0),
             name: text(&report.identification),
@@ -126,6 +129,18 @@ impl Discovery {
                 self.doubt(now, source);
             }
         }
+    }
+
+    /// Whether we have told others ourselves what is called how, namely our own subsystem or node.
+    /// A component that joins them may have another idea, or be a tool that passes by.
+    fn knows_better(&self, level: Level, source: JausId) -> bool {
+        let same_subsystem = source.subsystem() == self.own.subsystem();
+        let ours = match level {
+            Level::Subsystem => same_subsystem,
+            Level::Node => same_subsystem && source.node() == self.own.node(),
+            Level::Component => false,
+        };
+        ours && !self.profile.identification(level).name.is_empty()
     }
 
     /// Asks a component anew who it is and what it offers: another program may have taken its id.

@@ -12,7 +12,7 @@ pub struct Profile {
     pub system: String,
     /// What the subsystem is.
     pub kind: Kind,
-    /// The name of the subsystem.
+    /// The name of the subsystem. Empty: this component does not say, and learns it from others.
     pub subsystem: String,
     /// The name of the node; the subsystem's if empty.
     pub node: String,
