@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("octet {offset}: {problem}")]
 pub struct Error {
-    /// Offset of the header at fault, from the beginning of the datagram.
+    /// Offset of the header at fault, from the beginning of the datagram or stream.
     pub offset: usize,
     /// What is wrong there.
     pub problem: Problem,
@@ -44,6 +44,14 @@ pub enum Problem {
         /// What is there.
         available: usize,
     },
+    /// The size in front of an AS5669 header and the one in it do not agree.
+    #[error("the size field says {stated} octets, the header behind it {by_header}")]
+    SizesDiffer {
+        /// Octets of header and data by the size field.
+        stated: usize,
+        /// The same by the header's data size.
+        by_header: usize,
+    },
     /// An older header's data control has a value that is not defined.
     #[error("the data control {0} is not defined (0 single, 1 first, 2 or 4 middle, 8 last)")]
     UnknownDataControl(u8),
@@ -72,6 +80,9 @@ pub enum EncodeError {
         /// Octets of the payload.
         length: usize,
     },
+    /// The Reference Architecture's header travels in UDP datagrams only.
+    #[error("a message with the Reference Architecture's header travels in UDP datagrams only")]
+    DatagramsOnly,
     /// A message type other than 0 or a compressed header.
     #[error("only uncompressed messages of type 0 are sent")]
     NotPlain,

@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 
-use super::{EncodeError, Frame, judp};
+use super::{EncodeError, Frame, jserial, jtcp, judp};
 
 /// The framing of a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -10,6 +10,10 @@ pub enum Framing {
     /// Datagrams, each with its version in front: UDP.
     #[default]
     Judp,
+    /// Messages in a stream that delimit themselves: TCP.
+    Jtcp,
+    /// Packets marked and checked, each with one message: serial lines.
+    Jserial,
 }
 
 impl Framing {
@@ -20,6 +24,8 @@ impl Framing {
     pub fn encode(self, frame: &Frame) -> Result<Bytes, EncodeError> {
         match self {
             Self::Judp => judp::encode(frame),
+            Self::Jtcp => jtcp::encode(frame),
+            Self::Jserial => jserial::encode(frame),
         }
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! A [`Frame`] is one transport message, whichever header it came with: [`as5669a`] is today's,
 //! [`as5669`] its first edition and [`ra`] the header of the Reference Architecture that the latter
-//! took over. [`judp`] reads and writes datagrams; the first octet tells the three apart.
+//! took over. [`judp`] reads and writes datagrams, whose first octet tells the three apart;
+//! [`jtcp`] reads and writes the streams of TCP connections, [`jserial`] the packets of serial lines.
 //!
 //! Parsing checks every length against what is there, and gives an [`Error`] with the offset at
 //! fault; payloads are shared slices of the datagram. Nothing here judges whether a frame makes
@@ -13,6 +14,8 @@ pub mod as5669a;
 mod error;
 mod flags;
 mod framing;
+pub mod jserial;
+pub mod jtcp;
 pub mod judp;
 pub mod ra;
 #[cfg(test)]

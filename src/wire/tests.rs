@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-fn hex(text: &str) -> Bytes {
+pub(super) fn hex(text: &str) -> Bytes {
     let digits: Vec<u8> = text.bytes().filter(u8::is_ascii_hexdigit).collect();
     let octet = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
     digits.chunks(2).map(octet).collect()
@@ -277,7 +277,7 @@ fn a_frame_that_its_header_cannot_carry_is_not_written() {
     assert!(as5669a::emit(&frame(Version::As5669a, 65_522), &mut out).is_err() && out.is_empty());
 }
 
-fn any_frame(version: Version) -> impl Strategy<Value = Frame> {
+pub(super) fn any_frame(version: Version) -> impl Strategy<Value = Frame> {
     let shortest = if version == Version::As5669a { 0 } else { 2 };
     let ids =
         (any::<u32>(), any::<u32>()).prop_map(|(a, b)| (JausId::from_u32(a), JausId::from_u32(b)));
