@@ -28,7 +28,10 @@ fn main() -> Result<()> {
             &[&choice, &[0], json.as_bytes()],
         )?;
         write(&corpus.join("generated"), &name, &[&octets])?;
-        write(&corpus.join("judp"), &name, &[&[0], &datagram(&octets)])?;
+        let [datagram, stream, line] = framed(&octets);
+        write(&corpus.join("judp"), &name, &[&[0], &datagram])?;
+        write(&corpus.join("jtcp"), &name, &[&[5], &stream, &stream])?;
+        write(&corpus.join("jserial"), &name, &[&[5, 0], &line, &line])?;
     }
     write(&corpus.join("local"), "component", &[&[0, 1], &component()])?;
     write(&corpus.join("local"), "node", &[&[1, 30], &node()])?;
@@ -53,13 +56,15 @@ fn view((_, message): &Declared) -> String {
         .to_string()
 }
 
-/// The message in an AS5669A datagram from 1.1.2 to 1.1.1.
-fn datagram(payload: &[u8]) -> Vec<u8> {
+/// The AS5669A message from 1.1.2 to 1.1.1 in a datagram, at the beginning of a stream, and in the
+/// packet of a serial line.
+fn framed(payload: &[u8]) -> [Vec<u8>; 3] {
     use jaus::address::JausId;
-    use jaus::wire::{Frame, judp};
+    use jaus::wire::{Frame, Framing};
     let (source, destination) = (JausId::new(1, 1, 2), JausId::new(1, 1, 1));
     let frame = Frame::new(source, destination, payload.to_vec().into());
-    judp::encode(&frame).expect("a short message").into()
+    [Framing::Judp, Framing::Jtcp, Framing::Jserial]
+        .map(|framing| framing.encode(&frame).expect("a short message").into())
 }
 
 /// What a component says to its host's node: a greeting, a message, and a long one.

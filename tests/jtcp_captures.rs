@@ -1,0 +1,146 @@
+//! Recorded JTCP connections of Junior and JAUS++: read, however they are cut, and written again.
+
+#![cfg(feature = "view")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests")]
+
+#[path = "support/shared.rs"]
+mod shared;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::Path;
+
+use bytes::{Bytes, BytesMut};
+use jaus::view::Capture;
+use jaus::wire::jtcp::{self, Decoder};
+use jaus::wire::{DataControl, Frame, judp};
+
+/// The octets of one direction of a connection, in order.
+type Streams = BTreeMap<(u16, u16), Vec<u8>>;
+
+/// The streams from and to the JAUS port, by their ports. The captures are of loopback-like links:
+/// Ethernet, IPv4, nothing lost or out of order, which is checked.
+fn streams(file: &Path) -> Streams {
+    let mut capture = Capture::new(File::open(file).expect("a readable file")).unwrap();
+    let mut streams = Streams::new();
+    let mut next = BTreeMap::new();
+    while let Some(frame) = capture.next_frame() {
+        let frame = frame.expect("a whole capture");
+        let Some((ports, sequence, octets)) = segment(frame.octets) else {
+            continue;
+        };
+        if octets.is_empty() || !(ports.0 == judp::PORT || ports.1 == judp::PORT) {
+            continue;
+        }
+        let expected = next.insert(ports, sequence.wrapping_add(octets.len() as u32));
+        assert!(
+            expected.is_none_or(|expected| expected == sequence),
+            "a segment is missing"
+        );
+        streams.entry(ports).or_default().extend_from_slice(octets);
+    }
+    streams
+}
+
+/// Ports, sequence number and content of a TCP segment in IPv4 in Ethernet.
+fn segment(octets: &[u8]) -> Option<((u16, u16), u32, &[u8])> {
+    const TCP: u8 = 6;
+    let ip = octets.get(14..)?;
+    let words = |octet: &u8| usize::from(octet & 0x0F) * 4;
+    if octets[12..14] != [8, 0] || ip.get(9) != Some(&TCP) {
+        return None;
+    }
+    let total = usize::from(u16::from_be_bytes([ip[2], ip[3]]));
+    let tcp = ip.get(words(&ip[0])..total)?;
+    let number = |at: usize| u16::from_be_bytes([tcp[at], tcp[at + 1]]);
+    let sequence = u32::from(number(4)) << 16 | u32::from(number(6));
+    let content = tcp.get(usize::from(tcp[12] >> 4) * 4..)?;
+    Some(((number(0), number(2)), sequence, content))
+}
+
+fn decode(stream: &[u8], part: usize) -> Vec<Frame> {
+    let mut decoder = Decoder::new();
+    let mut frames = Vec::new();
+    for part in stream.chunks(part) {
+        decoder.input().extend_from_slice(part);
+        while let Some(frame) = decoder.next_frame().expect("a sound stream") {
+            frames.push(frame);
+        }
+    }
+    assert_eq!(decoder.buffered(), 0, "it ends with a message");
+    frames
+}
+
+/// As our side writes them: the version octet once.
+fn encode(frames: &[Frame]) -> Bytes {
+    let mut stream = BytesMut::new();
+    for frame in frames {
+        let encoded = jtcp::encode(frame).unwrap();
+        stream.extend_from_slice(&encoded[usize::from(!stream.is_empty())..]);
+    }
+    stream.freeze()
+}
+
+/// The frames of each stream of a capture, by all cuts alike.
+fn frames(file: &Path) -> Vec<(Vec<u8>, Vec<Frame>)> {
+    let read = |stream: Vec<u8>| {
+        let frames = decode(&stream, usize::MAX);
+        for part in [1, 7, 1460] {
+            assert_eq!(decode(&stream, part), frames, "cut every {part}");
+        }
+        (stream, frames)
+    };
+    streams(file).into_values().map(read).collect()
+}
+
+#[test]
+fn juniors_streams_are_written_octet_for_octet() {
+    let Some(captures) = shared::captures() else {
+        return;
+    };
+    for (file, count) in [
+        ("junior/13-jtcp.pcap", vec![8, 8]),
+        ("junior/14-jtcp-64KB.pcap", vec![18]),
+    ] {
+        let streams = frames(&captures.join(file));
+        let counts: Vec<_> = streams.iter().map(|(_, frames)| frames.len()).collect();
+        assert_eq!(counts, count, "{file}");
+        for (stream, frames) in streams {
+            assert!(encode(&frames) == stream, "{file}");
+        }
+    }
+}
+
+#[test]
+fn juniors_64_kb_come_in_17_parts() {
+    let Some(captures) = shared::captures() else {
+        return;
+    };
+    let (_, frames) = frames(&captures.join("junior/14-jtcp-64KB.pcap")).remove(0);
+    let parts: Vec<_> = frames
+        .iter()
+        .filter(|f| f.flags.data() != DataControl::Single)
+        .collect();
+    let length: usize = parts.iter().map(|frame| frame.payload.len()).sum();
+    assert_eq!((parts.len(), length), (17, 65_536));
+}
+
+/// JAUS++ writes the version octet before each message, ours only at the beginning: that is all
+/// the difference.
+#[test]
+fn jausplusplus_streams_differ_by_their_version_octets() {
+    let Some(captures) = shared::captures() else {
+        return;
+    };
+    let mut messages = 0;
+    for (stream, frames) in frames(&captures.join("jauspp/06-jtcp.pcap")) {
+        let each: Vec<_> = frames
+            .iter()
+            .map(|frame| jtcp::encode(frame).unwrap())
+            .collect();
+        assert!(each.concat() == stream);
+        assert_eq!(encode(&frames).len(), stream.len() - (frames.len() - 1));
+        messages += frames.len();
+    }
+    assert!(messages > 20, "{messages}");
+}
