@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use bytes::{BufMut, Bytes, BytesMut};
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Counter, Endpoint, Event, Outgoing};
+use jaus::endpoint::{Config, Counter, Endpoint, Event, Outgoing, Unacknowledged};
 use sim::{Conditions, Host, Mailbox, Network};
 
 const ONE: JausId = JausId::new(101, 1, 1);
@@ -119,8 +119,8 @@ fn acknowledged_messages_survive_a_poor_wire_and_arrive_once() {
                     );
                     told += 1;
                 }
-                Event::NotAcknowledged { refused, .. } => {
-                    assert!(!refused);
+                Event::NotAcknowledged { reason, .. } => {
+                    assert_eq!(reason, Unacknowledged::TimedOut);
                     told += 1;
                 }
                 _ => {}
@@ -292,7 +292,9 @@ fn a_cut_wire_is_told_and_heals() {
     let failed = Event::NotAcknowledged {
         message: lost,
         destination: OTHER,
-        refused: false,
+        reason: Unacknowledged::TimedOut,
+        acknowledged: 0,
+        length: message(1).payload.len(),
     };
     assert!(network.owner(hosts[0]).take_news().contains(&failed));
     network.set_cut(hosts[0], hosts[1], false);

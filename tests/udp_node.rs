@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{Event, Outgoing, Received};
+use jaus::endpoint::{Event, Outgoing, Received, Unacknowledged};
 use jaus::link::Group;
 use jaus::node::{Config, Events, MailboxLimits, Node, Port, StartError};
 use jaus::wire::{Broadcast, Priority};
@@ -168,7 +168,9 @@ async fn who_asks_for_an_acknowledgement_is_told_when_it_comes_and_when_it_does_
     let wanted = Event::NotAcknowledged {
         message: unheard,
         destination: nobody,
-        refused: false,
+        reason: Unacknowledged::TimedOut,
+        acknowledged: 0,
+        length: REPORT_HEARTBEAT.len(),
     };
     event(&mut events, |event| *event == wanted).await;
 }
@@ -270,7 +272,7 @@ async fn a_component_that_does_not_read_stops_nobody_and_keeps_the_urgent() {
 
 #[tokio::test]
 async fn large_messages_arrive_whole_whatever_the_size_of_packets() {
-    for payload_limit in [1425, 65_492] {
+    for payload_limit in [64, 1425, 4079] {
         let group = own_group();
         let mut config = Config::loopback(101, 1).group(group);
         config.payload_limit = payload_limit;

@@ -1,9 +1,13 @@
 //! The settings of an endpoint: bounds and times, with defaults that suit a node on a small board.
 
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use super::Path;
 use crate::address::JausId;
+
+/// The payloads that packets may be limited to, in octets.
+pub const PAYLOAD_LIMITS: RangeInclusive<usize> = 64..=4079;
 
 /// The settings of an [`Endpoint`](super::Endpoint).
 ///
@@ -18,9 +22,9 @@ pub struct Config {
     pub max_peers: usize,
     /// Peers whose address is known beforehand and not learned.
     pub static_peers: Vec<StaticPeer>,
-    /// The longest payload, in octets, that is sent in one message. The default fits one
-    /// Ethernet frame, and is the most that JAUS++ does not expect to be fragmented in a way of
-    /// its own.
+    /// The longest payload, in octets, that is sent in one packet: 64 to 4079, which is Junior's
+    /// most; what is outside is taken for the nearest of these. The default fits one Ethernet
+    /// frame, and is the most that JAUS++ does not expect to be fragmented in a way of its own.
     pub payload_limit: usize,
     /// The longest message, in octets, that is sent or received. Above
     /// [`payload_limit`](Self::payload_limit) it travels in fragments. Also the most that is kept
@@ -38,20 +42,37 @@ pub struct Config {
     /// duplicate made by the network. Short, because a restarted peer may well begin with the same
     /// message.
     pub duplicate_window: Duration,
-    /// The same for messages that want an acknowledgement, which a peer repeats when ours got lost.
-    /// Junior gives up after 0.42 s.
+    /// The same for messages that want an acknowledgement, which a peer repeats when ours got lost:
+    /// Junior for 0.42 s, an endpoint for [`acknowledge_patience`](Self::acknowledge_patience).
     pub retransmission_window: Duration,
+    /// The same for those that went to everybody because our address was not known: shorter,
+    /// because a peer that was restarted begins like that, with the numbers that it began with
+    /// before. Endpoints repeat them every 0.4 s.
+    pub first_contact_window: Duration,
     /// How long our own multicast is expected to come back to us.
     pub echo_window: Duration,
     /// The most messages remembered to tell duplicates, and likewise echoes. The oldest is
     /// forgotten first.
     pub max_recent: usize,
-    /// How long to wait for an acknowledgement before sending again.
-    pub acknowledge_timeout: Duration,
-    /// How often to send again before giving up.
-    pub acknowledge_retries: u32,
-    /// The most messages, or fragments of one, that can wait for an acknowledgement at a time.
+    /// How long a destination may be silent before a message that waits for its acknowledgement is
+    /// given up, and for how long one packet of it is sent again and again at the least. How long
+    /// to wait before sending again follows the measured round trip.
+    pub acknowledge_patience: Duration,
+    /// How often one packet is sent at the least before its message is given up while the
+    /// destination acknowledges others.
+    pub acknowledge_tries: u32,
+    /// The most messages that can wait for their acknowledgement, or for their result to be polled.
     pub max_unacknowledged: usize,
+    /// The most octets of messages that can wait for their acknowledgement. A single longer message
+    /// is taken when no other waits.
+    pub max_unacknowledged_octets: usize,
+    /// The most destinations of which round trip and window are remembered. The one idle for
+    /// longest is forgotten for a new one.
+    pub max_flows: usize,
+    /// How many packets may be on their way to one destination at first.
+    pub initial_window: usize,
+    /// How many packets may ever be on their way to one destination.
+    pub max_window: usize,
     /// The shortest time between two [`Event::IdConflict`](super::Event::IdConflict) about one id.
     pub conflict_interval: Duration,
     /// The number before the first sequence number. A node should choose it at random, because some
@@ -66,17 +87,22 @@ impl Default for Config {
             max_peers: 1024,
             static_peers: Vec::new(),
             payload_limit: 1425,
-            max_message: 512 * 1024,
-            max_reassembly: 4 * 1024 * 1024,
+            max_message: 16 << 20,
+            max_reassembly: 48 << 20,
             reassembly_timeout: Duration::from_secs(2),
             queue_limit: 1024,
             duplicate_window: Duration::from_millis(100),
-            retransmission_window: Duration::from_millis(500),
+            retransmission_window: Duration::from_millis(3500),
+            first_contact_window: Duration::from_millis(900),
             echo_window: Duration::from_secs(1),
-            max_recent: 4096,
-            acknowledge_timeout: Duration::from_millis(100),
-            acknowledge_retries: 3,
-            max_unacknowledged: 512,
+            max_recent: 16_384,
+            acknowledge_patience: Duration::from_secs(3),
+            acknowledge_tries: 20,
+            max_unacknowledged: 4096,
+            max_unacknowledged_octets: 64 << 20,
+            max_flows: 256,
+            initial_window: 16,
+            max_window: 512,
             conflict_interval: Duration::from_secs(5),
             first_sequence: 0,
         }

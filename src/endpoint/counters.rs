@@ -42,8 +42,10 @@ counters! {
     /// Acknowledgements received that no component waits for, among them those to the first
     /// messages for unknown ids, which only teach the address.
     UnawaitedAcknowledgement = "acknowledgements that nobody waits for",
-    /// Messages sent again for want of an acknowledgement.
+    /// Packets sent again for want of an acknowledgement.
     Retransmissions = "retransmissions",
+    /// Messages that wanted an acknowledgement and were given up.
+    MessagesGivenUp = "messages given up, not acknowledged",
     /// Peers forgotten because more were heard than the table holds.
     PeersEvicted = "peers forgotten, table full",
     /// Octets behind the last message of a datagram, left by a peer that does not shorten its

@@ -1,11 +1,17 @@
 //! What goes in and out of an endpoint beside datagrams: messages to send, messages received, and
 //! news.
 
+use std::fmt;
+
 use bytes::Bytes;
 
-use super::{MessageHandle, Path};
+use super::Path;
 use crate::address::JausId;
 use crate::wire::{Broadcast, Priority, Version};
+
+/// Names a sent message in the events about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MessageHandle(pub(crate) u64);
 
 /// A message that a local component wants to send.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -108,7 +114,34 @@ pub enum Event {
         message: MessageHandle,
         /// For whom it was.
         destination: JausId,
-        /// Whether the receiver refused it (NAK); otherwise nothing was heard in time.
-        refused: bool,
+        /// Why.
+        reason: Unacknowledged,
+        /// How many octets of it were acknowledged, of a large message some of its fragments.
+        acknowledged: usize,
+        /// How many octets it has.
+        length: usize,
     },
+}
+
+/// Why a message was not acknowledged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Unacknowledged {
+    /// The receiver refused it (NAK).
+    Refused,
+    /// It was sent, more than once, and not or not wholly acknowledged in time. The receiver may
+    /// have it all the same.
+    TimedOut,
+    /// It never was sent, because its destination did not acknowledge what was to go before it.
+    NotSent,
+}
+
+impl fmt::Display for Unacknowledged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Refused => "refused by the receiver",
+            Self::TimedOut => "not acknowledged in time",
+            Self::NotSent => "not sent, as the receiver acknowledges nothing",
+        })
+    }
 }

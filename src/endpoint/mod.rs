@@ -33,8 +33,9 @@
 mod acknowledge;
 mod config;
 mod counters;
+mod delivery;
 mod event;
-mod fragment;
+mod large;
 mod link;
 mod local;
 mod peers;
@@ -48,18 +49,19 @@ mod tests;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Instant;
 
-pub use acknowledge::MessageHandle;
-pub use config::{Config, StaticPeer};
+pub use config::{Config, PAYLOAD_LIMITS, StaticPeer};
 pub use counters::{Counter, Counters};
-pub use event::{Event, Outgoing, Received};
+pub use delivery::FlowStatus;
+pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
 pub use peers::Peer;
 pub use send::SendError;
 
 use crate::address::JausId;
-use acknowledge::Acknowledgements;
-use fragment::Reassembly;
+use crate::wire::Priority;
+use delivery::Deliveries;
+use large::{Numbers, Reassembly};
 use local::Components;
 use peers::Peers;
 use queue::PriorityQueue;
@@ -72,35 +74,44 @@ pub struct Endpoint {
     components: Components,
     links: BTreeMap<LinkId, LinkProfile>,
     peers: Peers,
-    sequence: u16,
+    numbers: Numbers,
     heard: Recent,
     sent_to_group: Recent,
     reassembly: Reassembly,
-    acknowledgements: Acknowledgements,
+    deliveries: Deliveries,
     conflicts: BTreeMap<JausId, Instant>,
     transmits: PriorityQueue<Transmit>,
     messages: PriorityQueue<Received>,
     news: VecDeque<Event>,
+    /// How many of the news are results of messages, for which there is always room.
+    untold: usize,
+    /// The latest time that was told.
+    latest: Option<Instant>,
     counters: Counters,
 }
 
 impl Endpoint {
     /// An endpoint without components and links.
     #[must_use]
-    pub fn new(config: Config) -> Self {
+    pub fn new(mut config: Config) -> Self {
+        config.payload_limit = config
+            .payload_limit
+            .clamp(*PAYLOAD_LIMITS.start(), *PAYLOAD_LIMITS.end());
         Self {
             components: Components::new(config.max_components),
             links: BTreeMap::new(),
             peers: Peers::new(config.max_peers, config.static_peers.clone()),
-            sequence: config.first_sequence,
+            numbers: Numbers::after(config.first_sequence),
             heard: Recent::new(config.max_recent, config.retransmission_window),
             sent_to_group: Recent::new(config.max_recent, config.echo_window),
             reassembly: Reassembly::new(&config),
-            acknowledgements: Acknowledgements::new(&config),
+            deliveries: Deliveries::new(&config),
             conflicts: BTreeMap::new(),
             transmits: PriorityQueue::new(config.queue_limit),
             messages: PriorityQueue::new(config.queue_limit),
             news: VecDeque::new(),
+            untold: 0,
+            latest: None,
             counters: Counters::default(),
             config,
         }
@@ -120,7 +131,7 @@ impl Endpoint {
     /// Lets a local component go. What was already received for it can still be polled.
     pub fn detach(&mut self, id: JausId) {
         self.components.detach(id);
-        self.acknowledgements.forget_source(id);
+        self.deliveries.forget_source(id);
         self.conflicts.remove(&id);
     }
 
@@ -159,29 +170,37 @@ impl Endpoint {
     /// Tells that time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached;
     /// early calls are harmless.
     pub fn handle_timeout(&mut self, now: Instant) {
+        self.latest = Some(now);
         self.retry_unacknowledged(now);
         self.reassembly.expire(now, &mut self.counters);
     }
 
     /// The next datagram to send, the most urgent first.
     pub fn poll_transmit(&mut self) -> Option<Transmit> {
-        let transmit = self.transmits.pop()?;
+        let transmit = Priority::ALL.into_iter().rev().find_map(|priority| {
+            let queued = self.transmits.pop_at(priority);
+            queued.or_else(|| self.next_delivery(priority))
+        })?;
         self.counters.add(Counter::DatagramsSent);
         Some(transmit)
     }
 
     /// The next event: news first, then received messages, the most urgent first.
     pub fn poll_event(&mut self) -> Option<Event> {
-        self.news
-            .pop_front()
-            .or_else(|| self.messages.pop().map(Event::Received))
+        let Some(news) = self.news.pop_front() else {
+            return self.messages.pop().map(Event::Received);
+        };
+        if let Event::Acknowledged { .. } | Event::NotAcknowledged { .. } = news {
+            self.untold -= 1;
+        }
+        Some(news)
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout), if ever.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         [
-            self.acknowledgements.next_deadline(),
+            self.deliveries.next_deadline(),
             self.reassembly.next_expiry(),
         ]
         .into_iter()
@@ -196,11 +215,18 @@ impl Endpoint {
     }
 
     fn announce(&mut self, event: Event) {
-        if self.news.len() < self.config.queue_limit {
+        if self.news.len() - self.untold < self.config.queue_limit {
             self.news.push_back(event);
         } else {
             self.counters.add(Counter::NewsQueueFull);
         }
+    }
+
+    /// Tells what became of a message. There is room: a message whose result waits to be polled
+    /// counts as one that waits for its acknowledgement.
+    fn tell_result(&mut self, event: Event) {
+        self.untold += 1;
+        self.news.push_back(event);
     }
 
     /// Queues a datagram, if there is room; a full queue is counted.

@@ -40,6 +40,11 @@ impl<T> PriorityQueue<T> {
         self.levels.iter_mut().rev().find_map(VecDeque::pop_front)
     }
 
+    /// Takes the oldest entry of that priority.
+    pub(super) fn pop_at(&mut self, priority: Priority) -> Option<T> {
+        self.levels[usize::from(priority.bits())].pop_front()
+    }
+
     /// Keeps only what `keep` says.
     pub(super) fn retain(&mut self, keep: impl Fn(&T) -> bool) {
         for level in &mut self.levels {

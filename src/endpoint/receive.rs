@@ -73,7 +73,7 @@ impl Endpoint {
         match frame.flags.acknowledgement() {
             Acknowledgement::Positive | Acknowledgement::Negative => {
                 self.learn(now, from, frame);
-                return self.receive_answer(frame);
+                return self.receive_answer(now, frame);
             }
             Acknowledgement::Request => self.acknowledge(from, frame),
             Acknowledgement::None => {}
@@ -174,17 +174,21 @@ impl Endpoint {
         if !repeats && frame.version != Version::As5669a {
             return Ok(());
         }
-        let window = if repeats {
-            self.config.retransmission_window
-        } else {
-            self.config.duplicate_window
+        let window = match frame.flags.broadcast() {
+            _ if !repeats => self.config.duplicate_window,
+            Some(Broadcast::None) => self.config.retransmission_window,
+            _ => self.config.first_contact_window,
         };
         let fingerprint = self.heard.fingerprint(frame);
-        if self.heard.contains(now, &fingerprint, window) {
-            return Err(Counter::Duplicate);
+        let known = self.heard.contains(now, &fingerprint, window);
+        if repeats || !known {
+            self.heard.insert(now, fingerprint);
         }
-        self.heard.insert(now, fingerprint);
-        Ok(())
+        if known {
+            Err(Counter::Duplicate)
+        } else {
+            Ok(())
+        }
     }
 
     /// Queues a whole message for its receivers.

@@ -5,13 +5,14 @@ use std::time::Instant;
 use bytes::Bytes;
 use tracing::trace;
 
+use super::large::Cut;
 use super::{
     Counter, Endpoint, Event, LinkId, LinkProfile, MessageHandle, Outgoing, Path, Received, To,
-    Transmit, fragment,
+    Transmit,
 };
 use crate::address::JausId;
 use crate::wire::{
-    Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version, judp,
+    Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version,
 };
 
 /// Why a message cannot be sent. Nothing of it was.
@@ -53,6 +54,18 @@ pub enum SendError {
         /// [`Config::max_unacknowledged`](super::Config::max_unacknowledged).
         limit: usize,
     },
+    /// Too much waits for acknowledgements.
+    #[error("messages of {limit} octets wait for acknowledgements already")]
+    TooMuchUnacknowledged {
+        /// [`Config::max_unacknowledged_octets`](super::Config::max_unacknowledged_octets).
+        limit: usize,
+    },
+    /// Messages to too many destinations wait for acknowledgements.
+    #[error("messages to {limit} destinations wait for acknowledgements already")]
+    TooManyDestinations {
+        /// [`Config::max_flows`](super::Config::max_flows).
+        limit: usize,
+    },
     /// Too many datagrams or messages wait to be sent or delivered.
     #[error("{limit} messages of this priority wait already")]
     QueueFull {
@@ -80,7 +93,8 @@ impl Endpoint {
     /// mean that it arrives; ask for an acknowledgement to be told.
     pub fn send(&mut self, now: Instant, message: Outgoing) -> Result<MessageHandle, SendError> {
         let scope = self.check(&message)?;
-        let handle = self.acknowledgements.next_handle();
+        self.latest = Some(now);
+        let handle = self.deliveries.next_handle();
         if self.components.contains(message.destination) {
             self.send_to_sibling(handle, message)?;
         } else {
@@ -125,6 +139,9 @@ impl Endpoint {
     ) -> Result<(), SendError> {
         let (acknowledge, scope, by) =
             (message.acknowledge, message.broadcast, message.destination);
+        if acknowledge {
+            self.deliveries.check_room(self.untold, 0)?;
+        }
         let limit = self.config.queue_limit;
         let received = received_locally(message, scope, by);
         self.messages
@@ -135,7 +152,7 @@ impl Endpoint {
             })?;
         self.counters.add(Counter::MessagesDelivered);
         if acknowledge {
-            self.announce(Event::Acknowledged {
+            self.tell_result(Event::Acknowledged {
                 message: handle,
                 by,
             });
@@ -164,11 +181,11 @@ impl Endpoint {
         if self.links.is_empty() && scope == Broadcast::None {
             return Err(SendError::NoLink(destination));
         }
-        let frames = self.frames(message, scope)?;
-        if message.acknowledge && !self.acknowledgements.has_room(frames.len()) {
-            let limit = self.config.max_unacknowledged;
-            return Err(SendError::TooManyUnacknowledged { limit });
+        self.check_length(message)?;
+        if message.acknowledge {
+            return self.deliver_reliably(now, handle, message, scope);
         }
+        let frames = self.frames(message, scope);
         let transmits: Vec<_> = frames
             .iter()
             .map(|frame| self.transmits_of(frame))
@@ -182,88 +199,83 @@ impl Endpoint {
         }
         for (frame, transmits) in frames.into_iter().zip(transmits) {
             self.queue(now, &frame, transmits);
-            if message.acknowledge {
-                self.acknowledgements.expect(now, handle, frame);
-            }
+        }
+        Ok(())
+    }
+
+    /// Whether what is sent to `destination` names the message code in each fragment.
+    fn repeats_code(&self, destination: JausId) -> bool {
+        self.route(destination)
+            .is_some_and(|(_, version)| version != Version::As5669a)
+    }
+
+    fn check_length(&self, message: &Outgoing) -> Result<(), SendError> {
+        let length = message.payload.len();
+        let repeat_code = self.repeats_code(message.destination);
+        let longest = Cut::longest(self.config.payload_limit, repeat_code);
+        let limit = self.config.max_message.min(longest);
+        if length > limit {
+            return Err(SendError::TooLong { length, limit });
         }
         Ok(())
     }
 
     /// The frame that carries a message, or its fragments.
-    fn frames(&mut self, message: &Outgoing, scope: Broadcast) -> Result<Vec<Frame>, SendError> {
-        let length = message.payload.len();
-        let older_header = self
-            .peers
-            .route(message.destination)
-            .is_some_and(|(_, version)| version != Version::As5669a);
-        let (part, limit) = match self.config.payload_limit.clamp(1, judp::MAX_PAYLOAD) {
-            part if older_header => (part, part),
-            part => (
-                part,
-                self.config
-                    .max_message
-                    .clamp(part, part.saturating_mul(u16::MAX.into())),
-            ),
-        };
-        if length > limit {
-            return Err(SendError::TooLong { length, limit });
-        }
-        let mut flags = Flags::new(message.priority).with_broadcast(scope);
-        if message.acknowledge {
-            flags = flags.with_acknowledgement(Acknowledgement::Request);
-        }
-        let first = self.take_sequence_numbers(length.div_ceil(part));
-        Ok(fragment::split(&message.payload, part)
-            .enumerate()
-            .map(|(index, (data, payload))| Frame {
-                flags: flags.with_data(data),
-                sequence: first.wrapping_add(index as u16),
-                ..Frame::new(message.source, message.destination, payload)
+    fn frames(&mut self, message: &Outgoing, scope: Broadcast) -> Vec<Frame> {
+        let repeat_code = self.repeats_code(message.destination);
+        let cut = Cut::new(
+            message.payload.len(),
+            self.config.payload_limit,
+            repeat_code,
+        );
+        let flags = Flags::new(message.priority).with_broadcast(scope);
+        let first = self.numbers.take(cut.count());
+        (0..cut.count())
+            .map(|index| {
+                let (data, payload) = cut.fragment(&message.payload, index);
+                Frame {
+                    flags: flags.with_data(data),
+                    sequence: (first + index as u64) as u16,
+                    ..Frame::new(message.source, message.destination, payload)
+                }
             })
-            .collect())
+            .collect()
     }
 
-    /// The first of `count` consecutive sequence numbers.
-    ///
-    /// One counter serves all destinations and all components: Junior tells duplicates by source
-    /// and number alone, so that a broadcast and a message to it must not share a number. The
-    /// numbers neither hold 0, which JAUS++ refuses in fragments, nor go round within a message,
-    /// which it does not follow.
-    fn take_sequence_numbers(&mut self, count: usize) -> u16 {
-        let last = u16::try_from(count)
-            .ok()
-            .and_then(|count| self.sequence.checked_add(count));
-        let first = if last.is_some() { self.sequence + 1 } else { 1 };
-        self.sequence = last.unwrap_or(count as u16);
-        first
+    /// Where and with which header to reach `destination`, if that is known and there is a link.
+    pub(super) fn route(&self, destination: JausId) -> Option<(Path, Version)> {
+        self.peers
+            .route(destination)
+            .filter(|(path, _)| self.links.contains_key(&path.link))
     }
 
-    /// Sends a frame again, to where its destination is now.
-    pub(super) fn resend(&mut self, now: Instant, frame: &Frame) -> Result<(), SendError> {
-        let transmits = self.transmits_of(frame)?;
-        self.queue(now, frame, transmits);
-        Ok(())
-    }
-
-    fn queue(&mut self, now: Instant, frame: &Frame, transmits: Vec<Transmit>) {
+    /// Remembers what goes to the group, which may come back.
+    pub(super) fn remember_echo(
+        &mut self,
+        now: Instant,
+        frame: &Frame,
+        transmits: Vec<Transmit>,
+    ) -> Vec<Transmit> {
         if transmits.iter().any(|transmit| transmit.to == To::Group) {
             self.sent_to_group
                 .insert(now, self.sent_to_group.fingerprint(frame));
         }
-        for transmit in transmits {
+        transmits
+    }
+
+    fn queue(&mut self, now: Instant, frame: &Frame, transmits: Vec<Transmit>) {
+        for transmit in self.remember_echo(now, frame, transmits) {
             self.transmit(transmit);
         }
     }
 
     /// The datagrams that carry a frame to where its destination is.
-    fn transmits_of(&self, frame: &Frame) -> Result<Vec<Transmit>, SendError> {
+    pub(super) fn transmits_of(&self, frame: &Frame) -> Result<Vec<Transmit>, SendError> {
         let destination = frame.destination;
         if destination.has_wildcard() || frame.flags.broadcast() != Some(Broadcast::None) {
             return self.to_group(frame);
         }
-        let route = self.peers.route(destination);
-        let Some((path, version)) = route.filter(|(path, _)| self.links.contains_key(&path.link))
-        else {
+        let Some((path, version)) = self.route(destination) else {
             trace!(%destination, "address unknown");
             let flags = frame
                 .flags

@@ -8,7 +8,7 @@ use tokio::sync::oneshot;
 use super::error::Undelivered;
 use super::local::Replies;
 use crate::address::JausId;
-use crate::endpoint::{Event, MessageHandle};
+use crate::endpoint::{Event, MessageHandle, Unacknowledged};
 use crate::link::local::record::{Reply, Silence};
 
 /// Messages whose fate somebody waits for, at most. The endpoint gives up each of them some day,
@@ -82,13 +82,18 @@ fn outcome(event: &Event) -> Result<(), Undelivered> {
     match *event {
         Event::NotAcknowledged {
             destination,
-            refused: true,
+            reason: Unacknowledged::Refused,
             ..
         } => Err(Undelivered::Refused { destination }),
-        Event::NotAcknowledged { destination, .. } => Err(Undelivered::NotAcknowledged {
+        Event::NotAcknowledged {
             destination,
-            acknowledged: 0,
-            length: 0,
+            acknowledged,
+            length,
+            ..
+        } => Err(Undelivered::NotAcknowledged {
+            destination,
+            acknowledged,
+            length,
         }),
         _ => Ok(()),
     }
@@ -98,18 +103,19 @@ fn reply(event: &Event, handle: u64) -> Reply {
     match *event {
         Event::NotAcknowledged {
             destination,
-            refused,
+            reason,
+            acknowledged,
+            length,
             ..
         } => Reply::NotAcknowledged {
             handle,
             destination,
-            reason: if refused {
-                Silence::Refused
-            } else {
-                Silence::TimedOut
+            reason: match reason {
+                Unacknowledged::Refused => Silence::Refused,
+                _ => Silence::TimedOut,
             },
-            acknowledged: 0,
-            length: 0,
+            acknowledged: acknowledged as u32,
+            length: length as u32,
         },
         Event::Acknowledged { by, .. } => Reply::Acknowledged { handle, by },
         _ => Reply::Rejected {

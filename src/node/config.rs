@@ -20,19 +20,18 @@
 
 use std::fmt;
 use std::net::{SocketAddr, SocketAddrV4};
-use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use super::mailbox::MailboxLimits;
 use crate::address::{JausId, ParseIdError};
-use crate::endpoint;
+use crate::endpoint::{self, PAYLOAD_LIMITS};
 use crate::link::local::{Address, Local};
 use crate::link::udp::{self, Broadcasts, PortTaken};
 use crate::link::{Group, Group6, Interfaces, InvalidGroup, Ip, Place};
 
-/// A UDP datagram holds 65507 octets, of which one and fourteen are headers.
-const PAYLOAD_LIMITS: RangeInclusive<usize> = 64..=65_492;
 const LONGEST_MESSAGE: usize = 16 << 20;
+/// Sequence numbers have 16 bits, and 0 is left out.
+const MOST_FRAGMENTS: usize = u16::MAX as usize;
 
 /// Everything that can be set about a node. All but the id has a default.
 ///
@@ -72,7 +71,7 @@ pub struct Config {
     pub receive_buffer: usize,
     /// Peers to whom everything for the group is sent by unicast too.
     pub peers: Vec<Peer>,
-    /// The most octets of payload in one packet, 64 to 65492. The default, 1425, keeps a packet
+    /// The most octets of payload in one packet, 64 to 4079. The default, 1425, keeps a packet
     /// within one Ethernet frame.
     pub payload_limit: usize,
     /// The longest message, in octets, that is sent or received, up to 16 MiB. Above
@@ -190,9 +189,13 @@ impl Config {
         if !PAYLOAD_LIMITS.contains(&self.payload_limit) {
             return Err(ConfigError::PayloadLimit(self.payload_limit));
         }
-        if !(self.payload_limit..=LONGEST_MESSAGE).contains(&self.max_message) {
-            let (message, payload) = (self.max_message, self.payload_limit);
-            return Err(ConfigError::MaxMessage { message, payload });
+        let longest = LONGEST_MESSAGE.min(self.payload_limit * MOST_FRAGMENTS);
+        if !(self.payload_limit..=longest).contains(&self.max_message) {
+            return Err(ConfigError::MaxMessage {
+                message: self.max_message,
+                payload: self.payload_limit,
+                longest,
+            });
         }
         if self.mailbox.messages == 0 {
             return Err(ConfigError::Mailbox);
@@ -203,13 +206,10 @@ impl Config {
     /// The endpoint's settings; its bounds leave room for two of the longest messages.
     pub(super) fn endpoint(&self, first_sequence: u16) -> endpoint::Config {
         let usual = endpoint::Config::default();
-        let fragments = 2 * (self.max_message / self.payload_limit + 1);
         endpoint::Config {
             payload_limit: self.payload_limit,
             max_message: self.max_message,
             max_reassembly: usual.max_reassembly.max(2 * self.max_message),
-            queue_limit: usual.queue_limit.max(fragments),
-            max_unacknowledged: usual.max_unacknowledged.max(fragments),
             first_sequence,
             ..usual
         }
@@ -302,15 +302,17 @@ pub enum ConfigError {
     #[error("node {0} cannot be: choose a number from 1 to 254")]
     Node(u8),
     /// Too little for a packet, or more than one holds.
-    #[error("payload_limit {0} cannot be: a packet holds 64 to 65492 octets of payload")]
+    #[error("payload_limit {0} cannot be: choose from 64 to 4079 octets of payload in a packet")]
     PayloadLimit(usize),
-    /// Less than a packet, or more than a small board should be asked to keep.
-    #[error("max_message {message} cannot be: choose from {payload} (payload_limit) to 16777216")]
+    /// Less than a packet, more than there are fragments for, or more than a small board should be asked to keep.
+    #[error("max_message {message} cannot be: choose from {payload} (payload_limit) to {longest}")]
     MaxMessage {
         /// The length that was chosen, in octets.
         message: usize,
         /// [`Config::payload_limit`].
         payload: usize,
+        /// The most, in octets: 16 MiB, and no more fragments than there are sequence numbers.
+        longest: usize,
     },
     /// A mailbox without room.
     #[error("a mailbox must hold at least 1 message")]
@@ -371,11 +373,16 @@ mod tests {
             };
             config.validate().map_err(|error| error.to_string())
         };
-        assert!(with(63, 1000).unwrap_err().contains("64 to 65492"));
-        assert!(with(65_493, 70_000).unwrap_err().contains("64 to 65492"));
+        assert!(with(63, 1000).unwrap_err().contains("64 to 4079"));
+        assert!(with(4080, 70_000).unwrap_err().contains("64 to 4079"));
         assert!(with(1000, 999).unwrap_err().contains("from 1000"));
         assert!(with(1000, 16_777_217).unwrap_err().contains("16777216"));
-        assert_eq!(with(65_492, 16_777_216), Ok(()));
+        assert_eq!(with(4079, 16_777_216), Ok(()));
+        assert!(with(64, 4_194_240).is_ok());
+        assert_eq!(
+            with(64, 4_194_241).unwrap_err(),
+            "max_message 4194241 cannot be: choose from 64 (payload_limit) to 4194240"
+        );
     }
 
     #[test]

@@ -133,22 +133,26 @@ fn an_unacknowledged_message_is_sent_again_and_then_given_up() {
         })
         .unwrap();
     let first = rig.transmits();
-    for _retry in 0..3 {
-        let wait = rig.endpoint.poll_timeout().unwrap() - rig.now;
-        assert_eq!(wait, Duration::from_millis(100));
+    let begin = rig.now;
+    for wait in [100, 200, 400, 800].map(Duration::from_millis) {
+        assert_eq!(rig.endpoint.poll_timeout(), Some(rig.now + wait));
         rig.pass(wait - Duration::from_millis(1));
         assert_eq!(rig.transmits(), [], "not before the time");
         rig.pass(Duration::from_millis(1));
         assert_eq!(rig.transmits(), first, "the same again");
     }
-    rig.pass(Duration::from_millis(100));
+    let end = rig.endpoint.poll_timeout().unwrap();
+    assert_eq!(end - begin, Config::default().acknowledge_patience);
+    rig.pass(end - rig.now);
     assert_eq!(rig.transmits(), []);
     assert_eq!(
         rig.events(),
         [Event::NotAcknowledged {
             message,
             destination: PEER,
-            refused: false
+            reason: Unacknowledged::TimedOut,
+            acknowledged: 0,
+            length: QUERY_IDENTIFICATION.len(),
         }]
     );
     assert_eq!(
@@ -156,7 +160,7 @@ fn an_unacknowledged_message_is_sent_again_and_then_given_up() {
             rig.endpoint.poll_timeout(),
             rig.count(Counter::Retransmissions)
         ),
-        (None, 3)
+        (None, 4)
     );
 }
 
@@ -191,7 +195,9 @@ fn a_refused_message_is_told() {
         [Event::NotAcknowledged {
             message,
             destination: PEER,
-            refused: true
+            reason: Unacknowledged::Refused,
+            acknowledged: 0,
+            length: QUERY_IDENTIFICATION.len(),
         }]
     );
 }

@@ -191,7 +191,7 @@ proptest! {
             prop_assert!(timeout.is_none_or(|timeout| timeout > rig.now), "what was due is done");
             prop_assert!(is_accounted_for(&rig));
         }
-        prop_assert!(rig.events().len() <= 5 * LIMIT);
+        prop_assert!(rig.events().len() <= 6 * LIMIT);
         prop_assert!(rig.transmits().len() <= 4 * LIMIT);
         // Left alone, it comes to rest.
         for _wake in 0..100 {

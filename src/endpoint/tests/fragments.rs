@@ -15,12 +15,15 @@ fn large(length: usize) -> Bytes {
 
 /// The fragments of a large message from [`PEER`], beginning with number `first`.
 fn fragments(first: u16, message: &Bytes, part: usize) -> Vec<Frame> {
-    fragment::split(message, part)
-        .enumerate()
-        .map(|(index, (data, payload))| Frame {
-            flags: Flags::default().with_data(data),
-            sequence: first.wrapping_add(index as u16),
-            ..Frame::new(PEER, US, payload)
+    let cut = large::Cut::new(message.len(), part, false);
+    (0..cut.count())
+        .map(|index| {
+            let (data, payload) = cut.fragment(message, index);
+            Frame {
+                flags: Flags::default().with_data(data),
+                sequence: first.wrapping_add(index as u16),
+                ..Frame::new(PEER, US, payload)
+            }
         })
         .collect()
 }
@@ -126,15 +129,21 @@ fn a_large_message_with_acknowledgement_is_told_when_all_of_it_is_acknowledged()
             ..to_peer()
         })
         .unwrap();
-    for _try in 0..4 {
-        rig.pass(Duration::from_millis(100));
-    }
+    let acknowledged = rig.sent().remove(0).1;
+    rig.hear(&Frame {
+        flags,
+        sequence: acknowledged.sequence,
+        ..from_peer(b"")
+    });
+    rig.pass(Config::default().acknowledge_patience);
     assert_eq!(
         rig.events(),
         [Event::NotAcknowledged {
             message,
             destination: PEER,
-            refused: false
+            reason: Unacknowledged::TimedOut,
+            acknowledged: 1425,
+            length: 1425 * 3,
         }]
     );
     assert_eq!(rig.endpoint.poll_timeout(), None);

@@ -4,10 +4,12 @@
 mod acknowledgements;
 mod anything;
 mod bounds;
+mod delivery;
 mod fragments;
 mod identity;
 mod receiving;
 mod sending;
+mod wire;
 
 use std::net::SocketAddr;
 use std::time::Duration;

@@ -295,11 +295,11 @@ fn a_message_that_cannot_be_sent_is_told_why() {
         error(
             &mut rig,
             Outgoing {
-                payload: vec![0; 524_289].into(),
+                payload: vec![0; (16 << 20) + 1].into(),
                 ..message
             }
         ),
-        "the message has 524289 octets, and at most 524288 can be sent to this receiver"
+        "the message has 16777217 octets, and at most 16777216 can be sent to this receiver"
     );
     assert_eq!(
         (rig.transmits(), rig.count(Counter::MessagesSent)),

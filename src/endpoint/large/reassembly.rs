@@ -1,9 +1,4 @@
-//! Large messages: cut into fragments when sent, put together when received.
-//!
-//! A fragment is a message of its own with the next sequence number and the data control first,
-//! middle or last; the message code stands only at the beginning of the first (AS5669A; Junior does
-//! the same, JAUS++ repeats the code in every fragment and is not understood). Fragments may come
-//! in any order.
+//! Putting fragments together. They may come in any order.
 //!
 //! What is kept of unfinished messages is bounded in octets, per sender and in all, in number and
 //! in time.
@@ -12,28 +7,12 @@ use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
 
-use super::{Config, Counter, Counters};
 use crate::address::JausId;
+use crate::endpoint::{Config, Counter, Counters};
 use crate::wire::{DataControl, Frame, Version, ra};
 
 /// The most runs of fragments that are kept, from all senders.
 const MAX_RUNS: usize = 256;
-
-/// Cuts a message into parts of at most `limit` octets, each with its data control.
-pub(super) fn split(message: &Bytes, limit: usize) -> impl Iterator<Item = (DataControl, Bytes)> {
-    let limit = limit.max(1);
-    let count = message.len().div_ceil(limit).max(1);
-    (0..count).map(move |index| {
-        let data = match index {
-            _ if count == 1 => DataControl::Single,
-            0 => DataControl::First,
-            _ if index == count - 1 => DataControl::Last,
-            _ => DataControl::Middle,
-        };
-        let end = message.len().min((index + 1) * limit);
-        (data, message.slice(index * limit..end))
-    })
-}
 
 /// What a fragment adds to its message. The older headers name the code with each fragment.
 fn part_of_message(frame: &Frame) -> &[u8] {
@@ -100,7 +79,7 @@ impl Run {
 
 /// The unfinished large messages.
 #[derive(Debug)]
-pub(super) struct Reassembly {
+pub(in crate::endpoint) struct Reassembly {
     runs: Vec<Run>,
     max_message: usize,
     max_octets: usize,
@@ -108,7 +87,7 @@ pub(super) struct Reassembly {
 }
 
 impl Reassembly {
-    pub(super) fn new(config: &Config) -> Self {
+    pub(in crate::endpoint) fn new(config: &Config) -> Self {
         Self {
             runs: Vec::new(),
             max_message: config.max_message,
@@ -119,7 +98,7 @@ impl Reassembly {
 
     /// Takes a fragment, and gives the message if it is whole now. What a bound makes it forget is
     /// counted.
-    pub(super) fn insert(
+    pub(in crate::endpoint) fn insert(
         &mut self,
         now: Instant,
         frame: &Frame,
@@ -197,7 +176,7 @@ impl Reassembly {
     }
 
     /// Forgets what has not grown for too long.
-    pub(super) fn expire(&mut self, now: Instant, counters: &mut Counters) {
+    pub(in crate::endpoint) fn expire(&mut self, now: Instant, counters: &mut Counters) {
         let timeout = self.timeout;
         self.forget(|run| run.updated + timeout <= now, counters);
     }
@@ -212,7 +191,7 @@ impl Reassembly {
     }
 
     /// When the next run expires.
-    pub(super) fn next_expiry(&self) -> Option<Instant> {
+    pub(in crate::endpoint) fn next_expiry(&self) -> Option<Instant> {
         self.runs.iter().map(|run| run.updated + self.timeout).min()
     }
 }

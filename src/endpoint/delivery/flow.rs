@@ -1,0 +1,550 @@
+//! One destination's messages that want an acknowledgement: what waits, what is on its way, what
+//! was lost.
+//!
+//! Acknowledgements name one packet each, so nothing is sent again but what was not acknowledged.
+//! A packet counts as lost when several that were sent after it were acknowledged (how many is
+//! learned from repetitions that turn out to have been needless), or when nothing was acknowledged
+//! for as long as a round trip should take.
+
+use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::round_trip::RoundTrip;
+use super::window::Window;
+use super::{FlowStatus, Undelivered};
+use crate::address::JausId;
+use crate::endpoint::large::{Cut, Numbers};
+use crate::endpoint::{Config, Unacknowledged};
+use crate::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version};
+
+/// So many packets may be on their way to somebody whose address is unknown: they go to everybody.
+const SEEKING: usize = 1;
+/// The longest wait before sending again to somebody whose address is unknown. Whoever hears it
+/// remembers such a message for a short time only.
+const SEEKING_TIMEOUT: Duration = Duration::from_millis(400);
+/// So many more than the window allows may be on their way if they are urgent, by priority: what
+/// is urgent does not wait for the answers to what is not.
+const RESERVE: [usize; Priority::ALL.len()] = [0, 0, 8, 32];
+/// A packet is lost when one that was sent so much later is acknowledged; at first and at most.
+const TOLERANCE: (u64, u64) = (3, 96);
+/// After so long without traffic the window is not known to be right any more.
+const STALE: Duration = Duration::from_secs(1);
+/// To a destination that was silent before, messages get this part of the usual patience.
+const SILENT_PART: u32 = 6;
+/// Numbers go round after so many.
+const ROUND: u64 = 1 << 16;
+
+/// A message on its way.
+#[derive(Debug)]
+pub(super) struct Parcel {
+    pub(super) source: JausId,
+    pub(super) priority: Priority,
+    pub(super) broadcast: Broadcast,
+    pub(super) payload: Bytes,
+    /// When it was handed in.
+    pub(super) accepted: Instant,
+    /// How it was cut, once the first of it was sent.
+    started: Option<Started>,
+    /// Octets that were acknowledged.
+    acknowledged: usize,
+}
+
+#[derive(Debug)]
+struct Started {
+    cut: Cut,
+    version: Version,
+    /// The serial number of the first fragment.
+    first: u64,
+    /// The first fragment that was never sent.
+    next: usize,
+    /// How many fragments were not acknowledged yet.
+    missing: usize,
+}
+
+impl Parcel {
+    pub(super) fn new(
+        accepted: Instant,
+        source: JausId,
+        priority: Priority,
+        broadcast: Broadcast,
+        payload: Bytes,
+    ) -> Self {
+        Self {
+            source,
+            priority,
+            broadcast,
+            payload,
+            accepted,
+            started: None,
+            acknowledged: 0,
+        }
+    }
+
+    /// The frame that carries a fragment; without its destination.
+    fn frame(&self, index: usize) -> Option<Frame> {
+        let started = self.started.as_ref()?;
+        let (data, payload) = started.cut.fragment(&self.payload, index);
+        let flags = Flags::new(self.priority)
+            .with_broadcast(self.broadcast)
+            .with_acknowledgement(Acknowledgement::Request)
+            .with_data(data);
+        Some(Frame {
+            version: started.version,
+            flags,
+            sequence: (started.first + index as u64) as u16,
+            ..Frame::new(self.source, self.source, payload)
+        })
+    }
+}
+
+/// A fragment, or a message that is not cut, that was sent and not acknowledged.
+#[derive(Debug)]
+struct Packet {
+    message: u64,
+    index: usize,
+    priority: Priority,
+    first_sent: Instant,
+    sent: Instant,
+    /// How many packets were sent before this one was, the last time.
+    order: u64,
+    tries: u32,
+    /// Taken for lost, and waiting to be sent again.
+    lost: bool,
+}
+
+/// What an acknowledgement did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Progress {
+    /// Nobody waits for it.
+    Unawaited,
+    /// Parts of the message are still to be acknowledged.
+    Part,
+    /// The message is acknowledged.
+    Whole(u64),
+}
+
+/// All that goes to one destination.
+#[derive(Debug)]
+pub(super) struct Flow {
+    /// By handle, hence in the order in which they were handed in.
+    parcels: BTreeMap<u64, Parcel>,
+    /// Messages of which not all was sent, by priority.
+    waiting: [VecDeque<u64>; Priority::ALL.len()],
+    /// What is to be sent again, by priority.
+    lost: [VecDeque<u16>; Priority::ALL.len()],
+    flight: HashMap<u16, Packet>,
+    /// What was sent, oldest first; entries of what was acknowledged meanwhile are passed over.
+    order: VecDeque<(u64, u16)>,
+    sends: u64,
+    /// The order of the latest packet that was acknowledged.
+    newest: u64,
+    tolerance: u64,
+    in_flight: usize,
+    window: Window,
+    round_trip: RoundTrip,
+    /// Since when something is on its way and nothing was acknowledged.
+    armed: Option<Instant>,
+    /// When the latest acknowledgement came.
+    heard: Option<Instant>,
+    /// When something was handed in or acknowledged.
+    active: Instant,
+    /// Whether messages were given up because nothing was heard, and nothing was since.
+    silent: bool,
+    /// Whether the address is known.
+    pub(super) known: bool,
+    /// By priority, whether it stands in the list of those that have something to send.
+    pub(super) listed: [bool; Priority::ALL.len()],
+    /// Messages of which a packet was sent as often as is allowed.
+    exhausted: Vec<u64>,
+    /// No message under way has a lower serial number.
+    floor: u64,
+    patience: Duration,
+    tries: u32,
+}
+
+impl Flow {
+    pub(super) fn new(now: Instant, config: &Config) -> Self {
+        Self {
+            parcels: BTreeMap::new(),
+            waiting: Default::default(),
+            lost: Default::default(),
+            flight: HashMap::new(),
+            order: VecDeque::new(),
+            sends: 0,
+            newest: 0,
+            tolerance: TOLERANCE.0,
+            in_flight: 0,
+            window: Window::new(config.initial_window, config.max_window),
+            round_trip: RoundTrip::default(),
+            armed: None,
+            heard: None,
+            active: now,
+            silent: false,
+            known: false,
+            listed: Default::default(),
+            exhausted: Vec::new(),
+            floor: 0,
+            patience: config.acknowledge_patience,
+            tries: config.acknowledge_tries,
+        }
+    }
+
+    pub(super) fn is_idle(&self) -> bool {
+        self.parcels.is_empty()
+    }
+
+    pub(super) fn active(&self) -> Instant {
+        self.active
+    }
+
+    pub(super) fn status(&self) -> FlowStatus {
+        FlowStatus {
+            round_trip: self.round_trip.smoothed(),
+            window: self.window.packets(),
+            in_flight: self.in_flight,
+            messages: self.parcels.len(),
+        }
+    }
+
+    /// Takes in a message.
+    pub(super) fn push(&mut self, now: Instant, message: u64, parcel: Parcel) {
+        if self.is_idle() {
+            self.round_trip.restart();
+            if now.saturating_duration_since(self.active) >= STALE {
+                self.window.rest();
+            }
+        }
+        self.active = now;
+        self.waiting[usize::from(parcel.priority.bits())].push_back(message);
+        self.parcels.insert(message, parcel);
+    }
+
+    /// The highest priority at which something is to be sent and may be.
+    pub(super) fn wants(&self) -> Option<Priority> {
+        let limit = if self.known {
+            self.window.packets()
+        } else {
+            SEEKING
+        };
+        Priority::ALL.into_iter().rev().find(|priority| {
+            let level = usize::from(priority.bits());
+            let something = !self.lost[level].is_empty() || !self.waiting[level].is_empty();
+            something && self.in_flight < limit + RESERVE[level]
+        })
+    }
+
+    /// The next packet to send, of that priority or, if that must wait for numbers, of a lower one;
+    /// without its destination. The message's cut and header version are asked for when its first
+    /// packet is due.
+    pub(super) fn take(
+        &mut self,
+        now: Instant,
+        priority: Priority,
+        numbers: &mut Numbers,
+        mut begin: impl FnMut(&Parcel) -> (Cut, Version),
+    ) -> Option<(Frame, u32)> {
+        (0..=usize::from(priority.bits())).rev().find_map(|level| {
+            self.repeat(now, level)
+                .or_else(|| self.advance(now, level, numbers, &mut begin))
+        })
+    }
+
+    /// A lost packet again.
+    fn repeat(&mut self, now: Instant, level: usize) -> Option<(Frame, u32)> {
+        while let Some(sequence) = self.lost[level].pop_front() {
+            let Some(packet) = self.flight.get_mut(&sequence).filter(|packet| packet.lost) else {
+                continue;
+            };
+            let frame = self.parcels.get(&packet.message)?.frame(packet.index)?;
+            packet.lost = false;
+            packet.sent = now;
+            packet.order = self.sends;
+            packet.tries += 1;
+            let tries = packet.tries;
+            self.depart(now, sequence);
+            return Some((frame, tries));
+        }
+        None
+    }
+
+    /// The next packet of the first message that waits.
+    fn advance(
+        &mut self,
+        now: Instant,
+        level: usize,
+        numbers: &mut Numbers,
+        begin: &mut impl FnMut(&Parcel) -> (Cut, Version),
+    ) -> Option<(Frame, u32)> {
+        loop {
+            let message = *self.waiting[level].front()?;
+            if !self.parcels.contains_key(&message) {
+                self.waiting[level].pop_front();
+                continue;
+            }
+            self.start(message, numbers, begin)?;
+            let parcel = self.parcels.get_mut(&message)?;
+            let index = parcel.started.as_ref()?.next;
+            let frame = parcel.frame(index)?;
+            let started = parcel.started.as_mut()?;
+            started.next += 1;
+            if started.next == started.cut.count() {
+                self.waiting[level].pop_front();
+            }
+            let packet = Packet {
+                message,
+                index,
+                priority: parcel.priority,
+                first_sent: now,
+                sent: now,
+                order: self.sends,
+                tries: 1,
+                lost: false,
+            };
+            self.flight.insert(frame.sequence, packet);
+            self.depart(now, frame.sequence);
+            return Some((frame, 1));
+        }
+    }
+
+    /// Cuts and numbers a message if that was not done before; `None` while the numbers that it
+    /// needs are those of what is on its way.
+    fn start(
+        &mut self,
+        message: u64,
+        numbers: &mut Numbers,
+        begin: &mut impl FnMut(&Parcel) -> (Cut, Version),
+    ) -> Option<()> {
+        let parcel = self.parcels.get(&message)?;
+        if parcel.started.is_some() {
+            return Some(());
+        }
+        let (cut, version) = begin(parcel);
+        let count = cut.count();
+        let end = numbers.peek(count as u64) + count as u64;
+        if end - self.floor >= ROUND {
+            let under_way = self.parcels.values().filter_map(|p| p.started.as_ref());
+            self.floor = under_way.map(|s| s.first).min().unwrap_or(end);
+            if end.saturating_sub(self.floor) >= ROUND {
+                return None;
+            }
+        }
+        self.parcels.get_mut(&message)?.started = Some(Started {
+            cut,
+            version,
+            first: numbers.take(count),
+            next: 0,
+            missing: count,
+        });
+        Some(())
+    }
+
+    fn depart(&mut self, now: Instant, sequence: u16) {
+        self.order.push_back((self.sends, sequence));
+        self.sends += 1;
+        self.in_flight += 1;
+        self.armed.get_or_insert(now);
+    }
+
+    /// A packet was acknowledged.
+    pub(super) fn acknowledge(&mut self, now: Instant, source: JausId, sequence: u16) -> Progress {
+        let Some(message) = self.owner_of(source, sequence) else {
+            return Progress::Unawaited;
+        };
+        let Some(packet) = self.flight.remove(&sequence) else {
+            return Progress::Unawaited;
+        };
+        self.learn_from(now, &packet);
+        if !packet.lost {
+            self.in_flight -= 1;
+        }
+        self.newest = self.newest.max(packet.order);
+        self.find_lost(now);
+        self.armed = (self.in_flight > 0).then_some(now);
+        let Some(parcel) = self.parcels.get_mut(&message) else {
+            return Progress::Unawaited;
+        };
+        let Some(started) = &mut parcel.started else {
+            return Progress::Unawaited;
+        };
+        parcel.acknowledged += started.cut.range(packet.index).len();
+        started.missing -= 1;
+        if started.missing > 0 {
+            return Progress::Part;
+        }
+        Progress::Whole(message)
+    }
+
+    /// The message that a packet of `source` belongs to.
+    pub(super) fn owner_of(&self, source: JausId, sequence: u16) -> Option<u64> {
+        let message = self.flight.get(&sequence)?.message;
+        let parcel = self.parcels.get(&message)?;
+        (parcel.source == source).then_some(message)
+    }
+
+    fn learn_from(&mut self, now: Instant, packet: &Packet) {
+        self.heard = Some(now);
+        self.active = now;
+        self.silent = false;
+        let time = now.saturating_duration_since(packet.sent);
+        let shortest = self.round_trip.shortest().unwrap_or_default();
+        // Answered before the repetition can have been: the first copy had only been overtaken.
+        let needless = if packet.tries == 1 {
+            packet.lost
+        } else {
+            time * 2 < shortest
+        };
+        if needless {
+            self.tolerance = (self.tolerance * 2).min(TOLERANCE.1);
+        }
+        if packet.tries == 1 {
+            self.round_trip.measure(time);
+        }
+        self.window.grow(packet.order, self.in_flight);
+    }
+
+    /// Finds packets that others have overtaken by more than is tolerated.
+    fn find_lost(&mut self, now: Instant) {
+        while let Some(&(order, sequence)) = self.order.front() {
+            let is_current = |packet: &Packet| packet.order == order && !packet.lost;
+            if self.flight.get(&sequence).is_some_and(is_current) {
+                if order + self.tolerance > self.newest {
+                    return;
+                }
+                self.lose(now, sequence);
+                self.window.shrink(order, self.sends);
+            }
+            self.order.pop_front();
+        }
+    }
+
+    fn lose(&mut self, now: Instant, sequence: u16) {
+        let Some(packet) = self.flight.get_mut(&sequence) else {
+            return;
+        };
+        packet.lost = true;
+        self.in_flight -= 1;
+        self.lost[usize::from(packet.priority.bits())].push_back(sequence);
+        let long = now.saturating_duration_since(packet.first_sent) >= self.patience;
+        if long && packet.tries >= self.tries {
+            self.exhausted.push(packet.message);
+        }
+    }
+
+    /// When something is to be done though nothing is heard.
+    pub(super) fn deadline(&self) -> Option<Instant> {
+        [self.repetition(), self.end_of_patience()]
+            .into_iter()
+            .flatten()
+            .min()
+    }
+
+    /// When all that is on its way counts as lost.
+    fn repetition(&self) -> Option<Instant> {
+        let timeout = self.round_trip.timeout();
+        let timeout = if self.known {
+            timeout
+        } else {
+            timeout.min(SEEKING_TIMEOUT)
+        };
+        self.armed.map(|armed| armed + timeout)
+    }
+
+    /// When the message that was handed in first is given up, unless something is heard before.
+    fn end_of_patience(&self) -> Option<Instant> {
+        let (_, oldest) = self.parcels.first_key_value()?;
+        let patience = if self.silent {
+            self.patience / SILENT_PART
+        } else {
+            self.patience
+        };
+        let since = self
+            .heard
+            .map_or(oldest.accepted, |at| at.max(oldest.accepted));
+        Some(since + patience)
+    }
+
+    /// Takes everything for lost if nothing was acknowledged in time, and gives up what is
+    /// hopeless.
+    pub(super) fn handle_timeout(&mut self, now: Instant) -> Vec<(u64, Undelivered)> {
+        if self.repetition().is_some_and(|due| due <= now) {
+            self.armed = None;
+            self.round_trip.back_off();
+            self.window.collapse(self.sends);
+            while let Some((order, sequence)) = self.order.pop_front() {
+                let is_current = |packet: &Packet| packet.order == order && !packet.lost;
+                if self.flight.get(&sequence).is_some_and(is_current) {
+                    self.lose(now, sequence);
+                }
+            }
+        }
+        let mut given_up = self.take_exhausted();
+        let mut silent = self.silent;
+        while self.end_of_patience().is_some_and(|end| end <= now)
+            && let Some((&message, _)) = self.parcels.first_key_value()
+        {
+            silent = true;
+            given_up.extend(self.give_up(message, Unacknowledged::TimedOut));
+        }
+        self.silent = silent;
+        given_up
+    }
+
+    /// Gives up messages of which a packet was sent as often as is allowed.
+    pub(super) fn take_exhausted(&mut self) -> Vec<(u64, Undelivered)> {
+        std::mem::take(&mut self.exhausted)
+            .into_iter()
+            .filter_map(|message| self.give_up(message, Unacknowledged::TimedOut))
+            .collect()
+    }
+
+    /// Gives up a message, and tells what became of it.
+    pub(super) fn give_up(
+        &mut self,
+        message: u64,
+        reason: Unacknowledged,
+    ) -> Option<(u64, Undelivered)> {
+        let parcel = self.remove(message)?;
+        let reason = match (reason, &parcel.started) {
+            (Unacknowledged::TimedOut, None) => Unacknowledged::NotSent,
+            (reason, _) => reason,
+        };
+        let undelivered = Undelivered {
+            reason,
+            acknowledged: parcel.acknowledged,
+            length: parcel.payload.len(),
+        };
+        Some((message, undelivered))
+    }
+
+    /// Takes a message out, with what is on its way of it.
+    pub(super) fn remove(&mut self, message: u64) -> Option<Parcel> {
+        let parcel = self.parcels.remove(&message)?;
+        if let Some(started) = parcel
+            .started
+            .as_ref()
+            .filter(|started| started.missing > 0)
+        {
+            for index in 0..started.next {
+                let sequence = (started.first + index as u64) as u16;
+                let packet = self.flight.remove(&sequence);
+                self.in_flight -= usize::from(packet.is_some_and(|packet| !packet.lost));
+            }
+        }
+        if self.in_flight == 0 {
+            self.armed = None;
+        }
+        Some(parcel)
+    }
+
+    /// The messages of a component.
+    pub(super) fn messages_of(&self, source: JausId) -> Vec<u64> {
+        let theirs = |(_, parcel): &(&u64, &Parcel)| parcel.source == source;
+        self.parcels
+            .iter()
+            .filter(theirs)
+            .map(|(&message, _)| message)
+            .collect()
+    }
+}

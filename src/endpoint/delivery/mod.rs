@@ -1,0 +1,385 @@
+//! Reliable delivery: messages that want an acknowledgement, until they have it or are given up.
+//!
+//! Each destination has a [flow](flow) of its own with a sliding window, so that a destination that
+//! does not answer keeps nobody else waiting. A message is given up when nothing at all was
+//! acknowledged by its destination for [`Config::acknowledge_patience`] since it was handed in, or
+//! when one of its packets was sent for that long and [`Config::acknowledge_tries`] times. So an
+//! attempt on a peer that never acknowledges ends, for every message that waits, that long after it
+//! was handed in. The silence is remembered: until something is heard again, further messages get a
+//! sixth of the time.
+//!
+//! Frames are made when they are sent; a waiting message costs its own octets, which are shared.
+//!
+//! Two things to know about Junior as receiver: it forgets fragments beyond the latest 50 (or 100,
+//! as configured) though it has acknowledged them, so a message must not have more; and it reads ten
+//! datagrams a millisecond from a buffer of 70000 octets, which the window finds out by loss.
+
+mod flow;
+mod round_trip;
+mod window;
+
+use std::collections::{BTreeSet, HashMap, VecDeque};
+use std::time::{Duration, Instant};
+
+use tracing::debug;
+
+use super::large::Cut;
+use super::{
+    Config, Counter, Endpoint, Event, MessageHandle, Outgoing, SendError, Transmit, Unacknowledged,
+};
+use crate::address::JausId;
+use crate::wire::{Acknowledgement, Broadcast, Frame, Priority, Version};
+use flow::{Flow, Parcel, Progress};
+
+/// How it goes with the messages to one destination that want an acknowledgement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FlowStatus {
+    /// The smoothed round trip; `None` before the first measurement.
+    pub round_trip: Option<Duration>,
+    /// How many packets may be on their way at a time.
+    pub window: usize,
+    /// How many are.
+    pub in_flight: usize,
+    /// Messages that wait or are on their way.
+    pub messages: usize,
+}
+
+/// What became of a message that was given up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Undelivered {
+    reason: Unacknowledged,
+    acknowledged: usize,
+    length: usize,
+}
+
+/// All flows, and which of them have something to send.
+#[derive(Debug)]
+pub(super) struct Deliveries {
+    flows: HashMap<JausId, Flow>,
+    /// Flows that may have something to send, by its priority, in turn.
+    ready: [VecDeque<JausId>; Priority::ALL.len()],
+    /// When to look at a flow at the latest; one entry each at the most.
+    timers: BTreeSet<(Instant, JausId)>,
+    timer_of: HashMap<JausId, Instant>,
+    handed_in: u64,
+    messages: usize,
+    octets: usize,
+    config: Config,
+}
+
+impl Deliveries {
+    pub(super) fn new(config: &Config) -> Self {
+        Self {
+            flows: HashMap::new(),
+            ready: Default::default(),
+            timers: BTreeSet::new(),
+            timer_of: HashMap::new(),
+            handed_in: 0,
+            messages: 0,
+            octets: 0,
+            config: config.clone(),
+        }
+    }
+
+    /// A handle for the next message.
+    pub(super) fn next_handle(&mut self) -> MessageHandle {
+        self.handed_in += 1;
+        MessageHandle(self.handed_in)
+    }
+
+    /// Checks whether one more message can be taken in, while `untold` results were not polled.
+    pub(super) fn check_room(&self, untold: usize, length: usize) -> Result<(), SendError> {
+        let limit = self.config.max_unacknowledged;
+        if self.messages + untold >= limit {
+            return Err(SendError::TooManyUnacknowledged { limit });
+        }
+        let limit = self.config.max_unacknowledged_octets;
+        if self.octets > 0 && self.octets + length > limit {
+            return Err(SendError::TooMuchUnacknowledged { limit });
+        }
+        Ok(())
+    }
+
+    fn push(
+        &mut self,
+        now: Instant,
+        destination: JausId,
+        handle: MessageHandle,
+        parcel: Parcel,
+    ) -> Result<(), SendError> {
+        if !self.flows.contains_key(&destination) && !self.make_room(now) {
+            let limit = self.config.max_flows;
+            return Err(SendError::TooManyDestinations { limit });
+        }
+        self.messages += 1;
+        self.octets += parcel.payload.len();
+        let flow = self
+            .flows
+            .entry(destination)
+            .or_insert_with(|| Flow::new(now, &self.config));
+        flow.push(now, handle.0, parcel);
+        self.touch(destination);
+        Ok(())
+    }
+
+    /// Makes room for one more flow, by forgetting the one that has been idle for longest.
+    fn make_room(&mut self, now: Instant) -> bool {
+        if self.flows.len() < self.config.max_flows.max(1) {
+            return true;
+        }
+        let idle = self.flows.iter().filter(|(_, flow)| flow.is_idle());
+        let oldest = idle.min_by_key(|(_, flow)| flow.active().min(now));
+        let Some((&destination, _)) = oldest else {
+            return false;
+        };
+        self.flows.remove(&destination);
+        true
+    }
+
+    /// Sees to it that a flow in which something has changed has its turn and its timer.
+    fn touch(&mut self, destination: JausId) {
+        let Some(flow) = self.flows.get_mut(&destination) else {
+            return;
+        };
+        if let Some(priority) = flow.wants() {
+            let level = usize::from(priority.bits());
+            if !flow.listed[level] {
+                flow.listed[level] = true;
+                self.ready[level].push_back(destination);
+            }
+        }
+        let deadline = flow.deadline();
+        match (self.timer_of.get(&destination).copied(), deadline) {
+            // A timer that is early is harmless, and moving it for each answer is not.
+            (Some(set), Some(deadline)) if set <= deadline => {}
+            (set, deadline) => {
+                if let Some(set) = set {
+                    self.timers.remove(&(set, destination));
+                    self.timer_of.remove(&destination);
+                }
+                if let Some(deadline) = deadline {
+                    self.timers.insert((deadline, destination));
+                    self.timer_of.insert(destination, deadline);
+                }
+            }
+        }
+    }
+
+    /// The next flow whose turn it is at this priority.
+    fn next_ready(&mut self, priority: Priority) -> Option<JausId> {
+        let level = usize::from(priority.bits());
+        loop {
+            let destination = self.ready[level].pop_front()?;
+            let Some(flow) = self.flows.get_mut(&destination) else {
+                continue;
+            };
+            flow.listed[level] = false;
+            if flow.wants() == Some(priority) {
+                return Some(destination);
+            }
+            self.touch(destination);
+        }
+    }
+
+    fn take_due(&mut self, now: Instant) -> Option<JausId> {
+        let &(deadline, destination) = self.timers.first()?;
+        if deadline > now {
+            return None;
+        }
+        self.timers.pop_first();
+        self.timer_of.remove(&destination);
+        Some(destination)
+    }
+
+    pub(super) fn next_deadline(&self) -> Option<Instant> {
+        self.timers.first().map(|&(deadline, _)| deadline)
+    }
+
+    fn settle(&mut self, length: usize) {
+        self.messages -= 1;
+        self.octets -= length;
+    }
+
+    /// Forgets the messages of a component that has gone.
+    pub(super) fn forget_source(&mut self, source: JausId) {
+        let destinations: Vec<_> = self.flows.keys().copied().collect();
+        for destination in destinations {
+            let Some(flow) = self.flows.get_mut(&destination) else {
+                continue;
+            };
+            let gone: Vec<_> = flow
+                .messages_of(source)
+                .into_iter()
+                .filter_map(|message| flow.remove(message))
+                .map(|parcel| parcel.payload.len())
+                .collect();
+            gone.into_iter().for_each(|length| self.settle(length));
+            self.touch(destination);
+        }
+    }
+}
+
+impl Endpoint {
+    /// How it goes with the messages to `destination` that want an acknowledgement; `None` if there
+    /// were none lately.
+    #[must_use]
+    pub fn flow(&self, destination: JausId) -> Option<FlowStatus> {
+        self.deliveries.flows.get(&destination).map(Flow::status)
+    }
+
+    /// Takes in a message that wants an acknowledgement.
+    pub(super) fn deliver_reliably(
+        &mut self,
+        now: Instant,
+        handle: MessageHandle,
+        message: &Outgoing,
+        scope: Broadcast,
+    ) -> Result<(), SendError> {
+        self.deliveries
+            .check_room(self.untold, message.payload.len())?;
+        let parcel = Parcel::new(
+            now,
+            message.source,
+            message.priority,
+            scope,
+            message.payload.clone(),
+        );
+        self.deliveries
+            .push(now, message.destination, handle, parcel)
+    }
+
+    /// The next packet of a message that wants an acknowledgement, if one of this priority may be
+    /// sent.
+    pub(super) fn next_delivery(&mut self, priority: Priority) -> Option<Transmit> {
+        let now = self.latest?;
+        while let Some(destination) = self.deliveries.next_ready(priority) {
+            let transmits = self.next_packet(now, destination, priority);
+            self.deliveries.touch(destination);
+            let mut transmits = transmits.into_iter();
+            if let Some(first) = transmits.next() {
+                transmits.for_each(|other| {
+                    self.transmit(other);
+                });
+                return Some(first);
+            }
+        }
+        None
+    }
+
+    fn next_packet(
+        &mut self,
+        now: Instant,
+        destination: JausId,
+        priority: Priority,
+    ) -> Vec<Transmit> {
+        let route = self.route(destination);
+        let version = route.map_or(Version::As5669a, |(_, version)| version);
+        let limit = self.config.payload_limit;
+        let Some(flow) = self.deliveries.flows.get_mut(&destination) else {
+            return Vec::new();
+        };
+        flow.known = route.is_some();
+        let cut = |parcel: &Parcel| {
+            let repeat = version != Version::As5669a;
+            (Cut::new(parcel.payload.len(), limit, repeat), version)
+        };
+        let Some((frame, tries)) = flow.take(now, priority, &mut self.numbers, cut) else {
+            return Vec::new();
+        };
+        if tries > 1 {
+            self.counters.add(Counter::Retransmissions);
+        }
+        let frame = Frame {
+            destination,
+            ..frame
+        };
+        match self.transmits_of(&frame) {
+            Ok(transmits) => self.remember_echo(now, &frame, transmits),
+            Err(error) => {
+                debug!(%destination, %error, "cannot be sent");
+                Vec::new()
+            }
+        }
+    }
+
+    /// Takes the answer to a message of ours.
+    pub(super) fn receive_answer(&mut self, now: Instant, frame: &Frame) -> Result<(), Counter> {
+        self.latest = Some(now);
+        let (destination, source) = (frame.source, frame.destination);
+        let flow = self
+            .deliveries
+            .flows
+            .get_mut(&destination)
+            .ok_or(Counter::UnawaitedAcknowledgement)?;
+        flow.known = true;
+        if frame.flags.acknowledgement() == Acknowledgement::Negative {
+            let message = flow
+                .owner_of(source, frame.sequence)
+                .ok_or(Counter::UnawaitedAcknowledgement)?;
+            let refused = flow.give_up(message, Unacknowledged::Refused);
+            self.tell_undelivered(destination, refused);
+        } else {
+            match flow.acknowledge(now, source, frame.sequence) {
+                Progress::Unawaited => return Err(Counter::UnawaitedAcknowledgement),
+                Progress::Part => {}
+                Progress::Whole(message) => self.tell_delivered(destination, message),
+            }
+            let exhausted = self
+                .deliveries
+                .flows
+                .get_mut(&destination)
+                .map(Flow::take_exhausted);
+            self.tell_undelivered(destination, exhausted.into_iter().flatten());
+        }
+        self.deliveries.touch(destination);
+        Ok(())
+    }
+
+    fn tell_delivered(&mut self, by: JausId, message: u64) {
+        let parcel = self
+            .deliveries
+            .flows
+            .get_mut(&by)
+            .and_then(|flow| flow.remove(message));
+        if let Some(parcel) = parcel {
+            self.deliveries.settle(parcel.payload.len());
+            let message = MessageHandle(message);
+            self.tell_result(Event::Acknowledged { message, by });
+        }
+    }
+
+    fn tell_undelivered(
+        &mut self,
+        destination: JausId,
+        messages: impl IntoIterator<Item = (u64, Undelivered)>,
+    ) {
+        for (message, undelivered) in messages {
+            let Undelivered {
+                reason,
+                acknowledged,
+                length,
+            } = undelivered;
+            self.deliveries.settle(length);
+            self.counters.add(Counter::MessagesGivenUp);
+            self.tell_result(Event::NotAcknowledged {
+                message: MessageHandle(message),
+                destination,
+                reason,
+                acknowledged,
+                length,
+            });
+        }
+    }
+
+    /// Sends again what was not acknowledged in time, or gives up.
+    pub(super) fn retry_unacknowledged(&mut self, now: Instant) {
+        while let Some(destination) = self.deliveries.take_due(now) {
+            let Some(flow) = self.deliveries.flows.get_mut(&destination) else {
+                continue;
+            };
+            let given_up = flow.handle_timeout(now);
+            self.tell_undelivered(destination, given_up);
+            self.deliveries.touch(destination);
+        }
+    }
+}

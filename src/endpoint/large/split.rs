@@ -1,0 +1,178 @@
+//! Cutting a message into fragments, and numbering them.
+
+use bytes::{BufMut, Bytes, BytesMut};
+
+use crate::wire::{DataControl, ra};
+
+/// The most fragments of a message: sequence numbers are 16 bits wide and 0 is left out.
+const MOST: usize = u16::MAX as usize;
+
+/// How a message is cut: which of its octets go into which fragment. Costs nothing to keep; the
+/// fragments are made one by one, when they are sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::endpoint) struct Cut {
+    length: usize,
+    /// Octets of the message that the first fragment holds.
+    first: usize,
+    /// Octets of the message that each other fragment holds, but for the last.
+    part: usize,
+    /// Octets of the message's beginning that each other fragment repeats.
+    repeated: usize,
+}
+
+impl Cut {
+    /// A message of `length` octets in payloads of at most `limit`; the code is in the first only
+    /// or, with `repeat_code`, in each. Fragments are longer than `limit` if there would be more
+    /// than there are numbers.
+    pub(in crate::endpoint) fn new(length: usize, limit: usize, repeat_code: bool) -> Self {
+        let repeated = if repeat_code { ra::CODE_LEN } else { 0 };
+        let first = limit
+            .max(repeated + 1)
+            .max(length.div_ceil(MOST) + repeated);
+        Self {
+            length,
+            first,
+            part: first - repeated,
+            repeated,
+        }
+    }
+
+    /// The longest message that can be cut into payloads of `limit` octets.
+    pub(in crate::endpoint) fn longest(limit: usize, repeat_code: bool) -> usize {
+        let repeated = if repeat_code { ra::CODE_LEN } else { 0 };
+        limit.saturating_sub(repeated).saturating_mul(MOST)
+    }
+
+    /// The number of fragments; 1 for a message that is not cut.
+    pub(in crate::endpoint) fn count(&self) -> usize {
+        1 + self
+            .length
+            .saturating_sub(self.first)
+            .div_ceil(self.part.max(1))
+    }
+
+    /// The octets of the message that the fragment holds.
+    pub(in crate::endpoint) fn range(&self, index: usize) -> std::ops::Range<usize> {
+        let start = match index {
+            0 => 0,
+            _ => self.first + (index - 1) * self.part,
+        };
+        let end = self.first + index * self.part;
+        start.min(self.length)..end.min(self.length)
+    }
+
+    /// The data control and payload of the fragment.
+    pub(in crate::endpoint) fn fragment(
+        &self,
+        message: &Bytes,
+        index: usize,
+    ) -> (DataControl, Bytes) {
+        let data = match (index, self.count()) {
+            (_, 1) => DataControl::Single,
+            (0, _) => DataControl::First,
+            (index, count) if index + 1 == count => DataControl::Last,
+            _ => DataControl::Middle,
+        };
+        let range = self.range(index);
+        if index == 0 || self.repeated == 0 {
+            return (data, message.slice(range));
+        }
+        let mut payload = BytesMut::with_capacity(self.repeated + range.len());
+        payload.put_slice(message.get(..self.repeated).unwrap_or_default());
+        payload.put_slice(message.get(range).unwrap_or_default());
+        (data, payload.freeze())
+    }
+}
+
+/// The sequence numbers of an endpoint.
+///
+/// One counter serves all destinations and all components: Junior tells duplicates by source and
+/// number alone, so that a broadcast and a message to it must not share a number. The numbers
+/// neither hold 0, which JAUS++ refuses in fragments, nor go round within a message, which it does
+/// not follow.
+///
+/// A *serial* number is a sequence number that does not go round: its lower 16 bits go out.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::endpoint) struct Numbers {
+    last: u64,
+}
+
+impl Numbers {
+    /// Numbers that begin behind `last`.
+    pub(in crate::endpoint) fn after(last: u16) -> Self {
+        Self { last: last.into() }
+    }
+
+    /// The first of `count` consecutive numbers, 1 to 65535 of them, which are then taken.
+    pub(in crate::endpoint) fn take(&mut self, count: usize) -> u64 {
+        let count = count as u64;
+        let first = self.peek(count);
+        self.last = first + count - 1;
+        first
+    }
+
+    /// What [`take`](Self::take) would give.
+    pub(in crate::endpoint) fn peek(&self, count: u64) -> u64 {
+        const ROUND: u64 = 1 << 16;
+        if self.last % ROUND + count < ROUND {
+            self.last + 1
+        } else {
+            (self.last / ROUND + 1) * ROUND + 1
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fragments_hold_the_message_and_know_their_place() {
+        let message: Bytes = (0..=250).collect();
+        for (limit, repeat) in [
+            (64, false),
+            (64, true),
+            (83, true),
+            (251, true),
+            (249, true),
+        ] {
+            let cut = Cut::new(message.len(), limit, repeat);
+            let mut joined = Vec::new();
+            for index in 0..cut.count() {
+                let (data, payload) = cut.fragment(&message, index);
+                assert!(payload.len() <= limit);
+                assert!(!payload.is_empty());
+                let expected = match index {
+                    0 if cut.count() == 1 => DataControl::Single,
+                    0 => DataControl::First,
+                    _ if index + 1 == cut.count() => DataControl::Last,
+                    _ => DataControl::Middle,
+                };
+                assert_eq!(data, expected);
+                let skip = if repeat && index > 0 { 2 } else { 0 };
+                assert!(payload.starts_with(&message[..skip]));
+                joined.extend_from_slice(&payload[skip..]);
+                assert_eq!(cut.range(index).len(), payload.len() - skip);
+            }
+            assert_eq!(joined, message, "{limit} {repeat}");
+        }
+        assert_eq!(Cut::new(128, 64, false).count(), 2);
+        assert_eq!(Cut::new(1, 64, false).count(), 1);
+        assert_eq!(
+            Cut::new(1 << 24, 64, true).count(),
+            65_281,
+            "longer fragments rather than more than there are numbers"
+        );
+    }
+
+    #[test]
+    fn numbers_leave_out_zero_and_do_not_go_round_within_a_message() {
+        let mut numbers = Numbers::after(65_532);
+        let taken: Vec<u16> = [1, 2, 1, 65_534, 2]
+            .map(|count| numbers.take(count) as u16)
+            .into();
+        assert_eq!(taken, [65_533, 65_534, 1, 2, 1]);
+        assert_eq!(Numbers::after(0).take(65_535) as u16, 1);
+        assert_eq!(Numbers::after(1).take(65_535) as u16, 1);
+    }
+}

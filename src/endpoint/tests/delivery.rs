@@ -1,0 +1,231 @@
+//! Messages that want an acknowledgement, over wires of all kinds.
+
+use super::wire::{Conditions, Wire, large, reliable};
+use super::*;
+
+const MINUTE: Duration = Duration::from_secs(60);
+
+#[test]
+fn a_large_message_arrives_whole_over_a_good_wire_without_repetitions() {
+    let mut wire = Wire::new(1, Conditions::default());
+    let payload = large(1 << 20);
+    let message = wire.send(reliable(payload.clone()));
+    let took = wire.run_for(MINUTE);
+    assert_eq!(wire.delivered(), [payload]);
+    assert_eq!(wire.results(), [Event::Acknowledged { message, by: PEER }]);
+    assert_eq!(wire.ends[0].counters().get(Counter::Retransmissions), 0);
+    assert!(
+        took < Duration::from_millis(20),
+        "736 packets in windows of up to 512: {took:?}"
+    );
+}
+
+#[test]
+fn a_large_message_arrives_whole_over_a_wire_that_loses_and_reorders() {
+    for seed in 0..20 {
+        let conditions = Conditions {
+            loss: 50,
+            jitter: Duration::from_millis(1),
+            ..Conditions::default()
+        };
+        let mut wire = Wire::new(seed, conditions);
+        let payload = large(300_000);
+        let message = wire.send(reliable(payload.clone()));
+        wire.run_for(MINUTE);
+        assert!(wire.delivered() == [payload], "seed {seed}");
+        let told = Event::Acknowledged { message, by: PEER };
+        assert_eq!(wire.results(), [told], "seed {seed}");
+    }
+}
+
+#[test]
+fn the_window_finds_out_what_the_receiver_can_take() {
+    let conditions = Conditions {
+        room: 20,
+        ..Conditions::default()
+    };
+    let mut wire = Wire::new(1, conditions);
+    let payload = large(1 << 20);
+    wire.send(reliable(payload.clone()));
+    wire.run_for(MINUTE);
+    assert!(wire.delivered() == [payload]);
+    let repeated = wire.ends[0].counters().get(Counter::Retransmissions);
+    assert!(repeated < 736 / 5, "{repeated} of 736 packets sent again");
+}
+
+#[test]
+fn packets_that_overtake_one_another_are_not_taken_for_lost_for_long() {
+    let conditions = Conditions {
+        jitter: Duration::from_millis(1),
+        ..Conditions::default()
+    };
+    let mut wire = Wire::new(3, conditions);
+    let payload = large(4 << 20);
+    wire.send(reliable(payload.clone()));
+    wire.run_for(MINUTE);
+    assert!(wire.delivered() == [payload]);
+    let repeated = wire.ends[0].counters().get(Counter::Retransmissions);
+    assert!(
+        repeated < 2944 / 10,
+        "{repeated} of 2944 packets sent again"
+    );
+}
+
+#[test]
+fn of_a_large_message_to_an_unknown_address_only_the_first_packet_goes_to_everybody() {
+    let mut rig = Rig::new();
+    rig.send(reliable(large(1 << 20))).unwrap();
+    let sent = rig.sent();
+    assert_eq!((sent.len(), sent[0].0), (1, To::Group));
+    let first = &sent[0].1;
+    let flags = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    rig.hear(&Frame {
+        flags,
+        sequence: first.sequence,
+        ..from_peer(b"")
+    });
+    let sent = rig.sent();
+    let initial = Config::default().initial_window;
+    assert!(sent.len() >= initial, "{} packets", sent.len());
+    let to = To::Peer(path(PEER_HOST).peer);
+    assert!(sent.iter().all(|(address, _)| *address == to));
+}
+
+#[test]
+fn what_is_urgent_does_not_wait_for_what_is_not() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    rig.send(Outgoing {
+        priority: Priority::Low,
+        ..reliable(large(16 << 20))
+    })
+    .unwrap();
+    assert_eq!(rig.sent().len(), Config::default().initial_window);
+    let stop = Outgoing {
+        priority: Priority::SafetyCritical,
+        ..reliable(Bytes::from_static(QUERY_IDENTIFICATION))
+    };
+    rig.send(stop).unwrap();
+    let sent = rig.sent();
+    assert_eq!(sent.len(), 1, "though the window is full");
+    assert_eq!(sent[0].1.flags.priority(), Priority::SafetyCritical);
+}
+
+#[test]
+fn a_peer_that_never_acknowledges_ends_every_attempt_in_time_and_holds_up_nobody_else() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    let other = id("42.1.2");
+    rig.hear_from(
+        9,
+        &Frame {
+            source: other,
+            ..from_peer(QUERY_HEARTBEAT)
+        },
+    );
+    rig.events();
+    let begin = rig.now;
+    for _message in 0..100 {
+        rig.send(reliable(Bytes::from_static(QUERY_HEARTBEAT)))
+            .unwrap();
+    }
+    rig.send(reliable(large(1 << 20))).unwrap();
+    rig.transmits();
+    rig.send(Outgoing {
+        destination: other,
+        ..reliable(Bytes::from_static(QUERY_HEARTBEAT))
+    })
+    .unwrap();
+    assert_eq!(rig.transmits().len(), 1, "at once");
+    let flags = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    rig.hear_from(
+        9,
+        &Frame {
+            source: other,
+            flags,
+            sequence: 17,
+            ..from_peer(b"")
+        },
+    );
+    assert_eq!(rig.events().len(), 1);
+    let mut reasons = Vec::new();
+    while let Some(timeout) = rig.endpoint.poll_timeout() {
+        rig.pass(timeout - rig.now);
+        rig.transmits();
+        reasons.extend(rig.events().into_iter().map(|event| match event {
+            Event::NotAcknowledged { reason, .. } => reason,
+            event => panic!("{event:?}"),
+        }));
+    }
+    assert_eq!(rig.now - begin, Config::default().acknowledge_patience);
+    let never_sent = |reason: &&Unacknowledged| **reason == Unacknowledged::NotSent;
+    assert_eq!(reasons.len(), 101);
+    assert_eq!(reasons.iter().filter(never_sent).count(), 101 - 16);
+
+    // The silence is remembered.
+    let begin = rig.now;
+    rig.send(reliable(Bytes::from_static(QUERY_HEARTBEAT)))
+        .unwrap();
+    let mut tries = rig.transmits().len();
+    while let Some(timeout) = rig.endpoint.poll_timeout() {
+        rig.pass(timeout - rig.now);
+        tries += rig.transmits().len();
+    }
+    assert_eq!((rig.now - begin, tries), (Duration::from_millis(500), 3));
+}
+
+#[test]
+fn sixteen_mebibytes_are_sent_and_more_is_refused_while_they_wait() {
+    let config = Config {
+        max_unacknowledged_octets: 20 << 20,
+        ..Config::default()
+    };
+    let mut wire = Wire::with(1, Conditions::default(), &config);
+    let payload = large(16 << 20);
+    wire.send(reliable(payload.clone()));
+    assert_eq!(
+        wire.ends[0].send(wire.now, reliable(large(5 << 20))),
+        Err(SendError::TooMuchUnacknowledged { limit: 20 << 20 })
+    );
+    wire.run_for(MINUTE);
+    assert!(wire.delivered() == [payload]);
+    let status = wire.ends[0].flow(PEER).unwrap();
+    assert_eq!((status.in_flight, status.messages), (0, 0));
+    assert_eq!(status.round_trip, Some(Duration::from_millis(1)));
+}
+
+#[test]
+fn a_packet_that_never_gets_through_ends_its_message_though_others_do() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    let payload = large(1425 * 3);
+    rig.send(reliable(payload)).unwrap();
+    let hopeless = rig.sent()[1].1.sequence;
+    let flags = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    let begin = rig.now;
+    let results = loop {
+        rig.send(reliable(Bytes::from_static(QUERY_HEARTBEAT)))
+            .unwrap();
+        rig.pass(Duration::from_millis(20));
+        for (_, frame) in rig.sent() {
+            if frame.sequence != hopeless {
+                rig.hear(&Frame {
+                    flags,
+                    sequence: frame.sequence,
+                    ..from_peer(b"")
+                });
+            }
+        }
+        let failed = |event: &Event| matches!(event, Event::NotAcknowledged { .. });
+        let results: Vec<_> = rig.events().into_iter().filter(failed).collect();
+        if !results.is_empty() {
+            break results;
+        }
+        assert!(rig.now - begin < MINUTE, "it ends");
+    };
+    assert!(rig.now - begin >= Config::default().acknowledge_patience);
+    let [Event::NotAcknowledged { reason, .. }] = results[..] else {
+        panic!("{results:?}")
+    };
+    assert_eq!(reason, Unacknowledged::TimedOut);
+}

@@ -1,0 +1,189 @@
+//! Two endpoints and a wire between them, with delay, loss and a bottleneck, in virtual time.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::*;
+
+/// What happens to datagrams on the way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Conditions {
+    pub(super) delay: Duration,
+    /// Each datagram takes up to so much longer, by chance; so they overtake one another.
+    pub(super) jitter: Duration,
+    /// Datagrams lost, of 1000.
+    pub(super) loss: u64,
+    /// The most datagrams that may be under way in one direction; what is more is lost.
+    pub(super) room: usize,
+}
+
+impl Default for Conditions {
+    fn default() -> Self {
+        Self {
+            delay: Duration::from_micros(500),
+            jitter: Duration::ZERO,
+            loss: 0,
+            room: usize::MAX,
+        }
+    }
+}
+
+/// When, the how-manieth, at which end, and the octets.
+type Arrival = (Instant, u64, usize, Vec<u8>);
+
+/// [`US`] at one end, [`PEER`] at the other.
+pub(super) struct Wire {
+    pub(super) ends: [Endpoint; 2],
+    pub(super) now: Instant,
+    pub(super) conditions: Conditions,
+    chance: u64,
+    sent: u64,
+    under_way: BinaryHeap<Reverse<Arrival>>,
+    /// What was told at either end.
+    pub(super) told: [Vec<Event>; 2],
+    /// How many datagrams each end has sent.
+    pub(super) datagrams: [usize; 2],
+}
+
+impl Wire {
+    pub(super) fn new(seed: u64, conditions: Conditions) -> Self {
+        Self::with(seed, conditions, &Config::default())
+    }
+
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "an arbitrary beginning of virtual time"
+    )]
+    pub(super) fn with(seed: u64, conditions: Conditions, config: &Config) -> Self {
+        let end = |host, id| {
+            let mut endpoint = Endpoint::new(config.clone());
+            endpoint.add_link(WIRE, LinkProfile::judp(path(host).peer.socket()));
+            endpoint.attach(id).unwrap();
+            endpoint
+        };
+        Self {
+            ends: [end(OUR_HOST, US), end(PEER_HOST, PEER)],
+            now: Instant::now(),
+            conditions,
+            chance: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1,
+            sent: 0,
+            under_way: BinaryHeap::new(),
+            told: [Vec::new(), Vec::new()],
+            datagrams: [0, 0],
+        }
+    }
+
+    /// A number below `limit`, by chance.
+    fn draw(&mut self, limit: u64) -> u64 {
+        self.chance ^= self.chance << 13;
+        self.chance ^= self.chance >> 7;
+        self.chance ^= self.chance << 17;
+        self.chance % limit.max(1)
+    }
+
+    pub(super) fn send(&mut self, message: Outgoing) -> MessageHandle {
+        let message = self.ends[0].send(self.now, message).unwrap();
+        self.carry();
+        message
+    }
+
+    /// Takes what the ends want to send.
+    fn carry(&mut self) {
+        for end in 0..2 {
+            while let Some(transmit) = self.ends[end].poll_transmit() {
+                let length = transmit.segment.unwrap_or(transmit.payload.len());
+                for datagram in transmit.payload.chunks(length) {
+                    self.put_on(end, datagram);
+                }
+            }
+            while let Some(event) = self.ends[end].poll_event() {
+                self.told[end].push(event);
+            }
+        }
+    }
+
+    fn put_on(&mut self, from: usize, datagram: &[u8]) {
+        self.datagrams[from] += 1;
+        let to = 1 - from;
+        let ahead = self.under_way.iter().filter(|entry| entry.0.2 == to);
+        let full = ahead.count() >= self.conditions.room;
+        if full || self.draw(1000) < self.conditions.loss {
+            return;
+        }
+        let jitter = self.draw(1 + self.conditions.jitter.as_micros() as u64);
+        let at = self.now + self.conditions.delay + Duration::from_micros(jitter);
+        self.sent += 1;
+        let entry = (at, self.sent, to, datagram.to_vec());
+        self.under_way.push(Reverse(entry));
+    }
+
+    /// Goes on to the next thing that happens; whether there was one before `end`.
+    fn step(&mut self, end: Instant) -> bool {
+        let arrival = self.under_way.peek().map(|entry| entry.0.0);
+        let timeouts = self.ends.iter().filter_map(Endpoint::poll_timeout);
+        let Some(next) = timeouts.chain(arrival).min().filter(|&next| next <= end) else {
+            return false;
+        };
+        self.now = self.now.max(next);
+        while let Some(Reverse((at, ..))) = self.under_way.peek()
+            && *at <= self.now
+            && let Some(Reverse((_, _, to, datagram))) = self.under_way.pop()
+        {
+            let from = path([PEER_HOST, OUR_HOST][to]);
+            self.ends[to].handle_datagram(self.now, from, datagram.into());
+        }
+        for end in &mut self.ends {
+            if end.poll_timeout().is_some_and(|at| at <= self.now) {
+                end.handle_timeout(self.now);
+            }
+        }
+        self.carry();
+        true
+    }
+
+    /// Lets time pass until nothing more happens, or as much as is given; how much passed.
+    pub(super) fn run_for(&mut self, time: Duration) -> Duration {
+        let (begin, end) = (self.now, self.now + time);
+        while self.step(end) {}
+        self.now - begin
+    }
+
+    /// The payloads that were delivered at the other end.
+    pub(super) fn delivered(&mut self) -> Vec<Bytes> {
+        let payload = |event| match event {
+            Event::Received(received) => Some(received.payload),
+            _ => None,
+        };
+        self.told[1].drain(..).filter_map(payload).collect()
+    }
+
+    /// What was told about messages at our end.
+    pub(super) fn results(&mut self) -> Vec<Event> {
+        let is_result = |event: &Event| {
+            matches!(
+                event,
+                Event::Acknowledged { .. } | Event::NotAcknowledged { .. }
+            )
+        };
+        self.told[0].drain(..).filter(is_result).collect()
+    }
+}
+
+/// A message of so many octets that no part of is like another.
+pub(super) fn large(length: usize) -> Bytes {
+    let octets = (0..length as u64).map(|index| (index.wrapping_mul(0x9E37_79B9) >> 13) as u8);
+    [0x01, 0x4B]
+        .into_iter()
+        .chain(octets)
+        .take(length)
+        .collect()
+}
+
+/// A message to [`PEER`] that wants an acknowledgement.
+pub(super) fn reliable(payload: Bytes) -> Outgoing {
+    Outgoing {
+        acknowledge: true,
+        payload,
+        ..to_peer()
+    }
+}
