@@ -19,6 +19,18 @@ pub enum SendError {
     Node(#[from] node::SendError),
 }
 
+/// Why it is not known that a message has arrived.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DeliverError {
+    /// The wire cannot carry it.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// It was not sent, or not acknowledged.
+    #[error(transparent)]
+    Undelivered(#[from] node::Undelivered),
+}
+
 /// Why a query has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]

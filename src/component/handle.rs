@@ -7,7 +7,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 
 use super::driver::{Answer, Command};
 use super::watch::Outlet;
-use super::{Builder, FindError, Messages, QueryError, SendError, Watch};
+use super::{Builder, DeliverError, FindError, Messages, QueryError, SendError, Watch};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
@@ -87,6 +87,21 @@ impl Component {
         let outgoing = crate::endpoint::Outgoing::new(self.id(), destination, payload);
         self.shared.sender.send(outgoing)?;
         Ok(())
+    }
+
+    /// Sends a message, again and again if need be, and waits until the receiver acknowledges it.
+    /// Dropping the future forgets the message, which may still arrive.
+    ///
+    /// # Errors
+    /// [`DeliverError`] says why it is not known to have arrived.
+    pub async fn deliver<M: Message>(
+        &self,
+        destination: JausId,
+        message: &M,
+    ) -> Result<(), DeliverError> {
+        let payload = message.encode()?;
+        let outgoing = crate::endpoint::Outgoing::new(self.id(), destination, payload);
+        Ok(self.shared.sender.deliver(outgoing).await?)
     }
 
     /// Asks a component, and waits for its answer; asks again if none comes.

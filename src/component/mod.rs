@@ -48,6 +48,6 @@ pub use crate::service::{
     Scope, Service, Timing,
 };
 pub use builder::{AttachError, Builder};
-pub use error::{FindError, QueryError, SendError};
+pub use error::{DeliverError, FindError, QueryError, SendError};
 pub use handle::Component;
 pub use watch::{Messages, Watch};

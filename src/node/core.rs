@@ -30,7 +30,7 @@ const BATCH: usize = 32;
 /// Node events kept for a slow listener.
 const EVENTS: usize = 256;
 /// How long a node that shuts down tries to send what waits.
-const LAST_WORDS: Duration = Duration::from_millis(250);
+pub(super) const LAST_WORDS: Duration = Duration::from_millis(250);
 
 /// The node's clock. Tokio's, so that a paused test clock holds for timers and endpoint alike.
 #[expect(
@@ -46,6 +46,8 @@ pub(super) fn now() -> Instant {
 pub(super) struct Shared {
     core: Mutex<Core>,
     pub(super) stopped: watch::Sender<bool>,
+    /// Whether no component process can come in (any more).
+    pub(super) closed: watch::Sender<bool>,
 }
 
 impl Shared {
@@ -55,6 +57,7 @@ impl Shared {
         Self {
             core: Mutex::new(core),
             stopped: watch::Sender::new(false),
+            closed: watch::Sender::new(true),
         }
     }
 
@@ -179,13 +182,15 @@ impl Core {
         message: Outgoing,
         waiter: Option<Waiter>,
     ) -> Result<MessageHandle, SendError> {
-        let source = message.source;
+        let (source, deadline) = (message.source, self.deadline());
         let result = self.endpoint.send(now(), message);
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
             self.awaiting.insert(*handle, source, waiter);
         }
-        self.pump();
-        self.wake_driver();
+        // What stays among the node's components is none of the driver's business.
+        if self.pump() || self.deadline() != deadline {
+            self.wake_driver();
+        }
         Ok(result?)
     }
 
@@ -232,9 +237,12 @@ impl Core {
     }
 
     /// Hands on what the endpoint has to say: datagrams to links, messages to mailboxes.
-    fn pump(&mut self) {
+    /// Says whether anything went to a link.
+    fn pump(&mut self) -> bool {
+        let mut transmitted = false;
         while let Some(transmit) = self.endpoint.poll_transmit() {
             self.transmit(&transmit);
+            transmitted = true;
         }
         while let Some(event) = self.endpoint.poll_event() {
             match event {
@@ -245,6 +253,7 @@ impl Core {
                 }
             }
         }
+        transmitted
     }
 
     fn transmit(&mut self, transmit: &Transmit) {

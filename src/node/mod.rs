@@ -62,6 +62,7 @@ use self::core::Shared;
 use self::driver::Driver;
 use self::links::Links;
 use self::local::Reception;
+use self::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
 use crate::link::local::Door;
@@ -107,7 +108,8 @@ impl Node {
         if let Some(door) = door {
             tracing::info!(place = door.place(), "components of this host may attach");
             let node = (config.subsystem, config.node);
-            runtime.spawn(Reception::new(shared.clone(), node, config.max_message).run(door));
+            let reception = Reception::new(shared.clone(), node, config.max_message);
+            runtime.spawn(reception.open(door));
         }
         Ok(Self {
             config: Arc::new(config),
@@ -165,14 +167,16 @@ impl Node {
         self.shared().lock().endpoint.counters().clone()
     }
 
-    /// What has become of the messages for each attached component.
+    /// The attached components, in order of their ids.
     #[must_use]
-    pub fn mailboxes(&self) -> Vec<(JausId, MailboxCounters)> {
+    pub fn components(&self) -> Vec<ComponentReport> {
         let core = self.shared().lock();
-        core.mailboxes
-            .iter()
-            .map(|(id, mailbox)| (*id, mailbox.counters()))
-            .collect()
+        let report = |(&id, mailbox): (&JausId, &Arc<Mailbox>)| ComponentReport {
+            id,
+            process: core.attendance.process(id).cloned(),
+            mailbox: mailbox.counters(),
+        };
+        core.mailboxes.iter().map(report).collect()
     }
 
     /// News from now on about components: who comes, goes, or reads nothing.
@@ -197,11 +201,26 @@ impl Node {
         self.shared().lock().stop();
         // An error would mean that the node is gone, and that is what is waited for.
         let _ = stopped.wait_for(|stopped| *stopped).await;
+        let mut closed = self.shared().closed.subscribe();
+        // As above.
+        let _ = closed.wait_for(|closed| *closed).await;
     }
 
     fn shared(&self) -> &Shared {
         &self.guard.0
     }
+}
+
+/// One component of a node, as it is now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ComponentReport {
+    /// Who.
+    pub id: JausId,
+    /// Where it lives; `None`: in the node's own process.
+    pub process: Option<Process>,
+    /// What has become of its messages.
+    pub mailbox: MailboxCounters,
 }
 
 /// One link of a node, as it is now.

@@ -181,8 +181,9 @@ async fn a_component_that_stops_reading_loses_its_own_messages_and_nobody_elses(
     };
     assert_eq!((id, process.pid), (ECHO, Some(stuck.pid())));
     let counters = |wanted| {
-        let found = node.mailboxes().into_iter().find(|(id, _)| *id == wanted);
-        found.expect("an attached component").1
+        let mut components = node.components().into_iter();
+        let found = components.find(|component| component.id == wanted);
+        found.expect("an attached component").mailbox
     };
     assert!(counters(ECHO).dropped > 0, "{:?}", counters(ECHO));
     assert_eq!(counters(other.id()).dropped, 0);
@@ -274,4 +275,23 @@ async fn a_component_whose_id_was_taken_meanwhile_is_told_and_gets_it_when_it_is
     drop(thief);
     host_event(&mut events, |event| *event == HostEvent::Back).await;
     assert!(port.is_connected());
+}
+
+#[tokio::test]
+async fn a_stuck_component_does_not_outlive_the_node_it_was_attached_to() {
+    let place = Place::new();
+    let node = place.node();
+    let echo = Actor::start(&place, "echo").await;
+    let here = node.attach(1).unwrap();
+    echo.signal("STOP").await;
+    for _ in 0..2000 {
+        here.send(message(&here, ECHO, [0; 1000])).unwrap();
+    }
+    drop(here);
+    node.shutdown().await;
+    let again = place.node();
+    let mut events = again.component_events();
+    echo.signal("CONT").await;
+    let back = |event: &ComponentEvent| matches!(event, ComponentEvent::Attached { .. });
+    component_event(&mut events, back).await;
 }

@@ -88,7 +88,7 @@ pub(in super::super) struct Line {
     events: broadcast::Sender<HostEvent>,
     pub(super) connected: watch::Sender<bool>,
     /// Told when the component goes.
-    pub(super) leaving: Notify,
+    leaving: Notify,
 }
 
 #[derive(Debug)]
@@ -222,7 +222,14 @@ impl Line {
         self.connected.send_replace(true);
     }
 
-    /// The component has gone, and the node knows it.
+    /// Ready when the component has gone. For the line's task alone.
+    pub(super) async fn left(&self) {
+        while !self.lock().left {
+            self.leaving.notified().await;
+        }
+    }
+
+    /// The component has gone, and the node knows it, if it listens.
     pub(super) fn handle_left(&self) {
         self.lock().write = None;
         self.connected.send_replace(false);

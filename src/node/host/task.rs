@@ -22,6 +22,8 @@ const ROOM: usize = 1024;
 /// How long a component that reads nothing holds up what comes behind, such as the outcomes of
 /// what it has sent.
 const PATIENCE: Duration = Duration::from_millis(100);
+/// How long a node may take to read that a component leaves.
+const FAREWELL: Duration = Duration::from_secs(1);
 /// The pauses between two attempts to reach the node again, the first and the longest.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(10), Duration::from_secs(1));
 
@@ -56,17 +58,25 @@ impl Task {
     }
 
     pub(super) async fn run(mut self) {
+        let line = self.line.clone();
         loop {
-            let end = std::future::poll_fn(|cx| self.poll(cx)).await;
-            let End::Lost(error) = end else {
-                return self.line.handle_left();
+            let farewell = async {
+                line.left().await;
+                tokio::time::sleep(FAREWELL).await;
             };
-            tracing::warn!(id = %self.line.id(), %error, "the node of this host is lost");
-            self.line.handle_lost(error.to_string());
-            let left = self.line.clone();
+            let end = tokio::select! {
+                biased;
+                end = std::future::poll_fn(|cx| self.poll(cx)) => end,
+                () = farewell => End::Left,
+            };
+            let End::Lost(error) = end else {
+                return line.handle_left();
+            };
+            tracing::warn!(id = %line.id(), %error, "the node of this host is lost");
+            line.handle_lost(error.to_string());
             tokio::select! {
                 () = self.reach() => {}
-                () = left.leaving.notified() => return,
+                () = line.left() => return,
             }
         }
     }

@@ -53,8 +53,13 @@ impl Reception {
         }
     }
 
-    /// Serves guests until the node has stopped.
-    pub(super) async fn run(self, door: Door) {
+    /// Opens the door; who serves guests at it until the node has stopped.
+    pub(super) fn open(self, door: Door) -> impl Future<Output = ()> + use<> {
+        let open = OpenDoor::new(door, self.shared.clone());
+        self.serve(open)
+    }
+
+    async fn serve(self, open: OpenDoor) {
         let mut stopped = self.shared.stopped.subscribe();
         let this = Arc::new(self);
         let ungreeted = Arc::new(Semaphore::new(UNGREETED));
@@ -63,7 +68,7 @@ impl Reception {
                 return;
             };
             let guest = tokio::select! {
-                guest = door.accept() => guest,
+                guest = open.door.accept() => guest,
                 _ = stopped.wait_for(|stopped| *stopped) => return,
             };
             match guest {
@@ -178,6 +183,31 @@ impl Reception {
                 Err(refusal(Reason::WrongId, words))
             }
         }
+    }
+}
+
+/// A door, and who waits until it is closed: the next node of this host may want its place.
+#[derive(Debug)]
+struct OpenDoor {
+    door: Door,
+    _last: ClosedLast,
+}
+
+/// Says that the door is closed; as its last field it is dropped after it.
+#[derive(Debug)]
+struct ClosedLast(Arc<Shared>);
+
+impl OpenDoor {
+    fn new(door: Door, shared: Arc<Shared>) -> Self {
+        shared.closed.send_replace(false);
+        let _last = ClosedLast(shared);
+        Self { door, _last }
+    }
+}
+
+impl Drop for ClosedLast {
+    fn drop(&mut self) {
+        self.0.closed.send_replace(true);
     }
 }
 

@@ -17,7 +17,7 @@ use tokio::time::Sleep;
 
 use super::super::attendance::{ComponentEvent, Departure};
 use super::super::awaiting::Waiter;
-use super::super::core::{Core, Shared};
+use super::super::core::{Core, LAST_WORDS, Shared};
 use super::super::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{Outgoing, Received};
@@ -120,7 +120,18 @@ impl Session {
 
     /// Serves the component until it is gone or the node has stopped.
     pub(super) async fn run(mut self) {
-        let why = std::future::poll_fn(|cx| self.poll(cx)).await;
+        let shared = self.shared.clone();
+        let end = async {
+            let mut stopped = shared.stopped.subscribe();
+            // An error would mean that the node is gone, and that is what is waited for.
+            let _ = stopped.wait_for(|stopped| *stopped).await;
+            tokio::time::sleep(LAST_WORDS).await;
+        };
+        let why = tokio::select! {
+            biased;
+            why = std::future::poll_fn(|cx| self.poll(cx)) => why,
+            () = end => Departure::Stopped,
+        };
         self.depart(why);
     }
 
