@@ -5,22 +5,7 @@ mod cli_support;
 
 use std::fs;
 
-use cli_support::{Running, jaus, run};
-
-/// Flags for a multicast group of this test's own, so that no other program of this computer is
-/// met. `test` tells the tests of this file apart.
-fn own_group(test: u32) -> Vec<String> {
-    let port = 20_000 + (std::process::id() * 8 + test) % 40_000;
-    [
-        "--loopback",
-        "--port",
-        "0",
-        "--group",
-        &format!("239.255.77.1:{port}"),
-    ]
-    .map(str::to_owned)
-    .to_vec()
-}
+use cli_support::{Running, jaus, own_group, run};
 
 #[test]
 fn the_demo_tells_its_story_and_ends_by_itself() {

@@ -51,6 +51,21 @@ pub fn jaus() -> Command {
     command
 }
 
+/// Flags for a multicast group of this test's own, so that no other program of this computer is
+/// met. `test` tells the tests of one file apart.
+pub fn own_group(test: u32) -> Vec<String> {
+    let port = 20_000 + (std::process::id() * 8 + test) % 40_000;
+    [
+        "--loopback",
+        "--port",
+        "0",
+        "--group",
+        &format!("239.255.77.1:{port}"),
+    ]
+    .map(str::to_owned)
+    .to_vec()
+}
+
 /// Runs `jaus` with arguments and standard input.
 pub fn run(arguments: &[&str], input: &[u8]) -> Run {
     let mut child = jaus()

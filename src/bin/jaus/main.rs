@@ -14,6 +14,7 @@ mod failure;
 mod network;
 mod node;
 mod output;
+mod ping;
 mod query;
 mod runtime;
 mod tree;
@@ -46,6 +47,7 @@ enum Command {
     Demo(demo::Demo),
     Node(node::NodeCommand),
     Discover(discover::Discover),
+    Ping(ping::Ping),
     Query(query::Query),
     Decode(decode::Decode),
     Encode(encode::Encode),
@@ -57,6 +59,7 @@ impl Command {
             Self::Demo(demo) => demo.run(),
             Self::Node(node) => node.run(),
             Self::Discover(discover) => discover.run(),
+            Self::Ping(ping) => ping.run(),
             Self::Query(query) => query.run(),
             Self::Decode(decode) => decode.run(),
             Self::Encode(encode) => encode.run(),
