@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use super::Path;
+use super::{LargeStyle, Path};
 use crate::address::JausId;
 
 /// The payloads that packets may be limited to, in octets.
@@ -27,11 +27,16 @@ pub struct Config {
     /// frame, and is the most that JAUS++ does not expect to be fragmented in a way of its own.
     pub payload_limit: usize,
     /// The longest message, in octets, that is sent or received. Above
-    /// [`payload_limit`](Self::payload_limit) it travels in fragments. Also the most that is kept
-    /// of the unfinished messages of one sender.
+    /// [`payload_limit`](Self::payload_limit) it travels in fragments.
     pub max_message: usize,
-    /// The most octets that are kept of unfinished messages of all senders. The oldest are
-    /// forgotten first.
+    /// How peers cut large messages, if that is known beforehand: ids, which may hold wildcards,
+    /// of which the first that fits counts. That a peer repeats the code in each fragment is also
+    /// learned from what it sends.
+    pub large_styles: Vec<(JausId, LargeStyle)>,
+    /// The most octets that are kept of unfinished messages of one sender, with 64 more for each
+    /// fragment and 256 for each gap. The oldest are forgotten first.
+    pub max_reassembly_per_sender: usize,
+    /// The same for all senders.
     pub max_reassembly: usize,
     /// How long an unfinished message is kept after its latest fragment.
     pub reassembly_timeout: Duration,
@@ -88,6 +93,8 @@ impl Default for Config {
             static_peers: Vec::new(),
             payload_limit: 1425,
             max_message: 16 << 20,
+            large_styles: Vec::new(),
+            max_reassembly_per_sender: 24 << 20,
             max_reassembly: 48 << 20,
             reassembly_timeout: Duration::from_secs(2),
             queue_limit: 1024,

@@ -53,6 +53,7 @@ pub use config::{Config, PAYLOAD_LIMITS, StaticPeer};
 pub use counters::{Counter, Counters};
 pub use delivery::FlowStatus;
 pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
+pub use large::LargeStyle;
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
 pub use peers::Peer;
@@ -61,7 +62,7 @@ pub use send::SendError;
 use crate::address::JausId;
 use crate::wire::Priority;
 use delivery::Deliveries;
-use large::{Numbers, Reassembly};
+use large::{LargeStyles, Numbers, Reassembly};
 use local::Components;
 use peers::Peers;
 use queue::PriorityQueue;
@@ -78,6 +79,7 @@ pub struct Endpoint {
     heard: Recent,
     sent_to_group: Recent,
     reassembly: Reassembly,
+    large_styles: LargeStyles,
     deliveries: Deliveries,
     conflicts: BTreeMap<JausId, Instant>,
     transmits: PriorityQueue<Transmit>,
@@ -105,6 +107,7 @@ impl Endpoint {
             heard: Recent::new(config.max_recent, config.retransmission_window),
             sent_to_group: Recent::new(config.max_recent, config.echo_window),
             reassembly: Reassembly::new(&config),
+            large_styles: LargeStyles::new(&config),
             deliveries: Deliveries::new(&config),
             conflicts: BTreeMap::new(),
             transmits: PriorityQueue::new(config.queue_limit),

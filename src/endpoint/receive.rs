@@ -83,10 +83,15 @@ impl Endpoint {
         self.learn(now, from, frame);
         let payload = match frame.flags.data() {
             DataControl::Single => frame.payload.clone(),
-            _ => match self.reassembly.insert(now, frame, &mut self.counters)? {
-                Some(whole) => whole,
-                None => return Ok(()),
-            },
+            _ => {
+                let style = self.large_styles.of(frame.source);
+                let whole = self
+                    .reassembly
+                    .insert(now, frame, style, &mut self.counters)?;
+                let Some(whole) = whole else { return Ok(()) };
+                self.large_styles.learn(frame.source, whole.style);
+                whole.payload
+            }
         };
         self.deliver(from, frame, broadcast, &payload, &receivers);
         Ok(())

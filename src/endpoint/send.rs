@@ -5,7 +5,7 @@ use std::time::Instant;
 use bytes::Bytes;
 use tracing::trace;
 
-use super::large::Cut;
+use super::large::{Cut, LargeStyle};
 use super::{
     Counter, Endpoint, Event, LinkId, LinkProfile, MessageHandle, Outgoing, Path, Received, To,
     Transmit,
@@ -204,9 +204,10 @@ impl Endpoint {
     }
 
     /// Whether what is sent to `destination` names the message code in each fragment.
-    fn repeats_code(&self, destination: JausId) -> bool {
-        self.route(destination)
-            .is_some_and(|(_, version)| version != Version::As5669a)
+    pub(super) fn repeats_code(&self, destination: JausId) -> bool {
+        let route = self.route(destination);
+        let older_header = route.is_some_and(|(_, version)| version != Version::As5669a);
+        older_header || self.large_styles.of(destination) == Some(LargeStyle::RepeatedCode)
     }
 
     fn check_length(&self, message: &Outgoing) -> Result<(), SendError> {

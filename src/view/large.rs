@@ -6,17 +6,15 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use bytes::{Bytes, BytesMut};
+use bytes::Bytes;
 
 use crate::address::JausId;
-use crate::wire::{DataControl, Frame, Version};
+use crate::wire::{DataControl, Frame, Version, large};
 
 /// Messages that may be incomplete at a time; then the one that began first is given up.
 const MOST_OPEN: usize = 64;
 /// The most that one message may have; JAUS peers stop at some hundred kilobytes.
 const LONGEST: usize = 16 << 20;
-/// Octets of a message code.
-const CODE: usize = 2;
 
 /// Fragments on their way to a whole message.
 #[derive(Debug, Default)]
@@ -125,20 +123,13 @@ impl Open {
         let pieces: Vec<&Bytes> = (0..=fragments)
             .map(|step| self.pieces.get(&first.wrapping_add(step)))
             .collect::<Option<_>>()?;
-        let (begin, rest) = pieces.split_first()?;
-        let code = begin.get(..CODE)?;
-        let repeated = rest.iter().all(|piece| piece.starts_with(code));
-        let join = |skip: usize| {
-            let mut message = BytesMut::with_capacity(self.length);
-            message.extend_from_slice(begin);
-            rest.iter()
-                .for_each(|piece| message.extend_from_slice(&piece[skip..]));
-            message.freeze()
-        };
+        pieces.first()?.get(..large::CODE_LEN)?;
+        let repeated = large::repeats_code(pieces.iter().copied());
+        let join = |skip| large::join(pieces.iter().copied(), skip);
         // The older headers hold the code, so there it stands in every payload.
         let (plain, without_repeated_code) = match self.version {
-            Version::As5669a => (join(0), repeated.then(|| join(CODE))),
-            Version::As5669 | Version::Ra => (repeated.then(|| join(CODE))?, None),
+            Version::As5669a => (join(0), repeated.then(|| join(large::CODE_LEN))),
+            Version::As5669 | Version::Ra => (repeated.then(|| join(large::CODE_LEN))?, None),
         };
         Some(Whole {
             sequence: first,

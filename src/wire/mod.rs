@@ -17,6 +17,7 @@ mod framing;
 pub mod jserial;
 pub mod jtcp;
 pub mod judp;
+pub mod large;
 pub mod ra;
 #[cfg(test)]
 mod tests;

@@ -274,15 +274,12 @@ impl Endpoint {
     ) -> Vec<Transmit> {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
-        let limit = self.config.payload_limit;
+        let (limit, repeat) = (self.config.payload_limit, self.repeats_code(destination));
         let Some(flow) = self.deliveries.flows.get_mut(&destination) else {
             return Vec::new();
         };
         flow.known = route.is_some();
-        let cut = |parcel: &Parcel| {
-            let repeat = version != Version::As5669a;
-            (Cut::new(parcel.payload.len(), limit, repeat), version)
-        };
+        let cut = |parcel: &Parcel| (Cut::new(parcel.payload.len(), limit, repeat), version);
         let Some((frame, tries)) = flow.take(now, priority, &mut self.numbers, cut) else {
             return Vec::new();
         };

@@ -7,6 +7,9 @@
 
 mod reassembly;
 mod split;
+mod style;
 
 pub(super) use reassembly::Reassembly;
 pub(super) use split::{Cut, Numbers};
+pub use style::LargeStyle;
+pub(super) use style::LargeStyles;

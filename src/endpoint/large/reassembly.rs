@@ -1,87 +1,202 @@
 //! Putting fragments together. They may come in any order.
 //!
-//! What is kept of unfinished messages is bounded in octets, per sender and in all, in number and
-//! in time.
+//! Fragments with consecutive numbers form runs; a run with both ends is the message. The pieces
+//! stay where they were received and are joined once, at the end. Numbers go round, so "before" and
+//! "after" are neighbours on a circle, and what has not grown while the sender went on by a quarter
+//! of it is stale: its numbers are about to be used again.
+//!
+//! What is kept of unfinished messages is bounded in octets (with what keeping a piece costs), per
+//! sender and in all, and in time. The oldest runs go first.
 
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
-use bytes::{Bytes, BytesMut};
+use bytes::Bytes;
 
+use super::style::{self, LargeStyle};
 use crate::address::JausId;
 use crate::endpoint::{Config, Counter, Counters};
-use crate::wire::{DataControl, Frame, Version, ra};
+use crate::wire::{DataControl, Frame, Priority, Version, ra};
 
-/// The most runs of fragments that are kept, from all senders.
-const MAX_RUNS: usize = 256;
+/// What a piece costs beside its octets.
+const PIECE_COST: usize = 64;
+/// What a run costs beside its pieces.
+const RUN_COST: usize = 256;
+/// The most runs of one sender; one that loses every second fragment has so many in 2048.
+const MAX_RUNS: usize = 1024;
+/// What has not grown while the sender took so many numbers is stale.
+const STALE: u64 = 1 << 14;
 
 /// What a fragment adds to its message. The older headers name the code with each fragment.
-fn part_of_message(frame: &Frame) -> &[u8] {
+fn part_of_message(frame: &Frame) -> Bytes {
     match (frame.version, frame.flags.data()) {
-        (Version::As5669a, _) | (_, DataControl::First) => &frame.payload,
-        (Version::As5669 | Version::Ra, _) => frame.payload.get(ra::CODE_LEN..).unwrap_or_default(),
+        (Version::As5669a, _) | (_, DataControl::First) => frame.payload.clone(),
+        (Version::As5669 | Version::Ra, _) => {
+            frame.payload.slice(ra::CODE_LEN.min(frame.payload.len())..)
+        }
     }
 }
 
-/// Fragments with consecutive sequence numbers, put together.
+/// What the fragments of one message have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Kind {
+    version: Version,
+    priority: Priority,
+}
+
+/// Fragments with consecutive sequence numbers.
 #[derive(Debug)]
 struct Run {
-    source: JausId,
-    destination: JausId,
-    first: u16,
+    kind: Kind,
     last: u16,
     /// Whether it begins with the message's first fragment.
     begins: bool,
     /// Whether it ends with the message's last fragment.
     ends: bool,
-    octets: BytesMut,
+    pieces: VecDeque<Bytes>,
+    octets: usize,
+    /// When the latest of its fragments came.
     updated: Instant,
+    /// Where the sender was then.
+    position: i64,
 }
 
 impl Run {
-    fn new(now: Instant, frame: &Frame) -> Self {
-        let data = frame.flags.data();
+    fn covers(&self, first: u16, sequence: u16) -> bool {
+        sequence.wrapping_sub(first) <= self.last.wrapping_sub(first)
+    }
+
+    fn cost(&self) -> usize {
+        RUN_COST + self.pieces.len() * PIECE_COST + self.octets
+    }
+
+    /// Puts what follows behind it.
+    fn append(&mut self, mut next: Self) {
+        if self.pieces.len() >= next.pieces.len() {
+            self.pieces.append(&mut next.pieces);
+        } else {
+            while let Some(piece) = self.pieces.pop_back() {
+                next.pieces.push_front(piece);
+            }
+            self.pieces = next.pieces;
+        }
+        self.last = next.last;
+        self.ends = next.ends;
+        self.octets += next.octets;
+        self.updated = self.updated.max(next.updated);
+    }
+}
+
+/// The place of a run: for whom, and the number of its first fragment.
+type Place = (JausId, u16);
+
+/// The unfinished messages of one sender.
+#[derive(Debug)]
+struct Sender {
+    runs: BTreeMap<Place, Run>,
+    cost: usize,
+    /// When none of its runs was older, the last time that somebody looked.
+    listed: Instant,
+    /// The latest number, and how far it is from the first that was heard.
+    latest: u16,
+    position: i64,
+}
+
+impl Sender {
+    fn new(now: Instant, sequence: u16) -> Self {
         Self {
-            source: frame.source,
-            destination: frame.destination,
-            first: frame.sequence,
-            last: frame.sequence,
-            begins: data == DataControl::First,
-            ends: data == DataControl::Last,
-            octets: BytesMut::from(part_of_message(frame)),
-            updated: now,
+            runs: BTreeMap::new(),
+            cost: 0,
+            listed: now,
+            latest: sequence,
+            position: 0,
         }
     }
 
-    fn is_between(&self, source: JausId, destination: JausId) -> bool {
-        self.source == source && self.destination == destination
+    fn advance(&mut self, sequence: u16) {
+        let ahead = sequence.wrapping_sub(self.latest).cast_signed();
+        self.latest = sequence;
+        self.position += i64::from(ahead);
     }
 
-    /// Whether the sequence number is one of the run's.
-    fn covers(&self, sequence: u16) -> bool {
-        sequence.wrapping_sub(self.first) <= self.last.wrapping_sub(self.first)
+    /// The place of the run that begins at the number or as the next one before it.
+    fn at_or_before(&self, destination: JausId, sequence: u16) -> Option<Place> {
+        let from = (destination, 0);
+        let before = self.runs.range(from..=(destination, sequence)).next_back();
+        before
+            .or_else(|| self.runs.range(from..=(destination, u16::MAX)).next_back())
+            .map(|(&place, _)| place)
     }
 
-    /// Whether `next` continues this run.
-    fn is_continued_by(&self, next: &Self) -> bool {
-        next.is_between(self.source, self.destination)
-            && !self.ends
-            && !next.begins
-            && next.first == self.last.wrapping_add(1)
+    fn is_stale(&self, run: &Run) -> bool {
+        self.position.abs_diff(run.position) >= STALE
     }
 
-    fn append(&mut self, next: &Self) {
-        self.octets.extend_from_slice(&next.octets);
-        self.last = next.last;
-        self.ends = next.ends;
-        self.updated = self.updated.max(next.updated);
+    fn take(&mut self, place: Place) -> Option<Run> {
+        let run = self.runs.remove(&place)?;
+        self.cost -= run.cost();
+        Some(run)
     }
+
+    fn put(&mut self, place: Place, run: Run) {
+        self.cost += run.cost();
+        self.runs.insert(place, run);
+    }
+
+    fn oldest(&self) -> Option<(Instant, Place)> {
+        let times = self.runs.iter().map(|(&place, run)| (run.updated, place));
+        times.min()
+    }
+
+    /// Puts a new fragment to its neighbours; gives the place of the run that it is in then.
+    fn insert(&mut self, destination: JausId, first: u16, mut run: Run) -> Place {
+        let (mut place, kind) = ((destination, first), run.kind);
+        let before = self.at_or_before(destination, first.wrapping_sub(1));
+        if let Some(before) = before
+            && !run.begins
+            && let Some(known) = self.runs.get(&before)
+            && known.last.wrapping_add(1) == first
+            && !known.ends
+            && known.kind == kind
+            && !self.is_stale(known)
+            && let Some(mut longer) = self.take(before)
+        {
+            longer.append(run);
+            (place, run) = (before, longer);
+        }
+        let after = (destination, run.last.wrapping_add(1));
+        if let Some(known) = self.runs.get(&after)
+            && !run.ends
+            && !known.begins
+            && known.kind == kind
+            && !self.is_stale(known)
+            && let Some(next) = self.take(after)
+        {
+            run.append(next);
+        }
+        run.position = self.position;
+        self.put(place, run);
+        place
+    }
+}
+
+/// A message of which every fragment was received.
+#[derive(Debug, PartialEq, Eq)]
+pub(in crate::endpoint) struct Whole {
+    pub(in crate::endpoint) payload: Bytes,
+    /// How it was cut, if that can be told.
+    pub(in crate::endpoint) style: LargeStyle,
 }
 
 /// The unfinished large messages.
 #[derive(Debug)]
 pub(in crate::endpoint) struct Reassembly {
-    runs: Vec<Run>,
+    senders: HashMap<JausId, Sender>,
+    /// The senders by the time of their oldest run, or earlier.
+    listed: BTreeSet<(Instant, JausId)>,
+    cost: usize,
     max_message: usize,
+    max_sender: usize,
     max_octets: usize,
     timeout: Duration,
 }
@@ -89,109 +204,185 @@ pub(in crate::endpoint) struct Reassembly {
 impl Reassembly {
     pub(in crate::endpoint) fn new(config: &Config) -> Self {
         Self {
-            runs: Vec::new(),
+            senders: HashMap::new(),
+            listed: BTreeSet::new(),
+            cost: 0,
             max_message: config.max_message,
+            max_sender: config.max_reassembly_per_sender,
             max_octets: config.max_reassembly,
             timeout: config.reassembly_timeout,
         }
     }
 
-    /// Takes a fragment, and gives the message if it is whole now. What a bound makes it forget is
-    /// counted.
+    /// Takes a fragment of a sender that is known to cut in some style, and gives the message if it
+    /// is whole now. What a bound makes it forget is counted.
     pub(in crate::endpoint) fn insert(
         &mut self,
         now: Instant,
         frame: &Frame,
+        style: Option<LargeStyle>,
         counters: &mut Counters,
-    ) -> Result<Option<Bytes>, Counter> {
-        let covers = |run: &Run| {
-            run.is_between(frame.source, frame.destination) && run.covers(frame.sequence)
-        };
-        let mut run = Run::new(now, frame);
-        if run.begins {
-            // The true repetitions were filtered before: here a restarted sender begins anew.
-            self.forget(covers, counters);
-        } else if self.runs.iter().any(covers) {
-            return Err(Counter::Duplicate);
-        }
-        if let Some(before) = self
-            .runs
-            .iter()
-            .position(|before| before.is_continued_by(&run))
-        {
-            let mut before = self.runs.swap_remove(before);
-            before.append(&run);
-            run = before;
-        }
-        if let Some(after) = self
-            .runs
-            .iter()
-            .position(|after| run.is_continued_by(after))
-        {
-            run.append(&self.runs.swap_remove(after));
-        }
-        if run.octets.len() > self.max_message {
-            return Err(Counter::MessageTooLong);
-        }
-        if run.begins && run.ends {
-            return Ok(Some(run.octets.freeze()));
-        }
-        self.make_room(&run, counters);
-        self.runs.push(run);
-        Ok(None)
-    }
-
-    /// Forgets the oldest runs, of the same sender or of all, until there is room for one more.
-    fn make_room(&mut self, new: &Run, counters: &mut Counters) {
-        let length = new.octets.len();
-        while self.octets_of(|run| run.source == new.source) + length > self.max_message
-            && self.forget_oldest(|run| run.source == new.source)
-        {
-            counters.add(Counter::FragmentsForgotten);
-        }
-        while (self.octets_of(|_| true) + length > self.max_octets || self.runs.len() >= MAX_RUNS)
-            && self.forget_oldest(|_| true)
-        {
-            counters.add(Counter::FragmentsForgotten);
-        }
-    }
-
-    fn octets_of(&self, which: impl Fn(&Run) -> bool) -> usize {
-        self.runs
-            .iter()
-            .filter(|run| which(run))
-            .map(|run| run.octets.len())
-            .sum()
-    }
-
-    fn forget_oldest(&mut self, which: impl Fn(&Run) -> bool) -> bool {
-        let candidates = self.runs.iter().enumerate().filter(|(_, run)| which(run));
-        match candidates.min_by_key(|(_, run)| run.updated) {
-            Some((oldest, _)) => {
-                self.runs.swap_remove(oldest);
-                true
+    ) -> Result<Option<Whole>, Counter> {
+        let source = frame.source;
+        let sender = self.senders.entry(source).or_insert_with(|| {
+            self.listed.insert((now, source));
+            Sender::new(now, frame.sequence)
+        });
+        let before = sender.cost;
+        let inserted = sender.take_in(now, frame, self.max_message, counters);
+        let (cost, runs) = (sender.cost, sender.runs.len());
+        self.cost = self.cost + cost - before;
+        match inserted {
+            Ok(Some(run)) => {
+                self.drop_if_empty(source);
+                Ok(Some(style::join(run.kind.version, &run.pieces, style)))
             }
-            None => false,
+            Ok(None) => {
+                self.keep_within_bounds(source, runs, counters);
+                Ok(None)
+            }
+            Err(reason) => {
+                self.drop_if_empty(source);
+                Err(reason)
+            }
+        }
+    }
+
+    fn drop_if_empty(&mut self, source: JausId) {
+        if let Some(sender) = self.senders.get(&source)
+            && sender.runs.is_empty()
+        {
+            self.listed.remove(&(sender.listed, source));
+            self.senders.remove(&source);
+        }
+    }
+
+    /// Forgets the oldest runs, of this sender or of all, until all is within its bounds.
+    fn keep_within_bounds(&mut self, source: JausId, runs: usize, counters: &mut Counters) {
+        if runs > MAX_RUNS {
+            self.forget_oldest_of(source, counters);
+        }
+        while let Some(sender) = self.senders.get(&source)
+            && sender.cost > self.max_sender
+        {
+            self.forget_oldest_of(source, counters);
+        }
+        while self.cost > self.max_octets
+            && let Some(&(listed, source)) = self.listed.first()
+        {
+            let oldest = self.senders.get(&source).and_then(Sender::oldest);
+            match oldest {
+                Some((updated, _)) if updated > listed => self.list(source),
+                _ => self.forget_oldest_of(source, counters),
+            }
+        }
+    }
+
+    fn forget_oldest_of(&mut self, source: JausId, counters: &mut Counters) {
+        if let Some(sender) = self.senders.get_mut(&source) {
+            let oldest = sender.oldest();
+            if let Some(run) = oldest.and_then(|(_, place)| sender.take(place)) {
+                self.cost -= run.cost();
+                counters.add(Counter::FragmentsForgotten);
+            }
+        }
+        self.list(source);
+    }
+
+    /// Lists a sender by the time of its oldest run, or forgets it if it has none.
+    fn list(&mut self, source: JausId) {
+        let Some(sender) = self.senders.get_mut(&source) else {
+            return;
+        };
+        self.listed.remove(&(sender.listed, source));
+        match sender.oldest() {
+            Some((updated, _)) => {
+                sender.listed = updated;
+                self.listed.insert((updated, source));
+            }
+            None => {
+                self.senders.remove(&source);
+            }
         }
     }
 
     /// Forgets what has not grown for too long.
     pub(in crate::endpoint) fn expire(&mut self, now: Instant, counters: &mut Counters) {
-        let timeout = self.timeout;
-        self.forget(|run| run.updated + timeout <= now, counters);
+        while let Some(&(listed, source)) = self.listed.first()
+            && listed + self.timeout <= now
+        {
+            while let Some(sender) = self.senders.get(&source)
+                && let Some((updated, _)) = sender.oldest()
+                && updated + self.timeout <= now
+            {
+                self.forget_oldest_of(source, counters);
+            }
+            self.list(source);
+        }
     }
 
-    fn forget(&mut self, which: impl Fn(&Run) -> bool, counters: &mut Counters) {
-        let before = self.runs.len();
-        self.runs.retain(|run| !which(run));
-        counters.add_many(
-            Counter::FragmentsForgotten,
-            (before - self.runs.len()) as u64,
-        );
-    }
-
-    /// When the next run expires.
+    /// When something may expire.
     pub(in crate::endpoint) fn next_expiry(&self) -> Option<Instant> {
-        self.runs.iter().map(|run| run.updated + self.timeout).min()
+        let &(listed, _) = self.listed.first()?;
+        Some(listed + self.timeout)
+    }
+
+    /// What is kept, with what keeping it costs, in octets.
+    #[cfg(test)]
+    pub(in crate::endpoint) fn cost(&self) -> usize {
+        self.cost
+    }
+}
+
+impl Sender {
+    /// Takes a fragment; gives the run that is the whole message, if it is.
+    fn take_in(
+        &mut self,
+        now: Instant,
+        frame: &Frame,
+        max_message: usize,
+        counters: &mut Counters,
+    ) -> Result<Option<Run>, Counter> {
+        let (destination, sequence) = (frame.destination, frame.sequence);
+        let data = frame.flags.data();
+        self.advance(sequence);
+        if let Some(place) = self.at_or_before(destination, sequence)
+            && let Some(known) = self.runs.get(&place)
+            && known.covers(place.1, sequence)
+        {
+            // The true repetitions were filtered before: here a restarted sender begins anew.
+            if data != DataControl::First && !self.is_stale(known) {
+                return Err(Counter::Duplicate);
+            }
+            self.take(place);
+            counters.add(Counter::FragmentsForgotten);
+        }
+        let piece = part_of_message(frame);
+        let run = Run {
+            kind: Kind {
+                version: frame.version,
+                priority: frame.flags.priority(),
+            },
+            last: sequence,
+            begins: data == DataControl::First,
+            ends: data == DataControl::Last,
+            octets: piece.len(),
+            pieces: VecDeque::from([piece]),
+            updated: now,
+            position: self.position,
+        };
+        let place = self.insert(destination, sequence, run);
+        let Some(run) = self.runs.get(&place) else {
+            return Ok(None);
+        };
+        if run.octets > max_message {
+            self.take(place);
+            return Err(Counter::MessageTooLong);
+        }
+        Ok(if run.begins && run.ends {
+            self.take(place)
+        } else {
+            None
+        })
     }
 }

@@ -1,17 +1,8 @@
 //! Large messages in fragments.
 
+use super::wire::{large, reliable};
 use super::*;
 use crate::wire::DataControl;
-
-/// A message whose octets are all different from their neighbours'.
-fn large(length: usize) -> Bytes {
-    let octets = (0..length).map(|index| (index % 251) as u8);
-    [0x01, 0x4B]
-        .into_iter()
-        .chain(octets)
-        .take(length)
-        .collect()
-}
 
 /// The fragments of a large message from [`PEER`], beginning with number `first`.
 fn fragments(first: u16, message: &Bytes, part: usize) -> Vec<Frame> {
@@ -264,9 +255,10 @@ fn a_message_above_the_limit_is_dropped() {
 
 #[test]
 fn unfinished_messages_are_bounded_per_sender_and_in_all() {
+    const COST: usize = 200 + 64 + 256;
     let config = Config {
-        max_message: 500,
-        max_reassembly: 900,
+        max_reassembly_per_sender: 2 * COST,
+        max_reassembly: 4 * COST,
         ..Config::default()
     };
     let mut rig = Rig::with(config);
@@ -284,12 +276,175 @@ fn unfinished_messages_are_bounded_per_sender_and_in_all() {
     assert_eq!(
         hear("42.1.1", 30),
         1,
-        "a third of 200 octets is beyond the sender's 500"
+        "a third is beyond the sender's bound"
     );
     assert_eq!([hear("42.1.2", 10), hear("42.1.2", 20)], [1, 1]);
-    assert_eq!(
-        hear("42.1.3", 10),
-        2,
-        "a fifth of 200 octets is beyond the 900 in all"
-    );
+    assert_eq!(hear("42.1.3", 10), 2, "a fifth is beyond the bound for all");
+}
+
+#[test]
+fn what_invented_senders_leave_behind_is_bounded() {
+    let config = Config {
+        max_reassembly: 1 << 20,
+        ..Config::default()
+    };
+    let mut rig = Rig::with(config);
+    let whole = large(3000);
+    for number in 0..20_000_u32 {
+        let sender = JausId::new(1 + (number % 10_000) as u16, 7, 7);
+        let mut frame = fragments((number * 7) as u16, &whole, 1000).remove(number as usize % 3);
+        frame.source = sender;
+        rig.hear(&frame);
+        rig.now += Duration::from_micros(10);
+        assert!(rig.endpoint.reassembly.cost() <= 1 << 20);
+        rig.events();
+    }
+    assert!(rig.count(Counter::FragmentsForgotten) > 15_000);
+    rig.pass(Config::default().reassembly_timeout);
+    assert_eq!(rig.endpoint.reassembly.cost(), 0);
+}
+
+#[test]
+fn as_many_fragments_as_there_are_numbers_make_a_message_even_backwards() {
+    let message = large(65_535 * 64);
+    for backwards in [false, true] {
+        let mut rig = Rig::new();
+        let mut fragments = fragments(1, &message, 64);
+        if backwards {
+            fragments.reverse();
+        }
+        fragments.iter().for_each(|frame| rig.hear(frame));
+        assert!(payloads(&mut rig) == std::slice::from_ref(&message));
+        assert_eq!(rig.endpoint.reassembly.cost(), 0);
+    }
+}
+
+#[test]
+fn messages_of_several_priorities_are_put_together_side_by_side() {
+    let mut rig = Rig::new();
+    let (slow, quick) = (large(900), large(600));
+    let mut urgent = fragments(50, &quick, 300);
+    for frame in &mut urgent {
+        frame.flags = frame.flags.with_priority(Priority::High);
+    }
+    let slow_ones = fragments(1, &slow, 300);
+    for frame in [
+        &slow_ones[0],
+        &urgent[0],
+        &slow_ones[1],
+        &urgent[1],
+        &slow_ones[2],
+    ] {
+        rig.hear(frame);
+    }
+    assert_eq!(payloads(&mut rig), [quick, slow]);
+}
+
+#[test]
+fn what_is_left_of_a_message_is_not_put_into_one_that_has_its_numbers_again() {
+    let mut rig = Rig::new();
+    let (torn, whole) = (large(1000), large(1400));
+    let mut left = fragments(5, &torn, 200);
+    left.remove(2);
+    left.iter().for_each(|frame| rig.hear(frame));
+    // Many numbers later, within the time that fragments are kept for.
+    for round in 0..8_u16 {
+        let first = 1000 + round * 8000;
+        fragments(first, &large(400), 200)
+            .iter()
+            .for_each(|frame| rig.hear(frame));
+    }
+    payloads(&mut rig);
+    fragments(3, &whole, 200)
+        .iter()
+        .for_each(|frame| rig.hear(frame));
+    assert_eq!(payloads(&mut rig), [whole]);
+}
+
+/// As JAUS++ cuts: the code and 1571 octets in each fragment.
+fn of_jauspp(first: u16, message: &Bytes) -> Vec<Frame> {
+    let cut = large::Cut::new(message.len(), 1573, true);
+    (0..cut.count())
+        .map(|index| {
+            let (data, payload) = cut.fragment(message, index);
+            Frame {
+                flags: Flags::default().with_data(data),
+                sequence: first + index as u16,
+                ..Frame::new(PEER, US, payload)
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn the_code_that_jauspp_repeats_is_left_out_and_repeated_to_it_from_then_on() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    let message = large(5000);
+    of_jauspp(1, &message)
+        .iter()
+        .for_each(|frame| rig.hear(frame));
+    assert_eq!(payloads(&mut rig), std::slice::from_ref(&message));
+    for acknowledge in [false, true] {
+        rig.send(Outgoing {
+            acknowledge,
+            ..reliable(message.clone())
+        })
+        .unwrap();
+        let sent = rig.sent();
+        assert_eq!(sent.len(), 4);
+        assert!(sent.iter().all(|(_, frame)| frame.code() == Some(0x4B01)));
+        let octets: usize = sent.iter().map(|(_, frame)| frame.payload.len()).sum();
+        assert_eq!(octets, message.len() + 3 * 2);
+    }
+}
+
+#[test]
+fn octets_that_happen_to_repeat_are_not_taken_for_a_repeated_code() {
+    let mut rig = Rig::new();
+    let zeros = Bytes::from(vec![0; 5000]);
+    fragments(1, &zeros, 1425)
+        .iter()
+        .for_each(|frame| rig.hear(frame));
+    assert_eq!(payloads(&mut rig), std::slice::from_ref(&zeros));
+    let configured = Config {
+        large_styles: vec![(JausId::EVERYONE, LargeStyle::Standard)],
+        ..Config::default()
+    };
+    let mut rig = Rig::with(configured);
+    fragments(1, &zeros, 1573)
+        .iter()
+        .for_each(|frame| rig.hear(frame));
+    assert_eq!(payloads(&mut rig), [zeros], "even of JAUS++'s length");
+}
+
+#[test]
+fn large_messages_go_to_older_headers_with_the_code_in_each_fragment_and_come_back_whole() {
+    for version in [Version::As5669, Version::Ra] {
+        for acknowledge in [false, true] {
+            let mut rig = Rig::new();
+            rig.hear(&Frame {
+                version,
+                ..from_peer(QUERY_HEARTBEAT)
+            });
+            rig.events();
+            let message = large(5000);
+            rig.send(Outgoing {
+                acknowledge,
+                ..reliable(message.clone())
+            })
+            .unwrap();
+            let sent = rig.sent();
+            assert_eq!(sent.len(), 4);
+            let mut other = Rig::new();
+            other.endpoint.detach(US);
+            other.endpoint.attach(PEER).unwrap();
+            for (_, frame) in &sent {
+                assert_eq!((frame.version, frame.code()), (version, Some(0x4B01)));
+                assert!(frame.payload.len() <= 1425);
+                other.hear_from(OUR_HOST + 7, frame);
+            }
+            assert_eq!(payloads(&mut other), [message]);
+        }
+    }
 }

@@ -105,8 +105,14 @@ impl Wire {
     fn put_on(&mut self, from: usize, datagram: &[u8]) {
         self.datagrams[from] += 1;
         let to = 1 - from;
-        let ahead = self.under_way.iter().filter(|entry| entry.0.2 == to);
-        let full = ahead.count() >= self.conditions.room;
+        let room = self.conditions.room;
+        let ahead = || {
+            self.under_way
+                .iter()
+                .filter(|entry| entry.0.2 == to)
+                .count()
+        };
+        let full = room < usize::MAX && ahead() >= room;
         if full || self.draw(1000) < self.conditions.loss {
             return;
         }

@@ -1,0 +1,34 @@
+//! Large messages, whose fragments have arrived: where the message code stands in them.
+//!
+//! AS5669A and Junior cut the message as it is, so that only the first fragment begins with the
+//! message code. JAUS++ repeats the code at the beginning of every fragment, and so does what is
+//! read from the older headers. Nothing in a fragment tells which it is.
+
+use bytes::{Bytes, BytesMut};
+
+pub use super::ra::CODE_LEN;
+
+/// Whether every fragment begins with the code that the first begins with.
+#[must_use]
+pub fn repeats_code<'a>(fragments: impl IntoIterator<Item = &'a Bytes>) -> bool {
+    let mut fragments = fragments.into_iter();
+    let code = fragments.next().and_then(|first| first.get(..CODE_LEN));
+    code.is_some_and(|code| fragments.all(|fragment| fragment.starts_with(code)))
+}
+
+/// The fragments behind one another; of all but the first, `skip` octets are left out.
+#[must_use]
+pub fn join<'a, I>(fragments: I, skip: usize) -> Bytes
+where
+    I: IntoIterator<Item = &'a Bytes>,
+    I::IntoIter: Clone,
+{
+    let fragments = fragments.into_iter();
+    let length = fragments.clone().map(Bytes::len).sum();
+    let mut message = BytesMut::with_capacity(length);
+    for (index, fragment) in fragments.enumerate() {
+        let skip = if index == 0 { 0 } else { skip };
+        message.extend_from_slice(fragment.get(skip..).unwrap_or_default());
+    }
+    message.freeze()
+}
