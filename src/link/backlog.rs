@@ -40,6 +40,10 @@ impl<T> Backlog<T> {
         self.items
     }
 
+    pub(crate) const fn octets(&self) -> usize {
+        self.octets
+    }
+
     pub(crate) const fn is_empty(&self) -> bool {
         self.items == 0
     }

@@ -85,6 +85,16 @@ pub enum Error {
         /// Who has it, as far as this host tells.
         holder: Holder,
     },
+    /// Another program listens there.
+    #[error(
+        "TCP port {} of {} is taken: choose another, or another address of this host, or end the \
+         other program (`sudo ss -ltnp 'sport = :{}'` shows who it is)",
+        .address.port(), .address.ip(), .address.port()
+    )]
+    ListenerTaken {
+        /// What could not be bound.
+        address: SocketAddr,
+    },
     /// This process may not do it.
     #[error("this process lacks the right for {doing} ({source}){}", privileged(*port))]
     Permission {

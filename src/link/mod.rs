@@ -1,7 +1,8 @@
 //! Links: sockets, and nothing but sockets. Bytes in, bytes out, with the peer's address.
 //!
 //! A link knows no JAUS: what the bytes mean is the endpoint's business. There is one
-//! [`UdpLink`](udp::UdpLink) per network interface.
+//! [`UdpLink`](udp::UdpLink) per network interface, and one [`TcpLink`](tcp::TcpLink) for all
+//! connections, which reads the frames itself, because only they tell where one ends.
 //!
 //! # Several nodes on one host
 //!
@@ -32,6 +33,7 @@ pub mod interface;
 pub mod local;
 mod slab;
 mod socket_table;
+pub mod tcp;
 pub mod udp;
 
 pub use error::Error;

@@ -57,6 +57,13 @@ impl Decoder {
         &mut self.input
     }
 
+    /// Gives the memory back that an idle connection does not need.
+    pub fn release(&mut self) {
+        if self.input.is_empty() {
+            self.input = BytesMut::new();
+        }
+    }
+
     /// The version that the stream began with, once its first octet is there.
     #[must_use]
     pub const fn version(&self) -> Option<Version> {

@@ -1,0 +1,232 @@
+//! One TCP connection: frames in, messages out, and what waits because the other side is slower.
+
+use std::io;
+use std::net::SocketAddr;
+use std::task::{Context, Poll, ready};
+use std::time::{Duration, Instant};
+
+use bytes::{Buf, BufMut, Bytes, BytesMut};
+use socket2::{SockRef, TcpKeepalive};
+use tokio::net::TcpStream;
+
+use super::settings::{BACKLOG, STUCK};
+use crate::link::backlog::Backlog;
+use crate::wire::jtcp::{Decoder, split_version};
+use crate::wire::judp::{VERSION_AS5669, VERSION_AS5669A};
+use crate::wire::{self, Frame, Priority, Version};
+
+/// Octets that are read, and written, with one call. Many small messages share it: one call for
+/// each would cost most of the time.
+const CHUNK: usize = 64 * 1024;
+
+/// When so many more octets wait, they are written at once and not when the node has its turn: a
+/// component may send much before it comes to that.
+const WRITE_AT_ONCE: usize = 32 * 1024;
+
+/// Why a connection was closed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Closed {
+    /// The other side closed it, between two messages.
+    #[error("the other side closed it")]
+    Ended,
+    /// The other side closed it within a message.
+    #[error("the other side closed it within a message")]
+    CutShort,
+    /// What came is no JAUS, or out of step: nothing behind it can be trusted.
+    #[error("{0}")]
+    Malformed(wire::Error),
+    /// The other side has taken nothing for [`STUCK`], while messages for it were lost.
+    #[error("the other side took nothing for {} s while messages for it were lost", STUCK.as_secs())]
+    Stuck,
+    /// It had said nothing valid, and its place was needed.
+    #[error("it had said nothing valid and its place was needed")]
+    Silent,
+    /// The operating system's words.
+    #[error("{0}")]
+    Io(io::Error),
+}
+
+#[derive(Debug)]
+pub(super) struct Connection {
+    stream: TcpStream,
+    pub(super) dialed: bool,
+    pub(super) opened: Instant,
+    decoder: Decoder,
+    /// Frames received.
+    pub(super) received: u64,
+    /// The version octet that our direction began with.
+    spoken: Option<Version>,
+    backlog: Backlog<Bytes>,
+    /// On its way into the kernel; nothing overtakes it.
+    leaving: BytesMut,
+    /// As soon as so many octets wait, they are written.
+    write_at: usize,
+    /// Messages lost because the other side is slower.
+    pub(super) overflows: u64,
+    /// Messages lost, and no octet taken, since when; `None` in it until the clock is known.
+    stuck: Option<Option<Instant>>,
+    failed: Option<io::Error>,
+}
+
+impl Connection {
+    pub(super) fn new(stream: TcpStream, dialed: bool, now: Instant) -> io::Result<Self> {
+        stream.set_nodelay(true)?;
+        let keepalive = TcpKeepalive::new()
+            .with_time(Duration::from_secs(10))
+            .with_interval(Duration::from_secs(5));
+        SockRef::from(&stream).set_tcp_keepalive(&keepalive)?;
+        Ok(Self {
+            stream,
+            dialed,
+            opened: now,
+            decoder: Decoder::new(),
+            received: 0,
+            spoken: None,
+            backlog: Backlog::new(BACKLOG),
+            leaving: BytesMut::new(),
+            write_at: WRITE_AT_ONCE,
+            overflows: 0,
+            stuck: None,
+            failed: None,
+        })
+    }
+
+    /// Messages that wait for the other side.
+    pub(super) const fn waiting(&self) -> usize {
+        self.backlog.len()
+    }
+
+    /// Queues what [`jtcp::encode`](crate::wire::jtcp::encode) wrote. Whether it could be: a
+    /// connection carries one version.
+    pub(super) fn send(&mut self, priority: Priority, encoded: &Bytes) -> bool {
+        let (version, message) = split_version(encoded.clone());
+        let spoken = *self.spoken.get_or_insert_with(|| {
+            self.leaving.put_u8(match version {
+                Version::As5669a => VERSION_AS5669A,
+                Version::As5669 | Version::Ra => VERSION_AS5669,
+            });
+            version
+        });
+        if spoken != version {
+            return false;
+        }
+        let octets = message.len();
+        let lost = self.backlog.push(priority, octets, message);
+        self.overflows += lost;
+        if lost > 0 {
+            self.stuck.get_or_insert(None);
+        }
+        if self.backlog.octets() >= self.write_at {
+            self.write_straight();
+        }
+        true
+    }
+
+    /// Writes what the kernel takes without asking the runtime, which learns only between tasks
+    /// that there is room again.
+    fn write_straight(&mut self) {
+        while self.fill() {
+            match SockRef::from(&self.stream).send(&self.leaving) {
+                Ok(octets) => self.written(octets),
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) if e.kind() == io::ErrorKind::WouldBlock => break,
+                Err(e) => return self.fail(e),
+            }
+        }
+        self.write_at = self.backlog.octets() + WRITE_AT_ONCE;
+    }
+
+    /// Writes what waits; ready when nothing waits any more, or never will.
+    pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>, now: Instant) -> Poll<()> {
+        while self.failed.is_none() && self.fill() {
+            if let Some(since @ None) = &mut self.stuck {
+                *since = Some(now);
+            }
+            if ready!(self.stream.poll_write_ready(cx)).is_err() {
+                // The runtime is shutting down.
+                return Poll::Ready(());
+            }
+            match self.stream.try_write(&self.leaving) {
+                Ok(octets) => self.written(octets),
+                Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
+                Err(e) => self.fail(e),
+            }
+        }
+        Poll::Ready(())
+    }
+
+    /// Collects what is written with one call, the urgent first; whether there is anything.
+    fn fill(&mut self) -> bool {
+        while self.leaving.len() < CHUNK
+            && let Some(message) = self.backlog.pop()
+        {
+            self.leaving.extend_from_slice(&message);
+        }
+        !self.leaving.is_empty()
+    }
+
+    fn written(&mut self, octets: usize) {
+        self.stuck = None;
+        self.write_at = WRITE_AT_ONCE;
+        self.leaving.advance(octets);
+        if self.leaving.is_empty() {
+            // An idle connection holds no memory.
+            self.leaving = BytesMut::new();
+        }
+    }
+
+    fn fail(&mut self, error: io::Error) {
+        self.failed.get_or_insert(error);
+    }
+
+    /// When [`Closed::Stuck`] is due, unless the other side takes something before.
+    pub(super) fn stuck_at(&self) -> Option<Instant> {
+        self.stuck.flatten().map(|since| since + STUCK)
+    }
+
+    /// The next frame, or why there will be none.
+    pub(super) fn poll_recv(&mut self, cx: &mut Context<'_>) -> Poll<Result<Frame, Closed>> {
+        loop {
+            match self.decoder.next_frame() {
+                Ok(Some(frame)) => {
+                    self.received += 1;
+                    return Poll::Ready(Ok(frame));
+                }
+                Ok(None) => {}
+                Err(error) => return Poll::Ready(Err(Closed::Malformed(error))),
+            }
+            if let Some(error) = self.failed.take() {
+                return Poll::Ready(Err(Closed::Io(error)));
+            }
+            if let Err(closed) = ready!(self.poll_read(cx)) {
+                return Poll::Ready(Err(closed));
+            }
+        }
+    }
+
+    fn poll_read(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Closed>> {
+        loop {
+            if let Err(e) = ready!(self.stream.poll_read_ready(cx)) {
+                return Poll::Ready(Err(Closed::Io(e)));
+            }
+            let input = self.decoder.input();
+            input.reserve(CHUNK);
+            match self.stream.try_read_buf(input) {
+                Ok(0) if self.decoder.buffered() > 0 => {
+                    return Poll::Ready(Err(Closed::CutShort));
+                }
+                Ok(0) => return Poll::Ready(Err(Closed::Ended)),
+                Ok(_) => return Poll::Ready(Ok(())),
+                Err(e) if e.kind() == io::ErrorKind::WouldBlock => self.decoder.release(),
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => return Poll::Ready(Err(Closed::Io(e))),
+            }
+        }
+    }
+
+    /// The address of this end.
+    pub(super) fn local(&self) -> Option<SocketAddr> {
+        self.stream.local_addr().ok()
+    }
+}

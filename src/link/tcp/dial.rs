@@ -1,0 +1,148 @@
+//! Connecting to a configured peer, again and again, with growing pauses.
+
+use std::fmt;
+use std::hash::{BuildHasher, RandomState};
+use std::io;
+use std::net::SocketAddr;
+use std::pin::Pin;
+use std::task::{Context, Poll};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use tokio::net::TcpStream;
+
+use super::settings::{BACKLOG, CONNECT_TIMEOUT, FIRST_PAUSE, LONGEST_PAUSE};
+use crate::link::backlog::Backlog;
+use crate::wire::Priority;
+
+type Connecting = Pin<Box<dyn Future<Output = io::Result<TcpStream>> + Send>>;
+
+/// A peer that is to be connected to.
+#[derive(Debug)]
+pub(super) struct Dial {
+    pub(super) address: SocketAddr,
+    state: State,
+    failures: u32,
+    /// For the peer, while an attempt is under way.
+    pub(super) waiting: Backlog<(Priority, Bytes)>,
+}
+
+enum State {
+    /// A connection stands.
+    Connected,
+    Connecting {
+        attempt: Connecting,
+        until: Instant,
+    },
+    /// There is none, and until then there will be no attempt; `None`: at once.
+    Pausing(Option<Instant>),
+}
+
+impl fmt::Debug for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Connected => f.write_str("Connected"),
+            Self::Connecting { until, .. } => write!(f, "Connecting until {until:?}"),
+            Self::Pausing(until) => write!(f, "Pausing until {until:?}"),
+        }
+    }
+}
+
+impl Dial {
+    pub(super) fn new(address: SocketAddr) -> Self {
+        Self {
+            address,
+            state: State::Pausing(None),
+            failures: 0,
+            waiting: Backlog::new(BACKLOG),
+        }
+    }
+
+    /// Whether what is sent now may wait for a connection: before the first attempt and during
+    /// each. In the pauses it would wait for too long to be of use.
+    pub(super) const fn takes(&self) -> bool {
+        matches!(self.state, State::Connecting { .. } | State::Pausing(None))
+    }
+
+    /// When to poll again, if nothing happens before.
+    pub(super) const fn deadline(&self) -> Option<Instant> {
+        match self.state {
+            State::Connected => None,
+            State::Connecting { until, .. } => Some(until),
+            State::Pausing(until) => until,
+        }
+    }
+
+    /// A connection, or why an attempt has failed.
+    pub(super) fn poll(
+        &mut self,
+        cx: &mut Context<'_>,
+        now: Instant,
+    ) -> Poll<io::Result<TcpStream>> {
+        loop {
+            match &mut self.state {
+                State::Connected => return Poll::Pending,
+                State::Pausing(Some(until)) if now < *until => return Poll::Pending,
+                State::Pausing(_) => {
+                    self.state = State::Connecting {
+                        attempt: Box::pin(TcpStream::connect(self.address)),
+                        until: now + CONNECT_TIMEOUT,
+                    };
+                }
+                State::Connecting { attempt, until } => {
+                    let outcome = match attempt.as_mut().poll(cx) {
+                        Poll::Ready(outcome) => outcome,
+                        Poll::Pending if now >= *until => Err(io::ErrorKind::TimedOut.into()),
+                        Poll::Pending => return Poll::Pending,
+                    };
+                    match outcome {
+                        Ok(_) => self.state = State::Connected,
+                        Err(_) => self.pause(now),
+                    }
+                    return Poll::Ready(outcome);
+                }
+            }
+        }
+    }
+
+    /// The connection is gone; `was_good` if something valid had come through it.
+    pub(super) fn lost(&mut self, now: Instant, was_good: bool) {
+        if was_good {
+            self.failures = 0;
+        }
+        self.pause(now);
+    }
+
+    fn pause(&mut self, now: Instant) {
+        self.state = State::Pausing(Some(
+            now + pause(self.failures, RandomState::new().hash_one(())),
+        ));
+        self.failures = self.failures.saturating_add(1);
+    }
+}
+
+/// The pause after so many failures before, with a quarter more or less by chance.
+fn pause(failures: u32, chance: u64) -> Duration {
+    let doubled = FIRST_PAUSE
+        .saturating_mul(1 << failures.min(16))
+        .min(LONGEST_PAUSE);
+    let permille = 750 + (chance % 501) as u32;
+    doubled * permille / 1000
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pauses_grow_to_a_bound_and_differ() {
+        let shortest = |failures| pause(failures, 0);
+        let longest = |failures| pause(failures, 500);
+        assert_eq!(shortest(0), FIRST_PAUSE * 3 / 4);
+        assert_eq!(longest(0), FIRST_PAUSE * 5 / 4);
+        assert_eq!(shortest(3), FIRST_PAUSE * 6);
+        for failures in [10, 100, u32::MAX] {
+            assert_eq!(longest(failures), LONGEST_PAUSE * 5 / 4);
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! How a TCP link is set up, and its bounds.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use crate::link::backlog::Bounds;
+
+/// How a [`TcpLink`](super::TcpLink) is set up.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Where others may connect to; nowhere by default.
+    pub listen: Option<SocketAddr>,
+    /// Whom to connect to, again and again when a connection is lost.
+    pub connect: Vec<SocketAddr>,
+    /// The most connections that others may open. With so many, one that has not said anything
+    /// valid for [`HANDSHAKE`] gives way to a new one; else the new one is refused.
+    pub max_accepted: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            listen: None,
+            connect: Vec::new(),
+            max_accepted: 64,
+        }
+    }
+}
+
+/// How long a connection may say nothing valid before it can lose its place.
+pub const HANDSHAKE: Duration = Duration::from_secs(5);
+
+/// How long an attempt to connect may take.
+pub const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// The pause after the first attempt that failed. It doubles with each further one, up to
+/// [`LONGEST_PAUSE`]; a quarter more or less is left to chance, so that many nodes do not come back
+/// to a restarted one at the same time.
+pub const FIRST_PAUSE: Duration = Duration::from_millis(250);
+
+/// The longest pause between two attempts to connect, but for the quarter that chance may add.
+pub const LONGEST_PAUSE: Duration = Duration::from_secs(15);
+
+/// How long a peer may take nothing while messages for it are lost, before its connection is closed.
+pub const STUCK: Duration = Duration::from_secs(10);
+
+/// How much may wait for one connection. Then the oldest of the least urgent goes.
+pub(super) const BACKLOG: Bounds = Bounds {
+    items: 4096,
+    octets: 4 << 20,
+};
