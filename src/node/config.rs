@@ -18,10 +18,13 @@
 //! messages = 1024
 //! ```
 
+mod tcp;
+
 use std::fmt;
 use std::net::{SocketAddr, SocketAddrV4};
 use std::str::FromStr;
 
+pub use self::tcp::{InvalidListen, Listen, Tcp};
 use super::mailbox::MailboxLimits;
 use crate::address::{JausId, ParseIdError};
 use crate::endpoint::{self, PAYLOAD_LIMITS};
@@ -51,7 +54,8 @@ pub struct Config {
     pub subsystem: u16,
     /// The node number within the subsystem, 1 to 254.
     pub node: u8,
-    /// The interfaces to open links on.
+    /// The interfaces to open UDP links on. With none of them, an empty list, there is no UDP, which
+    /// is allowed beside TCP connections or serial lines.
     pub interfaces: Interfaces,
     /// The versions of IP that are used on them.
     pub ip: Ip,
@@ -81,6 +85,8 @@ pub struct Config {
     pub mailbox: MailboxLimits,
     /// Where component processes of this host may attach, if at all.
     pub local: Local,
+    /// TCP connections, to and from other nodes.
+    pub tcp: Tcp,
 }
 
 impl Default for Config {
@@ -112,6 +118,7 @@ impl Config {
             max_message: endpoint.max_message,
             mailbox: MailboxLimits::default(),
             local: Local::Off,
+            tcp: Tcp::default(),
         }
     }
 
@@ -168,6 +175,26 @@ impl Config {
         self
     }
 
+    /// Uses no UDP at all, but the TCP connections and serial lines that are configured.
+    #[must_use]
+    pub fn without_udp(self) -> Self {
+        self.interfaces::<String>([])
+    }
+
+    /// Lets others connect to this address by TCP.
+    #[must_use]
+    pub fn tcp_listen(mut self, at: Listen) -> Self {
+        self.tcp.listen = Some(at);
+        self
+    }
+
+    /// Connects to a peer by TCP.
+    #[must_use]
+    pub fn tcp_connect(mut self, peer: Peer) -> Self {
+        self.tcp.connect.push(peer);
+        self
+    }
+
     /// Adds a peer that is also spoken to by unicast.
     #[must_use]
     pub fn peer(mut self, peer: Peer) -> Self {
@@ -213,6 +240,16 @@ impl Config {
             first_sequence,
             ..usual
         }
+    }
+
+    /// Whether other links than UDP are wanted.
+    pub(super) const fn has_streams(&self) -> bool {
+        self.tcp.is_used()
+    }
+
+    /// Whether UDP is wanted: an empty list of interfaces turns it off, if there is another way.
+    pub(super) fn uses_udp(&self) -> bool {
+        self.interfaces != Interfaces::Only(Vec::new()) || !self.has_streams()
     }
 
     pub(super) fn udp(&self) -> udp::Settings {

@@ -18,15 +18,10 @@ use super::error::SendError;
 use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
 use crate::address::JausId;
-use crate::endpoint::{
-    AttachError, Endpoint, Event, LinkProfile, MessageHandle, Outgoing, Path, Received, Remote,
-    Transmit,
-};
+use crate::endpoint::{AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, Transmit};
 use crate::link::Slab;
 use crate::link::local::Process;
 
-/// Datagrams taken from one link before the others have their turn.
-const BATCH: usize = 32;
 /// Node events kept for a slow listener.
 const EVENTS: usize = 256;
 /// How long a node that shuts down tries to send what waits.
@@ -114,12 +109,8 @@ impl Core {
     /// any of them, so each is told all addresses.
     fn announce_links(&mut self) {
         for (id, link) in self.links.iter() {
-            let own = self.links.iter().map(|(_, link)| link.local());
-            let profile = LinkProfile {
-                max_segments: link.max_segments(),
-                ..LinkProfile::judp(own)
-            };
-            self.endpoint.add_link(id, profile);
+            let own = self.links.udp().map(|(_, link)| link.local());
+            self.endpoint.add_link(id, link.profile(own));
         }
         self.endpoint.set_static_peers(self.links.static_peers());
     }
@@ -214,7 +205,7 @@ impl Core {
             self.endpoint.handle_timeout(now);
         }
         self.pump();
-        let flushed = self.flush(cx);
+        let flushed = self.flush(cx, now);
         if self
             .stop_at
             .is_some_and(|deadline| flushed || deadline <= now)
@@ -230,10 +221,15 @@ impl Core {
 
     /// When the driver wants its next turn, if nothing else happens.
     pub(super) fn deadline(&self) -> Option<Instant> {
-        [self.endpoint.poll_timeout(), self.follow_at, self.stop_at]
-            .into_iter()
-            .flatten()
-            .min()
+        [
+            self.endpoint.poll_timeout(),
+            self.links.poll_timeout(),
+            self.follow_at,
+            self.stop_at,
+        ]
+        .into_iter()
+        .flatten()
+        .min()
     }
 
     /// Hands on what the endpoint has to say: datagrams to links, messages to mailboxes.
@@ -279,26 +275,16 @@ impl Core {
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
         let mut more = false;
         for (id, link) in self.links.iter_mut() {
-            let mut batch = 0;
-            while let Poll::Ready((peer, datagram)) = link.poll_recv(cx, &mut self.slab) {
-                let peer = Remote::Socket(peer);
-                let path = Path { link: id, peer };
-                self.endpoint.handle_datagram(now, path, datagram);
-                batch += 1;
-                if batch == BATCH {
-                    more = true;
-                    break;
-                }
-            }
+            more |= link.receive(cx, now, id, &mut self.slab, &mut self.endpoint);
         }
         more
     }
 
     /// Sends what waits for the network; whether nothing waits any more.
-    fn flush(&mut self, cx: &mut Context<'_>) -> bool {
+    fn flush(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
         let mut flushed = true;
         for (_, link) in self.links.iter_mut() {
-            flushed &= link.poll_flush(cx).is_ready();
+            flushed &= link.poll_flush(cx, now).is_ready();
         }
         flushed
     }

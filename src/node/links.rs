@@ -1,4 +1,5 @@
-//! The links of a node: one on each chosen interface, also when interfaces come and go.
+//! The links of a node: one for UDP on each chosen interface, also when interfaces come and go, and
+//! one for all TCP connections.
 //!
 //! A board may start its node before its network is up, and Wi-Fi comes back with another
 //! address. So the node looks at the host's interfaces again every [`INTERVAL`], opens links on
@@ -6,10 +7,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::{IpAddr, SocketAddr};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use super::link::Link;
 use super::{Config, Peer, StartError};
 use crate::endpoint::{LinkId, Path, StaticPeer};
+use crate::link::tcp::TcpLink;
 use crate::link::udp::UdpLink;
 use crate::link::{Available, Error, Interface, Interfaces, interface};
 
@@ -20,15 +23,34 @@ pub(super) const INTERVAL: Duration = Duration::from_secs(2);
 #[derive(Debug)]
 pub(super) struct Links {
     config: Config,
-    open: BTreeMap<LinkId, UdpLink>,
+    open: BTreeMap<LinkId, Link>,
     next: LinkId,
     /// Addresses where a link could not be opened; said once.
     refused: BTreeSet<SocketAddr>,
 }
 
 impl Links {
-    /// Opens a link on every chosen interface. Nothing stays open if one fails.
+    /// Opens a link on every chosen interface, and those for streams. Nothing stays open if one
+    /// fails.
     pub(super) fn open(config: &Config) -> Result<Self, StartError> {
+        let mut links = Self {
+            config: config.clone(),
+            open: BTreeMap::new(),
+            next: LinkId(0),
+            refused: BTreeSet::new(),
+        };
+        if config.uses_udp() {
+            links.open_udp()?;
+        }
+        if config.tcp.is_used() {
+            let link = TcpLink::open(&config.tcp.settings())?;
+            links.insert(Link::Tcp(link));
+        }
+        Ok(links)
+    }
+
+    fn open_udp(&mut self) -> Result<(), StartError> {
+        let config = self.config.clone();
         let mut chosen = config.interfaces.choose(config.ip)?;
         for &peer in &config.peers {
             lead_to(peer, &config.interfaces, &mut chosen)?;
@@ -38,31 +60,38 @@ impl Links {
         // The network of a board that has just started may come yet.
         let alone = chosen.iter().all(Interface::is_loopback);
         let waits = alone && config.interfaces == Interfaces::All;
-        if deaf && !waits && config.peers.is_empty() {
+        if deaf && !waits && config.peers.is_empty() && !config.has_streams() {
             return Err(Error::NoMulticast(Available(chosen)).into());
         }
-        let mut links = Self {
-            config: config.clone(),
-            open: BTreeMap::new(),
-            next: LinkId(0),
-            refused: BTreeSet::new(),
-        };
         for interface in &chosen {
-            links.add(interface)?;
+            self.add(interface)?;
         }
-        links.distribute_peers();
-        Ok(links)
+        self.distribute_peers();
+        Ok(())
     }
 
-    pub(super) fn get_mut(&mut self, link: LinkId) -> Option<&mut UdpLink> {
+    pub(super) fn get_mut(&mut self, link: LinkId) -> Option<&mut Link> {
         self.open.get_mut(&link)
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = (LinkId, &UdpLink)> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = (LinkId, &Link)> {
         self.open.iter().map(|(&id, link)| (id, link))
     }
 
-    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = (LinkId, &mut UdpLink)> {
+    pub(super) fn udp(&self) -> impl Iterator<Item = (LinkId, &UdpLink)> {
+        self.iter().filter_map(|(id, link)| Some((id, link.udp()?)))
+    }
+
+    pub(super) fn tcp(&self) -> Option<(LinkId, &TcpLink)> {
+        self.iter().find_map(|(id, link)| Some((id, link.tcp()?)))
+    }
+
+    /// When one of them wants a turn, if nothing arrives before.
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        self.open.values().filter_map(Link::poll_timeout).min()
+    }
+
+    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = (LinkId, &mut Link)> {
         self.open.iter_mut().map(|(&id, link)| (id, link))
     }
 
@@ -72,7 +101,7 @@ impl Links {
 
     /// Whether interfaces that come and go matter to this node.
     pub(super) fn follows(&self) -> bool {
-        self.config.interfaces != Interfaces::Loopback
+        self.config.uses_udp() && self.config.interfaces != Interfaces::Loopback
     }
 
     /// Opens links on interfaces that came and closes those that went, which are returned;
@@ -87,7 +116,7 @@ impl Links {
         let gone = self.close_all_but(&wanted);
         let mut came = false;
         for interface in &wanted {
-            if !self.open.values().any(|link| link.interface() == interface) {
+            if !self.udp().any(|(_, link)| link.interface() == interface) {
                 came |= self.try_add(interface);
             }
         }
@@ -111,17 +140,36 @@ impl Links {
                 gets_broadcasts: true,
             })
         };
-        self.config.peers.iter().filter_map(named).collect()
+        let behind_connection = |&peer: &Peer| {
+            let path = Path {
+                link: self.tcp()?.0,
+                peer: peer.address().into(),
+            };
+            // What is for everyone goes to all connections anyway.
+            Some(StaticPeer {
+                id: peer.id()?,
+                path,
+                gets_broadcasts: false,
+            })
+        };
+        let config = &self.config;
+        let by_udp = config.peers.iter().filter_map(named);
+        let by_tcp = config.tcp.connect.iter().filter_map(behind_connection);
+        by_udp.chain(by_tcp).collect()
     }
 
     fn add(&mut self, interface: &Interface) -> Result<(), Error> {
         let link = UdpLink::open(interface, &self.config.udp())?;
+        self.insert(Link::Udp(link));
+        Ok(())
+    }
+
+    fn insert(&mut self, link: Link) {
         while self.open.contains_key(&self.next) {
             self.next = LinkId(self.next.0.wrapping_add(1));
         }
         self.open.insert(self.next, link);
         self.next = LinkId(self.next.0.wrapping_add(1));
-        Ok(())
     }
 
     fn try_add(&mut self, interface: &Interface) -> bool {
@@ -142,12 +190,12 @@ impl Links {
     fn close_all_but(&mut self, wanted: &[Interface]) -> Vec<LinkId> {
         let is_gone = |link: &UdpLink| !wanted.contains(link.interface());
         let gone: Vec<_> = self
-            .iter()
+            .udp()
             .filter(|(_, link)| is_gone(link))
             .map(|(id, _)| id)
             .collect();
         for id in &gone {
-            if let Some(link) = self.open.remove(id) {
+            if let Some(Link::Udp(link)) = self.open.remove(id) {
                 tracing::info!(interface = %link.interface(), "link closed: the interface is gone");
             }
         }
@@ -161,6 +209,9 @@ impl Links {
             .filter_map(|peer| Some((self.link_to(peer.address())?, peer.address())))
             .collect();
         for (&id, link) in &mut self.open {
+            let Link::Udp(link) = link else {
+                continue;
+            };
             link.set_peers(
                 placed
                     .iter()
@@ -173,13 +224,13 @@ impl Links {
 
     /// The link that leads to an address; any if there is no way there just now.
     fn link_to(&self, address: SocketAddr) -> Option<LinkId> {
-        let interfaces = || self.open.values().map(UdpLink::interface);
+        let interfaces = || self.udp().map(|(_, link)| link.interface());
         let local = way_to(address, interfaces());
         let leads = |link: &UdpLink| Some(link.interface().address) == local;
         let link = self
-            .iter()
+            .udp()
             .find(|(_, link)| leads(link))
-            .or_else(|| self.iter().next());
+            .or_else(|| self.udp().next());
         link.map(|(id, _)| id)
     }
 }

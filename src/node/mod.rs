@@ -39,6 +39,7 @@ mod core;
 mod driver;
 mod error;
 mod host;
+mod link;
 mod links;
 mod local;
 mod mailbox;
@@ -50,7 +51,7 @@ use std::sync::Arc;
 use tokio::sync::broadcast;
 
 pub use self::attendance::{ComponentEvent, Departure};
-pub use self::config::{Config, ConfigError, Peer};
+pub use self::config::{Config, ConfigError, InvalidListen, Listen, Peer, Tcp};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::host::{Host, HostEvent, HostEvents};
 pub use self::mailbox::{MailboxCounters, MailboxLimits};
@@ -66,7 +67,7 @@ use self::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
 use crate::link::local::Door;
-use crate::link::{Interface, udp};
+use crate::link::{Interface, tcp, udp};
 
 /// A handle to a running node. Cheap to clone.
 ///
@@ -140,7 +141,7 @@ impl Node {
         Ok(Port::new(id, mailbox, self.guard.clone()))
     }
 
-    /// The open links; none after the node has stopped.
+    /// The open UDP links; none after the node has stopped.
     #[must_use]
     pub fn links(&self) -> Vec<LinkReport> {
         let core = self.shared().lock();
@@ -152,7 +153,20 @@ impl Node {
             counters: *link.counters(),
             kernel_drops: link.kernel_drops(),
         };
-        core.links.iter().map(report).collect()
+        core.links.udp().map(report).collect()
+    }
+
+    /// The TCP connections, if they are configured and the node has not stopped.
+    #[must_use]
+    pub fn tcp(&self) -> Option<TcpReport> {
+        let core = self.shared().lock();
+        let (link, tcp) = core.links.tcp()?;
+        Some(TcpReport {
+            link,
+            listening: tcp.local(),
+            connections: tcp.connections().collect(),
+            counters: tcp.counters(),
+        })
     }
 
     /// The peers whose addresses are known, in order of their ids.
@@ -223,7 +237,20 @@ pub struct ComponentReport {
     pub mailbox: MailboxCounters,
 }
 
-/// One link of a node, as it is now.
+/// The TCP connections of a node, as they are now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TcpReport {
+    /// Their number in [`Path`](endpoint::Path).
+    pub link: LinkId,
+    /// Where others may connect to.
+    pub listening: Option<SocketAddr>,
+    /// Those that stand, in order of their remote addresses.
+    pub connections: Vec<tcp::ConnectionReport>,
+    /// What has become of connections and messages.
+    pub counters: tcp::Counters,
+}
+
+/// One UDP link of a node, as it is now.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LinkReport {
     /// Its number in [`Path`](endpoint::Path).

@@ -1,0 +1,102 @@
+//! One open link of a node, of whichever kind.
+
+use std::net::SocketAddr;
+use std::task::{Context, Poll};
+use std::time::Instant;
+
+use crate::endpoint::{Endpoint, LinkId, LinkProfile, Path, Remote, Transmit};
+use crate::link::Slab;
+use crate::link::tcp::{Arrival, TcpLink};
+use crate::link::udp::UdpLink;
+use crate::wire::Framing;
+
+/// Datagrams taken from one link before the others have their turn.
+const BATCH: usize = 32;
+
+#[derive(Debug)]
+pub(super) enum Link {
+    Udp(UdpLink),
+    Tcp(TcpLink),
+}
+
+impl Link {
+    pub(super) const fn udp(&self) -> Option<&UdpLink> {
+        match self {
+            Self::Udp(link) => Some(link),
+            Self::Tcp(_) => None,
+        }
+    }
+
+    pub(super) const fn tcp(&self) -> Option<&TcpLink> {
+        match self {
+            Self::Tcp(link) => Some(link),
+            Self::Udp(_) => None,
+        }
+    }
+
+    /// What the endpoint is to know; `own` are the addresses that UDP is sent from.
+    pub(super) fn profile(&self, own: impl IntoIterator<Item = SocketAddr>) -> LinkProfile {
+        match self {
+            Self::Udp(link) => LinkProfile {
+                max_segments: link.max_segments(),
+                ..LinkProfile::judp(own)
+            },
+            Self::Tcp(_) => LinkProfile {
+                framing: Framing::Jtcp,
+                ..LinkProfile::default()
+            },
+        }
+    }
+
+    pub(super) fn transmit(&mut self, transmit: &Transmit) {
+        match self {
+            Self::Udp(link) => link.transmit(transmit),
+            Self::Tcp(link) => link.transmit(transmit),
+        }
+    }
+
+    /// Sends what waits for the network; ready when nothing waits any more.
+    pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>, now: Instant) -> Poll<()> {
+        match self {
+            Self::Udp(link) => link.poll_flush(cx),
+            Self::Tcp(link) => link.poll_flush(cx, now),
+        }
+    }
+
+    /// When the link wants a turn, if nothing arrives before.
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        match self {
+            Self::Udp(_) => None,
+            Self::Tcp(link) => link.poll_timeout(),
+        }
+    }
+
+    /// Gives the endpoint what has arrived; whether there was more than the link's share.
+    pub(super) fn receive(
+        &mut self,
+        cx: &mut Context<'_>,
+        now: Instant,
+        id: LinkId,
+        slab: &mut Slab,
+        endpoint: &mut Endpoint,
+    ) -> bool {
+        let from = |peer| Path { link: id, peer };
+        match self {
+            Self::Udp(link) => {
+                for _ in 0..BATCH {
+                    let Poll::Ready((peer, datagram)) = link.poll_recv(cx, slab) else {
+                        return false;
+                    };
+                    endpoint.handle_datagram(now, from(Remote::Socket(peer)), datagram);
+                }
+                true
+            }
+            Self::Tcp(link) => link.receive(cx, now, |arrival| match arrival {
+                Arrival::Frame(peer, frame) => {
+                    endpoint.handle_frame(now, from(Remote::Socket(peer)), &frame);
+                }
+                Arrival::Closed(peer, _) => endpoint.forget_path(from(Remote::Socket(peer))),
+            }),
+        }
+    }
+}
