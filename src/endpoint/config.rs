@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use super::{LargeStyle, Path};
+use super::{LargeStyle, Pacing, Packing, Path};
 use crate::address::JausId;
 
 /// The payloads that packets may be limited to, in octets.
@@ -78,6 +78,14 @@ pub struct Config {
     pub initial_window: usize,
     /// How many packets may ever be on their way to one destination.
     pub max_window: usize,
+    /// How fast large messages without acknowledgement leave; `None` for as fast as the link takes
+    /// them.
+    pub pacing: Option<Pacing>,
+    /// The most octets of large messages without acknowledgement that wait to be sent. A single
+    /// longer message is taken when no other waits.
+    pub max_paced: usize,
+    /// Whether small messages share datagrams.
+    pub packing: Packing,
     /// The shortest time between two [`Event::IdConflict`](super::Event::IdConflict) about one id.
     pub conflict_interval: Duration,
     /// The number before the first sequence number. A node should choose it at random, because some
@@ -110,6 +118,9 @@ impl Default for Config {
             max_flows: 256,
             initial_window: 16,
             max_window: 512,
+            pacing: Some(Pacing::default()),
+            max_paced: 32 << 20,
+            packing: Packing::Off,
             conflict_interval: Duration::from_secs(5),
             first_sequence: 0,
         }

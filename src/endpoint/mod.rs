@@ -38,6 +38,9 @@ mod event;
 mod large;
 mod link;
 mod local;
+mod output;
+mod pacing;
+mod packing;
 mod peers;
 mod queue;
 mod receive;
@@ -56,14 +59,17 @@ pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
 pub use large::LargeStyle;
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
+pub use pacing::Pacing;
+pub use packing::Packing;
 pub use peers::Peer;
 pub use send::SendError;
 
 use crate::address::JausId;
-use crate::wire::Priority;
 use delivery::Deliveries;
 use large::{LargeStyles, Numbers, Reassembly};
 use local::Components;
+use pacing::Pacer;
+use packing::Gathering;
 use peers::Peers;
 use queue::PriorityQueue;
 use recent::Recent;
@@ -83,6 +89,10 @@ pub struct Endpoint {
     deliveries: Deliveries,
     conflicts: BTreeMap<JausId, Instant>,
     transmits: PriorityQueue<Transmit>,
+    /// Taken out, but it did not go with the one before.
+    held: Option<Transmit>,
+    pacer: Pacer,
+    gathering: Gathering,
     messages: PriorityQueue<Received>,
     news: VecDeque<Event>,
     /// How many of the news are results of messages, for which there is always room.
@@ -111,6 +121,9 @@ impl Endpoint {
             deliveries: Deliveries::new(&config),
             conflicts: BTreeMap::new(),
             transmits: PriorityQueue::new(config.queue_limit),
+            held: None,
+            pacer: Pacer::new(&config),
+            gathering: Gathering::default(),
             messages: PriorityQueue::new(config.queue_limit),
             news: VecDeque::new(),
             untold: 0,
@@ -153,6 +166,9 @@ impl Endpoint {
         self.links.remove(&link);
         self.peers.forget_link(link);
         self.transmits.retain(|transmit| transmit.link != link);
+        self.held.take_if(|transmit| transmit.link == link);
+        self.pacer.forget_link(link);
+        self.gathering.forget_link(link);
     }
 
     /// Tells that a connection has closed: what was learned through it is forgotten.
@@ -175,17 +191,14 @@ impl Endpoint {
     pub fn handle_timeout(&mut self, now: Instant) {
         self.latest = Some(now);
         self.retry_unacknowledged(now);
+        self.pacer.handle_timeout(now);
+        self.send_gathered(now);
         self.reassembly.expire(now, &mut self.counters);
     }
 
-    /// The next datagram to send, the most urgent first.
+    /// The next datagram to send, or several for links that take them so; the most urgent first.
     pub fn poll_transmit(&mut self) -> Option<Transmit> {
-        let transmit = Priority::ALL.into_iter().rev().find_map(|priority| {
-            let queued = self.transmits.pop_at(priority);
-            queued.or_else(|| self.next_delivery(priority))
-        })?;
-        self.counters.add(Counter::DatagramsSent);
-        Some(transmit)
+        self.next_transmit()
     }
 
     /// The next event: news first, then received messages, the most urgent first.
@@ -204,6 +217,8 @@ impl Endpoint {
     pub fn poll_timeout(&self) -> Option<Instant> {
         [
             self.deliveries.next_deadline(),
+            self.pacer.next_deadline(),
+            self.gathering.next_deadline(),
             self.reassembly.next_expiry(),
         ]
         .into_iter()
@@ -230,14 +245,5 @@ impl Endpoint {
     fn tell_result(&mut self, event: Event) {
         self.untold += 1;
         self.news.push_back(event);
-    }
-
-    /// Queues a datagram, if there is room; a full queue is counted.
-    fn transmit(&mut self, transmit: Transmit) -> bool {
-        let queued = self.transmits.push(transmit.priority, transmit).is_ok();
-        if !queued {
-            self.counters.add(Counter::TransmitQueueFull);
-        }
-        queued
     }
 }

@@ -18,6 +18,7 @@ impl Endpoint {
     /// news come out of [`poll_event`](Self::poll_event) and
     /// [`poll_transmit`](Self::poll_transmit).
     pub fn handle_datagram(&mut self, now: Instant, from: Path, data: Bytes) {
+        self.latest = Some(now);
         self.counters.add(Counter::DatagramsReceived);
         if !self.links.contains_key(&from.link) {
             return self.counters.add(Counter::UnknownLink);
@@ -48,6 +49,7 @@ impl Endpoint {
     /// Takes a frame that came from `from`, from a link that reads frames itself. Nothing in it is
     /// an error, as with [`handle_datagram`](Self::handle_datagram).
     pub fn handle_frame(&mut self, now: Instant, from: Path, frame: &Frame) {
+        self.latest = Some(now);
         self.counters.add(Counter::MessagesReceived);
         if !self.links.contains_key(&from.link) {
             return self.counters.add(Counter::UnknownLink);

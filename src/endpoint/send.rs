@@ -2,13 +2,12 @@
 
 use std::time::Instant;
 
-use bytes::Bytes;
-use tracing::trace;
+use tracing::{debug, trace};
 
 use super::large::{Cut, LargeStyle};
+use super::pacing::Stretch;
 use super::{
-    Counter, Endpoint, Event, LinkId, LinkProfile, MessageHandle, Outgoing, Path, Received, To,
-    Transmit,
+    Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To, Transmit,
 };
 use crate::address::JausId;
 use crate::wire::{
@@ -64,6 +63,12 @@ pub enum SendError {
     #[error("messages to {limit} destinations wait for acknowledgements already")]
     TooManyDestinations {
         /// [`Config::max_flows`](super::Config::max_flows).
+        limit: usize,
+    },
+    /// Too much of large messages waits to be sent.
+    #[error("large messages of {limit} octets wait to be sent already")]
+    TooMuchQueued {
+        /// [`Config::max_paced`](super::Config::max_paced).
         limit: usize,
     },
     /// Too many datagrams or messages wait to be sent or delivered.
@@ -182,25 +187,81 @@ impl Endpoint {
             return Err(SendError::NoLink(destination));
         }
         self.check_length(message)?;
-        if message.acknowledge {
+        let length = message.payload.len();
+        let repeat_code = self.repeats_code(message.destination);
+        let cut = Cut::new(length, self.config.payload_limit, repeat_code);
+        // What is large goes to everybody only until the address is known.
+        let seeks = scope == Broadcast::None && self.route(message.destination).is_none();
+        if message.acknowledge || cut.count() > 1 && seeks {
             return self.deliver_reliably(now, handle, message, scope);
         }
-        let frames = self.frames(message, scope);
-        let transmits: Vec<_> = frames
-            .iter()
-            .map(|frame| self.transmits_of(frame))
-            .collect::<Result<_, _>>()?;
-        if !self
-            .transmits
-            .has_room(message.priority, transmits.iter().map(Vec::len).sum())
-        {
+        let first = self.numbers.take(cut.count());
+        if cut.count() > 1 {
+            return self.pace(now, message, scope, cut, first);
+        }
+        let frame = Frame {
+            flags: Flags::new(message.priority).with_broadcast(scope),
+            sequence: first as u16,
+            ..Frame::new(message.source, message.destination, message.payload.clone())
+        };
+        let transmits = self.transmits_of(&frame)?;
+        if !self.transmits.has_room(message.priority, transmits.len()) {
             self.counters.add(Counter::TransmitQueueFull);
             return Err(SendError::QueueFull { limit });
         }
-        for (frame, transmits) in frames.into_iter().zip(transmits) {
-            self.queue(now, &frame, transmits);
+        for transmit in self.remember_echo(now, &frame, transmits) {
+            self.transmit(transmit);
         }
         Ok(())
+    }
+
+    /// Takes in a large message that wants no acknowledgement.
+    fn pace(
+        &mut self,
+        now: Instant,
+        message: &Outgoing,
+        scope: Broadcast,
+        cut: Cut,
+        first: u64,
+    ) -> Result<(), SendError> {
+        let flags = Flags::new(message.priority).with_broadcast(scope);
+        let (flags, ways) = self.ways(message.destination, flags);
+        if !self.pacer.has_room(ways.len() * message.payload.len()) {
+            self.counters.add(Counter::TransmitQueueFull);
+            let limit = self.config.max_paced;
+            return Err(SendError::TooMuchQueued { limit });
+        }
+        for Way { link, to, version } in ways {
+            let stretch = Stretch {
+                source: message.source,
+                destination: message.destination,
+                version,
+                flags,
+                payload: message.payload.clone(),
+                cut,
+                first,
+            };
+            self.pacer.push(now, (link, to), stretch);
+        }
+        Ok(())
+    }
+
+    /// The next fragment of a large message that wants no acknowledgement, if one of this priority
+    /// may be sent.
+    pub(super) fn next_paced(&mut self, priority: Priority) -> Option<Transmit> {
+        let now = self.latest?;
+        loop {
+            let ((link, to), frame) = self.pacer.take(now, priority)?;
+            let way = Way {
+                link,
+                to,
+                version: frame.version,
+            };
+            match self.transmit_of(&way, &frame) {
+                Ok(transmit) => return self.remember_echo(now, &frame, vec![transmit]).pop(),
+                Err(error) => debug!(destination = %frame.destination, %error, "cannot be sent"),
+            }
+        }
     }
 
     /// Whether what is sent to `destination` names the message code in each fragment.
@@ -219,28 +280,6 @@ impl Endpoint {
             return Err(SendError::TooLong { length, limit });
         }
         Ok(())
-    }
-
-    /// The frame that carries a message, or its fragments.
-    fn frames(&mut self, message: &Outgoing, scope: Broadcast) -> Vec<Frame> {
-        let repeat_code = self.repeats_code(message.destination);
-        let cut = Cut::new(
-            message.payload.len(),
-            self.config.payload_limit,
-            repeat_code,
-        );
-        let flags = Flags::new(message.priority).with_broadcast(scope);
-        let first = self.numbers.take(cut.count());
-        (0..cut.count())
-            .map(|index| {
-                let (data, payload) = cut.fragment(&message.payload, index);
-                Frame {
-                    flags: flags.with_data(data),
-                    sequence: (first + index as u64) as u16,
-                    ..Frame::new(message.source, message.destination, payload)
-                }
-            })
-            .collect()
     }
 
     /// Where and with which header to reach `destination`, if that is known and there is a link.
@@ -264,56 +303,58 @@ impl Endpoint {
         transmits
     }
 
-    fn queue(&mut self, now: Instant, frame: &Frame, transmits: Vec<Transmit>) {
-        for transmit in self.remember_echo(now, frame, transmits) {
-            self.transmit(transmit);
-        }
-    }
-
     /// The datagrams that carry a frame to where its destination is.
     pub(super) fn transmits_of(&self, frame: &Frame) -> Result<Vec<Transmit>, SendError> {
-        let destination = frame.destination;
-        if destination.has_wildcard() || frame.flags.broadcast() != Some(Broadcast::None) {
-            return self.to_group(frame);
-        }
-        let Some((path, version)) = self.route(destination) else {
-            trace!(%destination, "address unknown");
-            let flags = frame
-                .flags
-                .with_broadcast(Broadcast::Global)
-                .with_acknowledgement(Acknowledgement::Request);
-            return self.to_group(&Frame {
-                flags,
-                ..frame.clone()
-            });
-        };
-        let priority = frame.flags.priority();
-        let payload = self.framing(path.link).encode(&Frame {
-            version,
+        let (flags, ways) = self.ways(frame.destination, frame.flags);
+        let frame = Frame {
+            flags,
             ..frame.clone()
-        })?;
-        Ok(vec![to_path(path, priority, payload)])
+        };
+        ways.iter()
+            .map(|way| Ok(self.transmit_of(way, &frame)?))
+            .collect()
     }
 
-    /// A frame for the group of every link and for the static peers that multicast does not reach.
-    fn to_group(&self, frame: &Frame) -> Result<Vec<Transmit>, SendError> {
-        let priority = frame.flags.priority();
-        let group = |(&link, profile): (&LinkId, &LinkProfile)| {
-            Ok(Transmit {
-                link,
-                to: To::Group,
-                priority,
-                payload: profile.framing.encode(frame)?,
-                segment: None,
-            })
+    fn transmit_of(&self, way: &Way, frame: &Frame) -> Result<Transmit, EncodeError> {
+        let frame = Frame {
+            version: way.version,
+            ..frame.clone()
         };
-        let copies = self.peers.broadcast_copies(frame.destination);
-        let copy = |path: Path| {
-            let payload = self.framing(path.link).encode(frame)?;
-            Ok(to_path(path, priority, payload))
+        Ok(Transmit {
+            link: way.link,
+            to: way.to,
+            priority: frame.flags.priority(),
+            payload: self.framing(way.link).encode(&frame)?,
+            segment: None,
+        })
+    }
+
+    /// The ways to where a destination is. If its address is unknown: to everybody, with flags that
+    /// ask it for an answer.
+    fn ways(&self, destination: JausId, flags: Flags) -> (Flags, Vec<Way>) {
+        if destination.has_wildcard() || flags.broadcast() != Some(Broadcast::None) {
+            return (flags, self.ways_to_group(destination));
+        }
+        if let Some((path, version)) = self.route(destination) {
+            return (flags, vec![Way::along(path, version)]);
+        }
+        trace!(%destination, "address unknown");
+        let flags = flags
+            .with_broadcast(Broadcast::Global)
+            .with_acknowledgement(Acknowledgement::Request);
+        (flags, self.ways_to_group(destination))
+    }
+
+    /// The group of every link, and the static peers that multicast does not reach.
+    fn ways_to_group(&self, destination: JausId) -> Vec<Way> {
+        let group = |&link: &LinkId| Way {
+            link,
+            to: To::Group,
+            version: Version::As5669a,
         };
-        let copies = copies.into_iter().map(copy);
-        self.links.iter().map(group).chain(copies).collect()
+        let copies = self.peers.broadcast_copies(destination).into_iter();
+        let copies = copies.map(|path| Way::along(path, Version::As5669a));
+        self.links.keys().map(group).chain(copies).collect()
     }
 
     /// How a link frames messages.
@@ -324,13 +365,21 @@ impl Endpoint {
     }
 }
 
-fn to_path(path: Path, priority: Priority, payload: Bytes) -> Transmit {
-    Transmit {
-        link: path.link,
-        to: To::Peer(path.peer),
-        priority,
-        payload,
-        segment: None,
+/// Whereto, and with which header.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    link: LinkId,
+    to: To,
+    version: Version,
+}
+
+impl Way {
+    const fn along(path: Path, version: Version) -> Self {
+        Self {
+            link: path.link,
+            to: To::Peer(path.peer),
+            version,
+        }
     }
 }
 

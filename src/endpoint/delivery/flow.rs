@@ -16,7 +16,7 @@ use super::window::Window;
 use super::{FlowStatus, Undelivered};
 use crate::address::JausId;
 use crate::endpoint::large::{Cut, Numbers};
-use crate::endpoint::{Config, Unacknowledged};
+use crate::endpoint::{Config, Outgoing, Unacknowledged};
 use crate::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version};
 
 /// So many packets may be on their way to somebody whose address is unknown: they go to everybody.
@@ -43,6 +43,8 @@ pub(super) struct Parcel {
     pub(super) priority: Priority,
     pub(super) broadcast: Broadcast,
     pub(super) payload: Bytes,
+    /// Whether the sender wants to be told the result.
+    pub(super) awaited: bool,
     /// When it was handed in.
     pub(super) accepted: Instant,
     /// How it was cut, once the first of it was sent.
@@ -64,18 +66,13 @@ struct Started {
 }
 
 impl Parcel {
-    pub(super) fn new(
-        accepted: Instant,
-        source: JausId,
-        priority: Priority,
-        broadcast: Broadcast,
-        payload: Bytes,
-    ) -> Self {
+    pub(super) fn new(accepted: Instant, message: &Outgoing, scope: Broadcast) -> Self {
         Self {
-            source,
-            priority,
-            broadcast,
-            payload,
+            source: message.source,
+            priority: message.priority,
+            broadcast: scope,
+            payload: message.payload.clone(),
+            awaited: message.acknowledge,
             accepted,
             started: None,
             acknowledged: 0,
@@ -511,6 +508,7 @@ impl Flow {
             (reason, _) => reason,
         };
         let undelivered = Undelivered {
+            awaited: parcel.awaited,
             reason,
             acknowledged: parcel.acknowledged,
             length: parcel.payload.len(),

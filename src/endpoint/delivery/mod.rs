@@ -31,6 +31,9 @@ use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, Frame, Priority, Version};
 use flow::{Flow, Parcel, Progress};
 
+/// So many packets of a flow go one after the other, which lets links send them with one call.
+const TURN: usize = 32;
+
 /// How it goes with the messages to one destination that want an acknowledgement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlowStatus {
@@ -47,6 +50,7 @@ pub struct FlowStatus {
 /// What became of a message that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Undelivered {
+    awaited: bool,
     reason: Unacknowledged,
     acknowledged: usize,
     length: usize,
@@ -56,8 +60,10 @@ pub(super) struct Undelivered {
 #[derive(Debug)]
 pub(super) struct Deliveries {
     flows: HashMap<JausId, Flow>,
-    /// Flows that may have something to send, by its priority, in turn.
+    /// Flows that may have something to send, by its priority; the first has its turn.
     ready: [VecDeque<JausId>; Priority::ALL.len()],
+    /// Who had the turn last, and how many packets it has sent since.
+    turn: Option<(JausId, usize)>,
     /// When to look at a flow at the latest; one entry each at the most.
     timers: BTreeSet<(Instant, JausId)>,
     timer_of: HashMap<JausId, Instant>,
@@ -72,6 +78,7 @@ impl Deliveries {
         Self {
             flows: HashMap::new(),
             ready: Default::default(),
+            turn: None,
             timers: BTreeSet::new(),
             timer_of: HashMap::new(),
             handed_in: 0,
@@ -145,7 +152,12 @@ impl Deliveries {
             let level = usize::from(priority.bits());
             if !flow.listed[level] {
                 flow.listed[level] = true;
-                self.ready[level].push_back(destination);
+                match self.turn {
+                    Some((whose, sent)) if whose == destination && sent < TURN => {
+                        self.ready[level].push_front(destination);
+                    }
+                    _ => self.ready[level].push_back(destination),
+                }
             }
         }
         let deadline = flow.deadline();
@@ -179,6 +191,16 @@ impl Deliveries {
             }
             self.touch(destination);
         }
+    }
+
+    /// A packet is sent: after some of one flow it is another's turn.
+    fn take_turn(&mut self, destination: JausId) {
+        self.turn = match self.turn {
+            Some((whose, sent)) if whose == destination && sent < TURN => {
+                Some((destination, sent + 1))
+            }
+            _ => Some((destination, 1)),
+        };
     }
 
     fn take_due(&mut self, now: Instant) -> Option<JausId> {
@@ -227,7 +249,7 @@ impl Endpoint {
         self.deliveries.flows.get(&destination).map(Flow::status)
     }
 
-    /// Takes in a message that wants an acknowledgement.
+    /// Takes in a message that wants an acknowledgement, or a large one for an unknown address.
     pub(super) fn deliver_reliably(
         &mut self,
         now: Instant,
@@ -237,13 +259,7 @@ impl Endpoint {
     ) -> Result<(), SendError> {
         self.deliveries
             .check_room(self.untold, message.payload.len())?;
-        let parcel = Parcel::new(
-            now,
-            message.source,
-            message.priority,
-            scope,
-            message.payload.clone(),
-        );
+        let parcel = Parcel::new(now, message, scope);
         self.deliveries
             .push(now, message.destination, handle, parcel)
     }
@@ -254,6 +270,7 @@ impl Endpoint {
         let now = self.latest?;
         while let Some(destination) = self.deliveries.next_ready(priority) {
             let transmits = self.next_packet(now, destination, priority);
+            self.deliveries.take_turn(destination);
             self.deliveries.touch(destination);
             let mut transmits = transmits.into_iter();
             if let Some(first) = transmits.next() {
@@ -301,7 +318,6 @@ impl Endpoint {
 
     /// Takes the answer to a message of ours.
     pub(super) fn receive_answer(&mut self, now: Instant, frame: &Frame) -> Result<(), Counter> {
-        self.latest = Some(now);
         let (destination, source) = (frame.source, frame.destination);
         let flow = self
             .deliveries
@@ -340,8 +356,10 @@ impl Endpoint {
             .and_then(|flow| flow.remove(message));
         if let Some(parcel) = parcel {
             self.deliveries.settle(parcel.payload.len());
-            let message = MessageHandle(message);
-            self.tell_result(Event::Acknowledged { message, by });
+            if parcel.awaited {
+                let message = MessageHandle(message);
+                self.tell_result(Event::Acknowledged { message, by });
+            }
         }
     }
 
@@ -352,12 +370,16 @@ impl Endpoint {
     ) {
         for (message, undelivered) in messages {
             let Undelivered {
+                awaited,
                 reason,
                 acknowledged,
                 length,
             } = undelivered;
             self.deliveries.settle(length);
             self.counters.add(Counter::MessagesGivenUp);
+            if !awaited {
+                continue;
+            }
             self.tell_result(Event::NotAcknowledged {
                 message: MessageHandle(message),
                 destination,

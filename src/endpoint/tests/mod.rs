@@ -7,6 +7,7 @@ mod bounds;
 mod delivery;
 mod fragments;
 mod identity;
+mod output;
 mod receiving;
 mod sending;
 mod wire;

@@ -1,0 +1,281 @@
+//! How datagrams leave: paced, several messages in one, several of them at once.
+
+use super::wire::{Conditions, Wire, large, reliable};
+use super::*;
+
+const OTHER: JausId = JausId::new(42, 1, 2);
+
+fn with_packing(packing: Packing) -> Rig {
+    let mut rig = Rig::with(Config {
+        packing,
+        ..Config::default()
+    });
+    rig.meet_peer();
+    rig
+}
+
+fn messages(transmit: &Transmit) -> Vec<Frame> {
+    judp::frames(transmit.payload.clone())
+        .unwrap()
+        .map(Result::unwrap)
+        .collect()
+}
+
+fn unreliable(payload: Bytes, priority: Priority) -> Outgoing {
+    Outgoing {
+        priority,
+        payload,
+        ..to_peer()
+    }
+}
+
+#[test]
+fn a_large_message_leaves_no_faster_than_receivers_empty_their_buffers() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    let begin = rig.now;
+    rig.send(unreliable(large(1 << 20), Priority::Standard))
+        .unwrap();
+    let burst = rig.transmits().len();
+    let occupied = |datagrams: usize| datagrams * 2304;
+    assert!((72..=92).contains(&burst), "{burst} datagrams at once");
+    assert!(occupied(burst) <= 212_992);
+    let mut sent = burst;
+    while let Some(timeout) = rig.endpoint.poll_timeout() {
+        assert!(timeout > rig.now);
+        rig.pass(timeout - rig.now);
+        let more = rig.transmits().len();
+        assert!(occupied(more) <= 212_992, "{more} datagrams at once");
+        sent += more;
+    }
+    assert_eq!(sent, 736);
+    let took = rig.now - begin;
+    let expected = Duration::from_secs_f64(occupied(736 - burst) as f64 / 200e6);
+    assert!(
+        took >= expected * 9 / 10 && took <= expected * 11 / 10,
+        "{took:?} and not {expected:?}"
+    );
+}
+
+#[test]
+fn small_messages_do_not_queue_behind_a_large_one_that_is_paced() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    rig.send(unreliable(large(8 << 20), Priority::Standard))
+        .unwrap();
+    rig.transmits();
+    rig.send(to_peer()).unwrap();
+    assert_eq!(rig.transmits().len(), 1, "at once");
+    rig.send(unreliable(large(100_000), Priority::High))
+        .unwrap();
+    rig.pass(Duration::from_millis(1));
+    let sent = rig.sent();
+    assert!(sent.len() > 10);
+    let priorities = sent.iter().map(|(_, frame)| frame.flags.priority());
+    assert!(
+        priorities.is_sorted_by(|a, b| a >= b),
+        "the urgent one overtakes"
+    );
+}
+
+#[test]
+fn without_pacing_everything_leaves_at_once() {
+    let mut rig = Rig::with(Config {
+        pacing: None,
+        ..Config::default()
+    });
+    rig.meet_peer();
+    rig.send(unreliable(large(1 << 20), Priority::Standard))
+        .unwrap();
+    assert_eq!(rig.transmits().len(), 736);
+    assert_eq!(rig.endpoint.poll_timeout(), None);
+}
+
+#[test]
+fn a_large_message_to_an_unknown_address_waits_for_it_though_nobody_asked_for_acknowledgements() {
+    let mut wire = Wire::new(1, Conditions::default());
+    let payload = large(1 << 20);
+    wire.send(unreliable(payload.clone(), Priority::Standard));
+    assert_eq!(wire.datagrams[0], 1);
+    wire.run_for(Duration::from_secs(9));
+    assert!(wire.delivered() == [payload]);
+    assert_eq!(wire.results(), [], "nobody wanted to know");
+}
+
+#[test]
+fn what_waits_anyway_shares_a_datagram() {
+    let mut rig = with_packing(Packing::Within(Duration::ZERO));
+    for number in 0..200_u8 {
+        let payload = Bytes::copy_from_slice(&[0x02, 0x22, number]);
+        rig.send(unreliable(payload, Priority::Standard)).unwrap();
+    }
+    let transmits = rig.transmits();
+    let lengths: Vec<_> = transmits.iter().map(|t| t.payload.len()).collect();
+    assert_eq!(lengths, [1 + 84 * 17, 1 + 84 * 17, 1 + 32 * 17]);
+    let numbers: Vec<_> = transmits
+        .iter()
+        .flat_map(messages)
+        .map(|frame| frame.payload[2])
+        .collect();
+    assert!(numbers.into_iter().eq(0..200));
+}
+
+#[test]
+fn messages_to_different_places_do_not_share_a_datagram() {
+    let mut rig = with_packing(Packing::Within(Duration::ZERO));
+    rig.hear_from(
+        9,
+        &Frame {
+            source: OTHER,
+            ..from_peer(QUERY_HEARTBEAT)
+        },
+    );
+    for destination in [PEER, OTHER, PEER, JausId::EVERYONE] {
+        rig.send(Outgoing {
+            destination,
+            ..to_peer()
+        })
+        .unwrap();
+    }
+    let places: Vec<_> = rig.transmits().iter().map(|t| t.to).collect();
+    let to = |host| To::Peer(path(host).peer);
+    assert_eq!(places, [to(PEER_HOST), to(9), to(PEER_HOST), To::Group]);
+}
+
+#[test]
+fn messages_wait_for_company_as_long_as_is_said_but_not_the_safety_critical() {
+    let mut rig = with_packing(Packing::Within(Duration::from_millis(5)));
+    rig.send(to_peer()).unwrap();
+    rig.pass(Duration::from_millis(3));
+    rig.send(unreliable(
+        Bytes::from_static(QUERY_HEARTBEAT),
+        Priority::High,
+    ))
+    .unwrap();
+    assert_eq!(rig.transmits(), []);
+    let stop = unreliable(
+        Bytes::from_static(QUERY_HEARTBEAT),
+        Priority::SafetyCritical,
+    );
+    rig.send(stop).unwrap();
+    let urgent = rig.transmits();
+    assert_eq!((urgent.len(), messages(&urgent[0]).len()), (1, 1));
+    rig.pass(Duration::from_millis(2));
+    let transmits = rig.transmits();
+    assert_eq!((transmits.len(), messages(&transmits[0]).len()), (1, 2));
+    assert_eq!(transmits[0].priority, Priority::High);
+    assert_eq!(rig.endpoint.poll_timeout(), None);
+}
+
+#[test]
+fn a_full_datagram_does_not_wait() {
+    let mut rig = with_packing(Packing::Within(Duration::from_millis(5)));
+    let half = || unreliable(large(700), Priority::Standard);
+    (0..3).for_each(|_| drop(rig.send(half())));
+    let transmits = rig.transmits();
+    assert_eq!((transmits.len(), messages(&transmits[0]).len()), (1, 2));
+    rig.pass(Duration::from_millis(5));
+    assert_eq!(rig.transmits().len(), 1);
+}
+
+#[test]
+fn older_headers_are_not_packed() {
+    let mut rig = with_packing(Packing::Within(Duration::from_millis(5)));
+    rig.hear(&Frame {
+        version: Version::As5669,
+        ..from_peer(QUERY_IDENTIFICATION)
+    });
+    rig.send(to_peer()).unwrap();
+    rig.send(to_peer()).unwrap();
+    assert_eq!(rig.transmits().len(), 2);
+}
+
+fn segmenting() -> LinkProfile {
+    LinkProfile {
+        max_segments: 64,
+        ..LinkProfile::judp(path(OUR_HOST).peer.socket())
+    }
+}
+
+#[test]
+fn fragments_leave_several_at_once_where_the_link_takes_them_so() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    rig.endpoint.add_link(WIRE, segmenting());
+    let payload = large(100_000);
+    rig.send(unreliable(payload.clone(), Priority::Standard))
+        .unwrap();
+    let transmits = rig.transmits();
+    let shapes: Vec<_> = transmits
+        .iter()
+        .map(|t| (t.payload.len(), t.segment))
+        .collect();
+    // 70 fragments of 1425 octets and one of 250; 45 fit what the kernel takes at once.
+    let expected = [(45 * 1440, Some(1440)), (25 * 1440 + 265, Some(1440))];
+    assert_eq!(shapes, expected);
+    assert_eq!(rig.count(Counter::DatagramsSent), 71);
+    let octets: Vec<u8> = transmits
+        .iter()
+        .flat_map(|t| t.payload.chunks(1440))
+        .flat_map(|datagram| messages_of(datagram).payload)
+        .collect();
+    assert_eq!(octets, payload);
+}
+
+fn messages_of(datagram: &[u8]) -> Frame {
+    let mut frames = judp::frames(Bytes::copy_from_slice(datagram)).unwrap();
+    frames.next().unwrap().unwrap()
+}
+
+#[test]
+fn acknowledgements_leave_several_at_once() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    rig.endpoint.add_link(WIRE, segmenting());
+    for sequence in 1..=10 {
+        let flags = Flags::default().with_acknowledgement(Acknowledgement::Request);
+        rig.hear(&Frame {
+            flags,
+            sequence,
+            ..from_peer(QUERY_IDENTIFICATION)
+        });
+    }
+    let transmits = rig.transmits();
+    assert_eq!(transmits.len(), 1);
+    assert_eq!(
+        (transmits[0].payload.len(), transmits[0].segment),
+        (150, Some(15))
+    );
+}
+
+#[test]
+fn two_large_messages_to_two_places_take_turns_without_tearing_the_trains() {
+    let mut rig = Rig::with(Config {
+        initial_window: 128,
+        ..Config::default()
+    });
+    rig.meet_peer();
+    rig.hear_from(
+        9,
+        &Frame {
+            source: OTHER,
+            ..from_peer(QUERY_HEARTBEAT)
+        },
+    );
+    rig.endpoint.add_link(WIRE, segmenting());
+    for destination in [PEER, OTHER] {
+        rig.send(Outgoing {
+            destination,
+            ..reliable(large(64 * 1425))
+        })
+        .unwrap();
+    }
+    let transmits = rig.transmits();
+    let places: Vec<_> = transmits
+        .iter()
+        .map(|t| (t.to, t.payload.len() / 1440))
+        .collect();
+    let to = |host| To::Peer(path(host).peer);
+    let expected = [(PEER_HOST, 32), (9, 32), (PEER_HOST, 32), (9, 32)];
+    assert_eq!(places, expected.map(|(host, count)| (to(host), count)));
+}
