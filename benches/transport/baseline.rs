@@ -73,7 +73,8 @@ impl UnixEcho {
 }
 
 pub(crate) fn unix_echo() {
-    let path = format!("{}/echo.sock", crate::place::folder().display());
+    let folder = crate::place::folder();
+    let path = format!("{}/echo-{}.sock", folder.display(), std::process::id());
     let listener = UnixListener::bind(&path).expect("a socket");
     println!("{path}");
     let (mut stream, _) = listener.accept().expect("a client");

@@ -82,4 +82,6 @@ fn main() {
         idle::measure(effort);
     }
     report::machine();
+    // Left behind if a measurement has failed.
+    let _ = std::fs::remove_dir_all(place::folder());
 }

@@ -14,13 +14,18 @@ use jaus::node::{Config, Host, Node, Port};
 use crate::child::Process;
 use crate::roles::Role;
 
+/// Names the run to its child processes.
+pub(crate) const RUN: &str = "JAUS_BENCH_RUN";
+
+/// The number of this run: the id of the process that the user has started.
+pub(crate) fn run() -> u32 {
+    let told = env::var(RUN).ok().and_then(|number| number.parse().ok());
+    told.unwrap_or_else(std::process::id)
+}
+
 /// A folder of this run for sockets, shared by all its processes.
 pub(crate) fn folder() -> PathBuf {
-    const VARIABLE: &str = "JAUS_BENCH_FOLDER";
-    if let Some(folder) = env::var_os(VARIABLE) {
-        return folder.into();
-    }
-    let folder = env::temp_dir().join(format!("jaus-bench-{}", std::process::id()));
+    let folder = env::temp_dir().join(format!("jaus-bench-{}", run()));
     fs::create_dir_all(&folder).expect("a folder for sockets");
     folder
 }
@@ -81,10 +86,11 @@ impl Place {
     }
 }
 
-/// A node on loopback, in a group that no other program of this host is in.
+/// A node on loopback, in a group that no other program of this host is in, nor another run.
 pub(crate) fn settings(id: JausId) -> Config {
     let mut config = Config::loopback(id.subsystem(), id.node());
-    config.group = "239.255.77.7:37947".parse().expect("a group");
+    let port = 20_000 + run() % 40_000;
+    config.group = format!("239.255.77.7:{port}").parse().expect("a group");
     config
 }
 
