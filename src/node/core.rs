@@ -17,11 +17,15 @@ use super::awaiting::{Awaiting, Waiter};
 use super::error::SendError;
 use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
+use super::trains::Trains;
 use crate::address::JausId;
 use crate::endpoint::{AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, Transmit};
 use crate::link::Slab;
 use crate::link::local::Process;
+use crate::wire::Priority;
 
+/// Messages of one burst that are gathered to leave together.
+const BURST: usize = 64;
 /// Node events kept for a slow listener.
 const EVENTS: usize = 256;
 /// How long a node that shuts down tries to send what waits.
@@ -78,6 +82,9 @@ pub(super) struct Core {
     /// Gone when the node has stopped, which ends the listeners' streams.
     events: Option<broadcast::Sender<Event>>,
     slab: Slab,
+    trains: Trains,
+    /// Messages sent since the last [`pump`](Self::pump).
+    gathered: usize,
     driver: Option<Waker>,
     follow_at: Option<Instant>,
     stop_at: Option<Instant>,
@@ -96,6 +103,8 @@ impl Core {
             limits,
             events: Some(broadcast::Sender::new(EVENTS)),
             slab: Slab::new(),
+            trains: Trains::default(),
+            gathered: 0,
             driver: None,
             follow_at,
             stop_at: None,
@@ -174,9 +183,16 @@ impl Core {
         waiter: Option<Waiter>,
     ) -> Result<MessageHandle, SendError> {
         let (source, deadline) = (message.source, self.deadline());
+        let urgent = message.priority > Priority::Standard;
         let result = self.endpoint.send(now(), message);
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
             self.awaiting.insert(*handle, source, waiter);
+        }
+        // The first of a burst leaves at once, and so does what is urgent. The others leave
+        // together when the driver has its turn, for which it was woken by the first.
+        if self.driver.is_none() && !urgent && self.gathered < BURST {
+            self.gathered += 1;
+            return Ok(result?);
         }
         // What stays among the node's components is none of the driver's business.
         if self.pump() || self.deadline() != deadline {
@@ -236,9 +252,17 @@ impl Core {
     /// Says whether anything went to a link.
     fn pump(&mut self) -> bool {
         let mut transmitted = false;
+        self.gathered = 0;
         while let Some(transmit) = self.endpoint.poll_transmit() {
-            self.transmit(&transmit);
+            let link = self.links.get_mut(transmit.link);
+            let most = link.map_or(1, |link| link.max_segments());
+            if let Some(train) = self.trains.add(transmit, most) {
+                self.transmit(&train);
+            }
             transmitted = true;
+        }
+        if let Some(train) = self.trains.take() {
+            self.transmit(&train);
         }
         while let Some(event) = self.endpoint.poll_event() {
             match event {

@@ -11,7 +11,7 @@ use crate::link::udp::UdpLink;
 use crate::wire::Framing;
 
 /// Datagrams taken from one link before the others have their turn.
-const BATCH: usize = 32;
+const BATCH: usize = 64;
 
 #[derive(Debug)]
 pub(super) enum Link {
@@ -45,6 +45,14 @@ impl Link {
                 framing: Framing::Jtcp,
                 ..LinkProfile::default()
             },
+        }
+    }
+
+    /// How many datagrams to one peer are best given to [`transmit`](Self::transmit) at once.
+    pub(super) const fn max_segments(&self) -> usize {
+        match self {
+            Self::Udp(link) => link.max_segments(),
+            Self::Tcp(_) => 1,
         }
     }
 

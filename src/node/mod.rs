@@ -44,6 +44,7 @@ mod links;
 mod local;
 mod mailbox;
 mod port;
+mod trains;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
