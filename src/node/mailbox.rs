@@ -7,6 +7,8 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 
+#[cfg(feature = "serde")]
+use super::config::units;
 use crate::endpoint::Received;
 use crate::link::backlog::{Backlog, Bounds};
 
@@ -22,6 +24,7 @@ pub struct MailboxLimits {
     pub messages: usize,
     /// Octets of payload that may wait. A single larger message is accepted when nothing else
     /// waits.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub octets: usize,
 }
 

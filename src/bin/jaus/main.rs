@@ -17,6 +17,7 @@ mod output;
 mod ping;
 mod query;
 mod runtime;
+mod settings;
 mod tree;
 
 use std::process::ExitCode;

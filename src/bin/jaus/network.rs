@@ -1,8 +1,7 @@
 //! The flags of every command that goes on the network: who we are, and where.
 
-use std::fs;
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -16,6 +15,7 @@ use jaus::node::{Address, Config, Host, HostError, Node, Peer, Port, Sender};
 use serde::Deserialize;
 
 use crate::failure::Failure;
+use crate::settings;
 
 #[derive(Args)]
 #[command(next_help_heading = "Network")]
@@ -187,7 +187,7 @@ impl Network {
     /// What the file says; without one, the usual settings.
     fn settings(&self) -> Result<(Identity, Config), Failure> {
         match &self.config {
-            Some(path) => read(path),
+            Some(path) => settings::read(path),
             None => Ok((Identity::default(), Config::new(0, 0))),
         }
     }
@@ -212,20 +212,6 @@ impl Network {
         node.validate().map_err(Failure::of)?;
         Ok(node)
     }
-}
-
-/// Reads a settings file: our own keys are taken out, the others are the node's.
-fn read(path: &Path) -> Result<(Identity, Config), Failure> {
-    let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
-    let wrong = |error: toml::de::Error| Failure::new(format!("{}: {error}", path.display()));
-    let mut table: toml::Table = toml::from_str(&text).map_err(wrong)?;
-    let own = ["id", "name", "kind"]
-        .into_iter()
-        .filter_map(|key| table.remove_entry(key));
-    let own: toml::Table = own.collect();
-    let identity = own.try_into().map_err(wrong)?;
-    let node = table.try_into().map_err(wrong)?;
-    Ok((identity, node))
 }
 
 /// Where the component of a passing command lives.

@@ -13,24 +13,27 @@
 //! broadcast = "auto"                   # where there is no multicast; or "on", or "off"
 //! ttl = 16
 //! peers = ["192.168.7.2", "192.168.7.3:3795", "[fe80::2%eth0]:3794"]
+//! max_message = "4MiB"                 # sizes: octets, or with a unit (see `units`)
 //!
 //! [mailbox]
 //! messages = 1024
+//! octets = "2MiB"
 //! ```
+//!
+//! Each section has a file of its own here.
 
+mod peer;
 mod tcp;
+pub mod units;
 
-use std::fmt;
-use std::net::{SocketAddr, SocketAddrV4};
-use std::str::FromStr;
-
+pub use self::peer::Peer;
 pub use self::tcp::{InvalidListen, Listen, Tcp};
 use super::mailbox::MailboxLimits;
 use crate::address::{JausId, ParseIdError};
 use crate::endpoint::{self, PAYLOAD_LIMITS};
 use crate::link::local::{Address, Local};
 use crate::link::udp::{self, Broadcasts, PortTaken};
-use crate::link::{Group, Group6, Interfaces, InvalidGroup, Ip, Place};
+use crate::link::{Group, Group6, Interfaces, InvalidGroup, Ip};
 
 const LONGEST_MESSAGE: usize = 16 << 20;
 /// Sequence numbers have 16 bits, and 0 is left out.
@@ -72,14 +75,17 @@ pub struct Config {
     /// How many routers multicast may pass.
     pub ttl: u8,
     /// How many octets of received datagrams the kernel is asked to hold for each socket.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub receive_buffer: usize,
     /// Peers to whom everything for the group is sent by unicast too.
     pub peers: Vec<Peer>,
     /// The most octets of payload in one packet, 64 to 4079. The default, 1425, keeps a packet
     /// within one Ethernet frame.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub payload_limit: usize,
     /// The longest message, in octets, that is sent or received, up to 16 MiB. Above
     /// `payload_limit` it travels in fragments.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub max_message: usize,
     /// How much may wait for each component.
     pub mailbox: MailboxLimits,
@@ -266,68 +272,6 @@ impl Config {
     }
 }
 
-/// A peer that is spoken to by unicast from the start: `10.0.0.2`, which means port 3794,
-/// `10.0.0.2:3795`, `[fe80::2%eth0]:3794`, or with its id in front `102.1.1@10.0.0.2`.
-///
-/// With an id (which may hold the wildcards 65535 and 255) its messages go there before it was
-/// heard, and its address is never learned anew.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Peer {
-    id: Option<JausId>,
-    place: Place,
-}
-
-impl Peer {
-    /// The id, or pattern of ids, that lives at the address, if that is known.
-    #[must_use]
-    pub const fn id(self) -> Option<JausId> {
-        self.id
-    }
-
-    /// The address and port. With an interface (`%eth0`) it holds as long as that interface does.
-    #[must_use]
-    pub fn address(self) -> SocketAddr {
-        self.place.address()
-    }
-}
-
-impl FromStr for Peer {
-    type Err = ConfigError;
-
-    fn from_str(text: &str) -> Result<Self, ConfigError> {
-        let (id, place) = match text.split_once('@') {
-            Some((id, place)) => (
-                Some(id.parse::<JausId>().map_err(ConfigError::PeerId)?),
-                place,
-            ),
-            None => (None, text),
-        };
-        let place: Option<Place> = place.parse().ok();
-        place
-            .filter(|place| !place.lacks_zone())
-            .map(|place| Self { id, place })
-            .ok_or_else(|| ConfigError::Peer(text.to_owned()))
-    }
-}
-
-impl fmt::Display for Peer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(id) = self.id {
-            write!(f, "{id}@")?;
-        }
-        self.place.fmt(f)
-    }
-}
-
-impl From<SocketAddrV4> for Peer {
-    fn from(address: SocketAddrV4) -> Self {
-        Self {
-            id: None,
-            place: SocketAddr::V4(address).into(),
-        }
-    }
-}
-
 /// A setting that no node can have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -369,21 +313,6 @@ pub enum ConfigError {
     Peer(String),
 }
 
-#[cfg(feature = "serde")]
-impl<'de> serde::Deserialize<'de> for Peer {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        text.parse().map_err(serde::de::Error::custom)
-    }
-}
-
-#[cfg(feature = "serde")]
-impl serde::Serialize for Peer {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -420,39 +349,6 @@ mod tests {
             with(64, 4_194_241).unwrap_err(),
             "max_message 4194241 cannot be: choose from 64 (payload_limit) to 4194240"
         );
-    }
-
-    #[test]
-    fn a_peer_is_an_address_with_or_without_port_and_id() {
-        assert_eq!(
-            "10.0.0.2".parse::<Peer>().unwrap().to_string(),
-            "10.0.0.2:3794"
-        );
-        assert_eq!(
-            "10.0.0.2:9".parse::<Peer>().unwrap().to_string(),
-            "10.0.0.2:9"
-        );
-        let named: Peer = "101.255.255@10.0.0.2".parse().unwrap();
-        assert_eq!(named.to_string(), "101.255.255@10.0.0.2:3794");
-        assert_eq!(named.id(), Some(JausId::new(101, 255, 255)));
-        assert!(
-            "101.1@10.0.0.2"
-                .parse::<Peer>()
-                .unwrap_err()
-                .to_string()
-                .contains("\"101.1\"")
-        );
-        for wrong in [
-            "",
-            "ten",
-            "10.0.0.2:0",
-            "239.255.0.1",
-            "0.0.0.0",
-            "10.0.0.2:70000",
-        ] {
-            let error = wrong.parse::<Peer>().unwrap_err().to_string();
-            assert!(error.contains(&format!("`{wrong}`")), "{error}");
-        }
     }
 }
 
