@@ -16,7 +16,7 @@ mod network;
 mod request;
 mod time;
 
-pub use capture::{Capture, CaptureError, Frame, LinkType};
+pub use capture::{Capture, CaptureError, CaptureWriter, Frame, InterfaceNumber, LinkType};
 pub use definition::{Body, ServiceName};
 pub use dictionary::{Added, Dictionary, Reading, Unreadable};
 pub use hex::{from_hex, to_hex};

@@ -16,6 +16,7 @@ mod node;
 mod output;
 mod ping;
 mod query;
+mod record;
 mod runtime;
 mod settings;
 mod tree;
@@ -50,6 +51,7 @@ enum Command {
     Discover(discover::Discover),
     Ping(ping::Ping),
     Query(query::Query),
+    Record(record::Record),
     Decode(decode::Decode),
     Encode(encode::Encode),
 }
@@ -62,6 +64,7 @@ impl Command {
             Self::Discover(discover) => discover.run(),
             Self::Ping(ping) => ping.run(),
             Self::Query(query) => query.run(),
+            Self::Record(record) => record.run(),
             Self::Decode(decode) => decode.run(),
             Self::Encode(encode) => encode.run(),
         }

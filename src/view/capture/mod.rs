@@ -1,4 +1,4 @@
-//! Reading capture files: pcap and pcapng, as written by tcpdump, Wireshark and friends.
+//! Reading and writing capture files: pcap and pcapng, as tcpdump, Wireshark and friends have them.
 //!
 //! A [`Capture`] hands out [`Frame`]s one after the other and keeps only one in memory, so that a
 //! file may be as long as it likes and may as well be a pipe. A file that was cut short, or is
@@ -19,12 +19,15 @@
 mod input;
 mod pcap;
 mod pcapng;
+mod writer;
 
 use std::io::{self, Read};
 use std::ops::Range;
 
 use input::Input;
 use thiserror::Error;
+
+pub use writer::{CaptureWriter, InterfaceNumber};
 
 use super::Timestamp;
 
