@@ -143,7 +143,10 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
             &["node", "--group", "10.0.0.1"],
             "224.0.0.0 to 239.255.255.255",
         ),
-        (&["node", "--peer", "nobody"], "write an address of one host"),
+        (
+            &["node", "--peer", "nobody"],
+            "write an address of one host",
+        ),
         (&["node", "--kind", "ship"], "vehicle, ocu, other"),
         (&["node", "--config", "no/such.toml"], "no/such.toml"),
         (&["node", "--config", config_path], "prot"),

@@ -1,11 +1,16 @@
 //! `jaus record` and `jaus replay` over the loopback interface of this computer.
 #![cfg(feature = "cli")]
+#![expect(clippy::disallowed_types, reason = "a receiver that is nobody's node")]
 
 mod cli_support;
 
 use std::fs;
+use std::net::UdpSocket;
+use std::time::Duration;
 
 use cli_support::{own_group, run};
+use etherparse::PacketBuilder;
+use jaus::view::{CaptureWriter, LinkType, Timestamp};
 
 /// A file of this test's own, removed at the end.
 struct File(std::path::PathBuf);
@@ -102,4 +107,68 @@ fn an_interface_that_is_not_there_is_refused_with_those_that_are() {
     assert!(refused.stderr.contains("lo 127.0.0.1"), "{refused:?}");
     assert_eq!(refused.status, 2);
     assert!(!file.0.exists());
+}
+
+/// 42.1.1 asks 101.1.1 for its heartbeat.
+const QUERY: &[u8] = b"\x02\x00\x10\x00\x01\x01\x01\x65\x00\x01\x01\x2A\x00\x02\x22\x07\x00";
+
+/// A capture with a query, something that is not JAUS, and the query again.
+#[expect(clippy::unwrap_used, reason = "writing to memory")]
+fn capture() -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut writer = CaptureWriter::new(&mut file, "test").unwrap();
+    let on = writer.add_interface("eth0", LinkType::RAW).unwrap();
+    for (i, payload) in [QUERY, b"noise", QUERY].into_iter().enumerate() {
+        let mut packet = Vec::new();
+        PacketBuilder::ipv4([10, 0, 0, 1], [10, 0, 0, 2], 16)
+            .udp(3794, 3794)
+            .write(&mut packet, payload)
+            .unwrap();
+        let time = Timestamp::new(1_000_000, i as u32 * 20_000_000, 9);
+        writer.write(on, time, &packet).unwrap();
+    }
+    file
+}
+
+#[test]
+fn a_capture_is_sent_again_to_where_it_is_told_and_nowhere_else() {
+    let file = File::new("replayed");
+    fs::write(file.path(), capture()).unwrap();
+    let receiver = UdpSocket::bind("127.0.0.1:0").unwrap();
+    receiver
+        .set_read_timeout(Some(Duration::from_secs(10)))
+        .unwrap();
+    let to = receiver.local_addr().unwrap().to_string();
+    let replayed = run(&["replay", file.path(), "--to", &to, "--loop", "2"], b"");
+    assert!(
+        replayed.stdout.contains("2 datagrams over 0.0 s"),
+        "{replayed:?}"
+    );
+    assert!(replayed.stdout.contains("2 from 42.1.1"), "{replayed:?}");
+    assert!(
+        replayed.stdout.contains("left out: 1 that are not JAUS"),
+        "{replayed:?}"
+    );
+    assert!(
+        replayed.stdout.contains("4 datagrams sent to 127.0.0.1:"),
+        "{replayed:?}"
+    );
+    assert_eq!((replayed.status, &*replayed.stderr), (0, ""));
+    for _ in 0..4 {
+        let mut datagram = [0; 100];
+        let length = receiver.recv(&mut datagram).unwrap();
+        assert_eq!(&datagram[..length], QUERY);
+    }
+
+    let nowhere = run(&["replay", file.path()], b"");
+    assert!(nowhere.stderr.contains("--to <ADDRESS>"), "{nowhere:?}");
+    let others = run(
+        &["replay", file.path(), "--dry-run", "--from", "7.255.255"],
+        b"",
+    );
+    assert!(
+        others.stdout.contains("left out: 2 from other ids"),
+        "{others:?}"
+    );
+    assert_eq!(others.status, 1);
 }

@@ -17,6 +17,7 @@ mod output;
 mod ping;
 mod query;
 mod record;
+mod replay;
 mod runtime;
 mod settings;
 mod tree;
@@ -52,6 +53,7 @@ enum Command {
     Ping(ping::Ping),
     Query(query::Query),
     Record(record::Record),
+    Replay(replay::Replay),
     Decode(decode::Decode),
     Encode(encode::Encode),
 }
@@ -65,6 +67,7 @@ impl Command {
             Self::Ping(ping) => ping.run(),
             Self::Query(query) => query.run(),
             Self::Record(record) => record.run(),
+            Self::Replay(replay) => replay.run(),
             Self::Decode(decode) => decode.run(),
             Self::Encode(encode) => encode.run(),
         }
