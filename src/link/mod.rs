@@ -2,7 +2,8 @@
 //!
 //! A link knows no JAUS: what the bytes mean is the endpoint's business. There is one
 //! [`UdpLink`](udp::UdpLink) per network interface, and one [`TcpLink`](tcp::TcpLink) for all
-//! connections, which reads the frames itself, because only they tell where one ends.
+//! connections, which reads the frames itself, because only they tell where one ends;
+//! there may be a `SerialLink` (feature `serial`) for each serial line.
 //!
 //! # Several nodes on one host
 //!
@@ -31,6 +32,8 @@ mod group;
 mod holder;
 pub mod interface;
 pub mod local;
+#[cfg(feature = "serial")]
+pub mod serial;
 mod slab;
 mod socket_table;
 pub mod tcp;

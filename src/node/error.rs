@@ -21,6 +21,10 @@ pub enum StartError {
     /// The component processes of this host cannot be served.
     #[error(transparent)]
     Local(#[from] link::local::Error),
+    /// A serial port cannot be used.
+    #[cfg(feature = "serial")]
+    #[error(transparent)]
+    Serial(#[from] link::serial::SerialError),
     /// A peer lies behind an interface that was not chosen.
     #[error(
         "the peer {peer} is reached from {local}, and that is none of the chosen interfaces \

@@ -6,6 +6,8 @@ use std::time::Instant;
 
 use crate::endpoint::{Endpoint, LinkId, LinkProfile, Path, Remote, Transmit};
 use crate::link::Slab;
+#[cfg(feature = "serial")]
+use crate::link::serial::{self, SerialLink};
 use crate::link::tcp::{Arrival, TcpLink};
 use crate::link::udp::UdpLink;
 use crate::wire::Framing;
@@ -17,20 +19,30 @@ const BATCH: usize = 64;
 pub(super) enum Link {
     Udp(UdpLink),
     Tcp(TcpLink),
+    #[cfg(feature = "serial")]
+    Serial(SerialLink),
 }
 
 impl Link {
     pub(super) const fn udp(&self) -> Option<&UdpLink> {
         match self {
             Self::Udp(link) => Some(link),
-            Self::Tcp(_) => None,
+            _ => None,
         }
     }
 
     pub(super) const fn tcp(&self) -> Option<&TcpLink> {
         match self {
             Self::Tcp(link) => Some(link),
-            Self::Udp(_) => None,
+            _ => None,
+        }
+    }
+
+    #[cfg(feature = "serial")]
+    pub(super) const fn serial(&self) -> Option<&SerialLink> {
+        match self {
+            Self::Serial(link) => Some(link),
+            _ => None,
         }
     }
 
@@ -45,6 +57,11 @@ impl Link {
                 framing: Framing::Jtcp,
                 ..LinkProfile::default()
             },
+            #[cfg(feature = "serial")]
+            Self::Serial(_) => LinkProfile {
+                framing: Framing::Jserial,
+                ..LinkProfile::default()
+            },
         }
     }
 
@@ -52,7 +69,7 @@ impl Link {
     pub(super) const fn max_segments(&self) -> usize {
         match self {
             Self::Udp(link) => link.max_segments(),
-            Self::Tcp(_) => 1,
+            _ => 1,
         }
     }
 
@@ -60,6 +77,8 @@ impl Link {
         match self {
             Self::Udp(link) => link.transmit(transmit),
             Self::Tcp(link) => link.transmit(transmit),
+            #[cfg(feature = "serial")]
+            Self::Serial(link) => link.transmit(transmit),
         }
     }
 
@@ -68,6 +87,8 @@ impl Link {
         match self {
             Self::Udp(link) => link.poll_flush(cx),
             Self::Tcp(link) => link.poll_flush(cx, now),
+            #[cfg(feature = "serial")]
+            Self::Serial(link) => link.poll_flush(cx),
         }
     }
 
@@ -76,6 +97,8 @@ impl Link {
         match self {
             Self::Udp(_) => None,
             Self::Tcp(link) => link.poll_timeout(),
+            #[cfg(feature = "serial")]
+            Self::Serial(link) => link.poll_timeout(),
         }
     }
 
@@ -104,6 +127,13 @@ impl Link {
                     endpoint.handle_frame(now, from(Remote::Socket(peer)), &frame);
                 }
                 Arrival::Closed(peer, _) => endpoint.forget_path(from(Remote::Socket(peer))),
+            }),
+            #[cfg(feature = "serial")]
+            Self::Serial(link) => link.receive(cx, now, |arrival| match arrival {
+                serial::Arrival::Frame(frame) => {
+                    endpoint.handle_frame(now, from(Remote::Line), &frame);
+                }
+                serial::Arrival::Lost => endpoint.forget_path(from(Remote::Line)),
             }),
         }
     }

@@ -1,5 +1,5 @@
 //! The links of a node: one for UDP on each chosen interface, also when interfaces come and go, and
-//! one for all TCP connections.
+//! one for all TCP connections, and one for each serial line.
 //!
 //! A board may start its node before its network is up, and Wi-Fi comes back with another
 //! address. So the node looks at the host's interfaces again every [`INTERVAL`], opens links on
@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 use super::link::Link;
 use super::{Config, Peer, StartError};
 use crate::endpoint::{LinkId, Path, StaticPeer};
+#[cfg(feature = "serial")]
+use crate::link::serial::SerialLink;
 use crate::link::tcp::TcpLink;
 use crate::link::udp::UdpLink;
 use crate::link::{Available, Error, Interface, Interfaces, interface};
@@ -45,6 +47,11 @@ impl Links {
         if config.tcp.is_used() {
             let link = TcpLink::open(&config.tcp.settings())?;
             links.insert(Link::Tcp(link));
+        }
+        #[cfg(feature = "serial")]
+        for line in &config.serial {
+            let link = SerialLink::open(line)?;
+            links.insert(Link::Serial(link));
         }
         Ok(links)
     }
@@ -84,6 +91,12 @@ impl Links {
 
     pub(super) fn tcp(&self) -> Option<(LinkId, &TcpLink)> {
         self.iter().find_map(|(id, link)| Some((id, link.tcp()?)))
+    }
+
+    #[cfg(feature = "serial")]
+    pub(super) fn serial(&self) -> impl Iterator<Item = (LinkId, &SerialLink)> {
+        self.iter()
+            .filter_map(|(id, link)| Some((id, link.serial()?)))
     }
 
     /// When one of them wants a turn, if nothing arrives before.

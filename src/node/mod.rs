@@ -68,6 +68,8 @@ use self::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
 use crate::link::local::Door;
+#[cfg(feature = "serial")]
+use crate::link::serial;
 use crate::link::{Interface, tcp, udp};
 
 /// A handle to a running node. Cheap to clone.
@@ -170,6 +172,21 @@ impl Node {
         })
     }
 
+    /// The serial lines, in the order in which they are configured; none after the node has
+    /// stopped.
+    #[cfg(feature = "serial")]
+    #[must_use]
+    pub fn serial_lines(&self) -> Vec<SerialReport> {
+        let core = self.shared().lock();
+        let report = |(id, line): (LinkId, &serial::SerialLink)| SerialReport {
+            link: id,
+            settings: line.settings().clone(),
+            is_open: line.is_open(),
+            counters: line.counters(),
+        };
+        core.links.serial().map(report).collect()
+    }
+
     /// The peers whose addresses are known, in order of their ids.
     #[must_use]
     pub fn peers(&self) -> Vec<endpoint::Peer> {
@@ -249,6 +266,20 @@ pub struct TcpReport {
     pub connections: Vec<tcp::ConnectionReport>,
     /// What has become of connections and messages.
     pub counters: tcp::Counters,
+}
+
+/// One serial line of a node, as it is now.
+#[cfg(feature = "serial")]
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SerialReport {
+    /// Its number in [`Path`](endpoint::Path).
+    pub link: LinkId,
+    /// How it is set up.
+    pub settings: serial::Settings,
+    /// Whether the port is there just now.
+    pub is_open: bool,
+    /// What has come and gone.
+    pub counters: serial::Counters,
 }
 
 /// One UDP link of a node, as it is now.

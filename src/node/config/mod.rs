@@ -23,6 +23,8 @@
 //! Each section has a file of its own here.
 
 mod peer;
+#[cfg(feature = "serial")]
+mod serial;
 mod tcp;
 pub mod units;
 
@@ -32,6 +34,8 @@ use super::mailbox::MailboxLimits;
 use crate::address::{JausId, ParseIdError};
 use crate::endpoint::{self, PAYLOAD_LIMITS};
 use crate::link::local::{Address, Local};
+#[cfg(feature = "serial")]
+use crate::link::serial::Settings as SerialLine;
 use crate::link::udp::{self, Broadcasts, PortTaken};
 use crate::link::{Group, Group6, Interfaces, InvalidGroup, Ip};
 
@@ -93,6 +97,9 @@ pub struct Config {
     pub local: Local,
     /// TCP connections, to and from other nodes.
     pub tcp: Tcp,
+    /// Serial lines.
+    #[cfg(feature = "serial")]
+    pub serial: Vec<SerialLine>,
 }
 
 impl Default for Config {
@@ -125,6 +132,8 @@ impl Config {
             mailbox: MailboxLimits::default(),
             local: Local::Off,
             tcp: Tcp::default(),
+            #[cfg(feature = "serial")]
+            serial: Vec::new(),
         }
     }
 
@@ -201,6 +210,14 @@ impl Config {
         self
     }
 
+    /// Uses a serial line.
+    #[cfg(feature = "serial")]
+    #[must_use]
+    pub fn serial(mut self, line: SerialLine) -> Self {
+        self.serial.push(line);
+        self
+    }
+
     /// Adds a peer that is also spoken to by unicast.
     #[must_use]
     pub fn peer(mut self, peer: Peer) -> Self {
@@ -230,6 +247,8 @@ impl Config {
                 longest,
             });
         }
+        #[cfg(feature = "serial")]
+        serial::validate(&self.serial)?;
         if self.mailbox.messages == 0 {
             return Err(ConfigError::Mailbox);
         }
@@ -250,6 +269,10 @@ impl Config {
 
     /// Whether other links than UDP are wanted.
     pub(super) const fn has_streams(&self) -> bool {
+        #[cfg(feature = "serial")]
+        if !self.serial.is_empty() {
+            return true;
+        }
         self.tcp.is_used()
     }
 
@@ -295,6 +318,27 @@ pub enum ConfigError {
         /// The most, in octets: 16 MiB, and no more fragments than there are sequence numbers.
         longest: usize,
     },
+    /// Nothing is on a serial line at 0 bits per second.
+    #[error(
+        "baud {baud} of the serial line {device} cannot be: choose what both ends have, such as 19200 or 115200"
+    )]
+    Baud {
+        /// The port.
+        device: String,
+        /// The rate that was chosen.
+        baud: u32,
+    },
+    /// Neither one nor two stop bits.
+    #[error("stop_bits {stop_bits} of the serial line {device} cannot be: choose 1 or 2")]
+    StopBits {
+        /// The port.
+        device: String,
+        /// The number that was chosen.
+        stop_bits: u8,
+    },
+    /// Two lines on one port.
+    #[error("the serial port {0} is named twice: leave one out")]
+    SerialTwice(String),
     /// A mailbox without room.
     #[error("a mailbox must hold at least 1 message")]
     Mailbox,

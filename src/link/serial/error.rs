@@ -1,0 +1,93 @@
+//! Why a serial port cannot be used, and what to do about it.
+
+use std::fmt;
+use std::io;
+
+use serial2_tokio::SerialPort;
+
+/// A serial port that cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the serial port `{device}` cannot be used ({source}): {}; {ports}",
+    remedy(source)
+)]
+pub struct SerialError {
+    /// The port, as it was given.
+    pub device: String,
+    /// What else there is.
+    pub ports: Ports,
+    /// The operating system's words.
+    pub source: io::Error,
+}
+
+impl SerialError {
+    pub(super) fn new(device: &str, source: io::Error) -> Self {
+        Self {
+            device: device.to_owned(),
+            ports: Ports::available(),
+            source,
+        }
+    }
+}
+
+/// The serial ports of this host, for people to choose from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ports(Vec<String>);
+
+impl Ports {
+    fn available() -> Self {
+        let found = SerialPort::available_ports().unwrap_or_default();
+        let mut names: Vec<_> = found
+            .iter()
+            .map(|port| port.display().to_string())
+            .collect();
+        names.sort_unstable();
+        Self(names)
+    }
+}
+
+impl fmt::Display for Ports {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() {
+            f.write_str("no serial port is found on this host")
+        } else {
+            write!(f, "there are: {}", self.0.join(", "))
+        }
+    }
+}
+
+fn remedy(error: &io::Error) -> &'static str {
+    use io::ErrorKind::{InvalidInput, NotFound, PermissionDenied, ResourceBusy};
+    /// The same number on all Unix systems: an ioctl for a terminal that the file is not.
+    const ENOTTY: i32 = 25;
+    match error.kind() {
+        NotFound => "plug it in or choose another",
+        PermissionDenied => {
+            "its user must belong to the group that owns it, usually `dialout` \
+             (`sudo usermod -aG dialout $USER`, then log in again)"
+        }
+        ResourceBusy => "end the other program that uses it (`sudo fuser -v` on it shows which)",
+        InvalidInput => "choose a baud rate, parity and stop bits that it supports",
+        _ if cfg!(unix) && error.raw_os_error() == Some(ENOTTY) => {
+            "it is no serial port, choose another"
+        }
+        _ => "check the device, or choose another",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_remedy_fits_the_reason() {
+        let message = |source| SerialError::new("/dev/ttyUSB7", source).to_string();
+        let missing = message(io::ErrorKind::NotFound.into());
+        assert!(
+            missing.contains("`/dev/ttyUSB7`") && missing.contains("plug it in"),
+            "{missing}"
+        );
+        let forbidden = message(io::ErrorKind::PermissionDenied.into());
+        assert!(forbidden.contains("usermod -aG dialout"), "{forbidden}");
+    }
+}
