@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use super::{LargeStyle, Pacing, Packing, Path};
+use super::{Access, LargeStyle, Pacing, Packing, Path, Rate, Rates};
 use crate::address::JausId;
 
 /// The payloads that packets may be limited to, in octets.
@@ -16,9 +16,10 @@ pub const PAYLOAD_LIMITS: RangeInclusive<usize> = 64..=4079;
 pub struct Config {
     /// The most components that can be attached.
     pub max_components: usize,
-    /// The most peers whose address is remembered. When there is one more, the one heard longest
-    /// ago is forgotten; messages to it go to the group again until it is heard. Static peers do
-    /// not count and are never forgotten.
+    /// The most peers whose address is remembered. When there is one more, somebody whom we have
+    /// not spoken to is forgotten, else whoever was heard longest ago; messages to it go to the
+    /// group again until it is heard. Addresses of static peers do not count and are never
+    /// forgotten.
     pub max_peers: usize,
     /// Peers whose address is known beforehand and not learned.
     pub static_peers: Vec<StaticPeer>,
@@ -56,8 +57,9 @@ pub struct Config {
     pub first_contact_window: Duration,
     /// How long our own multicast is expected to come back to us.
     pub echo_window: Duration,
-    /// The most messages remembered to tell duplicates, and likewise echoes. The oldest is
-    /// forgotten first.
+    /// The most messages remembered to tell duplicates, and likewise echoes: as many of those that
+    /// want an acknowledgement and as many others, and a quarter each of strangers' messages. The
+    /// oldest is forgotten first.
     pub max_recent: usize,
     /// How long a destination may be silent before a message that waits for its acknowledgement is
     /// given up, and for how long one packet of it is sent again and again at the least. How long
@@ -86,6 +88,15 @@ pub struct Config {
     pub max_paced: usize,
     /// Whether small messages share datagrams.
     pub packing: Packing,
+    /// Whether messages for others are passed on between the links. Off by default: whoever has two
+    /// links is not asked to join two networks by that.
+    pub forwarding: bool,
+    /// How many broadcasts, and messages for ids that are not known, are passed on in all.
+    pub forwarded_broadcasts: Rate,
+    /// Who may speak to us.
+    pub access: Access,
+    /// How much is taken from one source.
+    pub rates: Rates,
     /// The shortest time between two [`Event::IdConflict`](super::Event::IdConflict) about one id.
     pub conflict_interval: Duration,
     /// The number before the first sequence number. A node should choose it at random, because some
@@ -121,6 +132,10 @@ impl Default for Config {
             pacing: Some(Pacing::default()),
             max_paced: 32 << 20,
             packing: Packing::Off,
+            forwarding: false,
+            forwarded_broadcasts: Rate::new(500, 1000),
+            access: Access::default(),
+            rates: Rates::default(),
             conflict_interval: Duration::from_secs(5),
             first_sequence: 0,
         }

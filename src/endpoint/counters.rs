@@ -51,6 +51,8 @@ counters! {
     /// Octets behind the last message of a datagram, left by a peer that does not shorten its
     /// buffer.
     StaleOctets = "stale octets behind messages",
+    /// Messages of others that were sent on.
+    MessagesForwarded = "messages forwarded",
     /// Dropped: a datagram from a link that the endpoint does not have.
     UnknownLink = "dropped: unknown link",
     /// Dropped: a datagram that no JAUS transport wrote.
@@ -77,6 +79,25 @@ counters! {
     AcknowledgementWithPayload = "dropped: acknowledgement with payload",
     /// Dropped: the same message within a short time.
     Duplicate = "dropped: duplicate",
+    /// Dropped: from a network that is denied or not among the allowed.
+    NetworkDenied = "dropped: network not allowed",
+    /// Dropped: from or for a subsystem that is denied or not among the allowed.
+    SubsystemDenied = "dropped: subsystem not allowed",
+    /// Dropped: more messages from one address or id than configured.
+    MessageRate = "dropped: too many messages from one source",
+    /// Dropped: a message from an id that was not known, of which too many come from one address.
+    NewIdRate = "dropped: too many new ids from one address",
+    /// Dropped: a message from an id that was not known, while the table is full of peers in
+    /// conversation with us.
+    PeersFull = "dropped: no room for another peer",
+    /// Not sent: an acknowledgement to a stranger who asked for more octets than it sent.
+    AcknowledgementsWithheld = "acknowledgements withheld from strangers",
+    /// Not forwarded: a broadcast that did not come by the way that leads to its sender.
+    NotTheWayBack = "not forwarded: did not come from where its sender is",
+    /// Not forwarded: more broadcasts than are allowed to go on.
+    ForwardRate = "not forwarded: too many broadcasts",
+    /// Not forwarded: a message that the next header or framing cannot carry.
+    CannotForward = "not forwarded: next header cannot carry it",
     /// Dropped: a message too short for a message code.
     NoMessageCode = "dropped: no message code",
     /// Dropped: a large message that is longer than the limit.

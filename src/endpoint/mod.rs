@@ -30,6 +30,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod access;
 mod acknowledge;
 mod config;
 mod counters;
@@ -38,20 +39,25 @@ mod event;
 mod large;
 mod link;
 mod local;
+mod occupancy;
 mod output;
 mod pacing;
 mod packing;
 mod peers;
 mod queue;
+mod rate;
 mod receive;
 mod recent;
+mod route;
 mod send;
 #[cfg(test)]
 mod tests;
 
 use std::collections::{BTreeMap, VecDeque};
+use std::hash::RandomState;
 use std::time::Instant;
 
+pub use access::{Access, AccessError, Network, Subsystems};
 pub use config::{Config, PAYLOAD_LIMITS, StaticPeer};
 pub use counters::{Counter, Counters};
 pub use delivery::FlowStatus;
@@ -59,9 +65,11 @@ pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
 pub use large::LargeStyle;
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
+pub use occupancy::Occupancy;
 pub use pacing::Pacing;
 pub use packing::Packing;
-pub use peers::Peer;
+pub use peers::{Peer, Traffic};
+pub use rate::{Rate, Rates};
 pub use send::SendError;
 
 use crate::address::JausId;
@@ -72,6 +80,7 @@ use pacing::Pacer;
 use packing::Gathering;
 use peers::Peers;
 use queue::PriorityQueue;
+use rate::{Bucket, Gate};
 use recent::Recent;
 
 /// The protocol core of a node. See the [module](self).
@@ -82,6 +91,11 @@ pub struct Endpoint {
     links: BTreeMap<LinkId, LinkProfile>,
     peers: Peers,
     numbers: Numbers,
+    gate: Gate,
+    /// Octets of acknowledgements that a stranger may have for what is being received.
+    credit: usize,
+    /// For what is passed on to many.
+    broadcasts: Bucket,
     heard: Recent,
     sent_to_group: Recent,
     reassembly: Reassembly,
@@ -109,13 +123,18 @@ impl Endpoint {
         config.payload_limit = config
             .payload_limit
             .clamp(*PAYLOAD_LIMITS.start(), *PAYLOAD_LIMITS.end());
+        let keys = RandomState::new();
+        let longest = config.retransmission_window;
         Self {
             components: Components::new(config.max_components),
             links: BTreeMap::new(),
             peers: Peers::new(config.max_peers, config.static_peers.clone()),
             numbers: Numbers::after(config.first_sequence),
-            heard: Recent::new(config.max_recent, config.retransmission_window),
-            sent_to_group: Recent::new(config.max_recent, config.echo_window),
+            gate: Gate::new(&config.rates, config.max_peers),
+            credit: 0,
+            broadcasts: Bucket::default(),
+            heard: Recent::new(config.max_recent, longest, keys.clone()),
+            sent_to_group: Recent::new(config.max_recent, config.echo_window, keys),
             reassembly: Reassembly::new(&config),
             large_styles: LargeStyles::new(&config),
             deliveries: Deliveries::new(&config),
@@ -183,7 +202,10 @@ impl Endpoint {
 
     /// The peers whose addresses are known, in order of their ids.
     pub fn peers(&self) -> impl Iterator<Item = Peer> + '_ {
-        self.peers.iter()
+        self.peers.iter().map(|peer| Peer {
+            round_trip: self.flow(peer.id).and_then(|flow| flow.round_trip),
+            ..peer
+        })
     }
 
     /// Tells that time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached;

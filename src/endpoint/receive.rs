@@ -1,15 +1,32 @@
 //! From a datagram to deliveries: each message is judged, learned from, acknowledged, filtered and
 //! handed out.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use tracing::{debug, trace};
 
 use super::peers::Learned;
-use super::{Counter, Endpoint, Event, Path, Peer, Received};
+use super::recent::{Class, Fingerprint};
+use super::{Counter, Endpoint, Event, Path, Received};
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version, judp};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version, as5669a, judp};
+
+/// Octets of IPv4 and UDP around a datagram.
+const DATAGRAM_OVERHEAD: usize = 28;
+/// The same message again within this time is a copy made on the way: nobody repeats so fast.
+const REPEAT_INTERVAL: Duration = Duration::from_millis(1);
+
+/// How a message stands to what was heard lately.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Novelty {
+    /// Not heard lately.
+    New,
+    /// Its sender has sent it again.
+    Repeated,
+    /// The network has made a copy, or brought it in a circle.
+    Copy,
+}
 
 impl Endpoint {
     /// Takes a datagram that came from `from`.
@@ -20,9 +37,10 @@ impl Endpoint {
     pub fn handle_datagram(&mut self, now: Instant, from: Path, data: Bytes) {
         self.latest = Some(now);
         self.counters.add(Counter::DatagramsReceived);
-        if !self.links.contains_key(&from.link) {
-            return self.counters.add(Counter::UnknownLink);
+        if let Err(reason) = self.check_path(from) {
+            return self.counters.add(reason);
         }
+        self.credit = data.len() + DATAGRAM_OVERHEAD;
         let mut frames = match judp::frames(data) {
             Ok(frames) => frames,
             Err(error) => {
@@ -32,7 +50,7 @@ impl Endpoint {
         };
         for frame in &mut frames {
             match frame {
-                Ok(frame) => self.handle_frame(now, from, &frame),
+                Ok(frame) => self.receive(now, from, &frame),
                 Err(error) => {
                     debug!(?from, %error, "malformed");
                     return self.counters.add(Counter::Malformed);
@@ -50,10 +68,29 @@ impl Endpoint {
     /// an error, as with [`handle_datagram`](Self::handle_datagram).
     pub fn handle_frame(&mut self, now: Instant, from: Path, frame: &Frame) {
         self.latest = Some(now);
-        self.counters.add(Counter::MessagesReceived);
-        if !self.links.contains_key(&from.link) {
-            return self.counters.add(Counter::UnknownLink);
+        if let Err(reason) = self.check_path(from) {
+            self.counters.add(Counter::MessagesReceived);
+            return self.counters.add(reason);
         }
+        // Whoever is at the other end has shown that it is there.
+        self.credit = usize::MAX;
+        self.receive(now, from, frame);
+    }
+
+    /// Whether anything may come by a path.
+    fn check_path(&self, from: Path) -> Result<(), Counter> {
+        if !self.links.contains_key(&from.link) {
+            return Err(Counter::UnknownLink);
+        }
+        let address = from.peer.socket().map(|address| address.ip());
+        if address.is_some_and(|address| !self.config.access.allows_address(address)) {
+            return Err(Counter::NetworkDenied);
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, now: Instant, from: Path, frame: &Frame) {
+        self.counters.add(Counter::MessagesReceived);
         let (source, destination) = (frame.source, frame.destination);
         if let Err(reason) = self.accept(now, from, frame) {
             trace!(%source, %destination, peer = %from.peer, %reason);
@@ -64,25 +101,59 @@ impl Endpoint {
     /// Does all that a message causes, or tells why it is dropped.
     fn accept(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
         let broadcast = check_header(frame)?;
-        if self.is_own_echo(now, from, frame) {
-            return Err(Counter::OwnEcho);
-        }
-        if self.components.contains(frame.source) {
-            self.announce_conflict(now, from, frame.source);
-            return Err(Counter::IdConflict);
-        }
-        let receivers = self.receivers(frame, broadcast)?;
-        match frame.flags.acknowledgement() {
-            Acknowledgement::Positive | Acknowledgement::Negative => {
-                self.learn(now, from, frame);
-                return self.receive_answer(now, frame);
+        let seen = self.heard.fingerprint(frame);
+        self.refuse_own(now, from, frame.source, seen)?;
+        self.config.access.check_source(frame.source)?;
+        let passes = self.is_passed_on(frame);
+        let receivers = match self.receivers(frame, broadcast) {
+            Err(_) if passes => Vec::new(),
+            receivers => receivers?,
+        };
+        self.admit(now, from, frame.source)?;
+        if !receivers.is_empty() {
+            match frame.flags.acknowledgement() {
+                Acknowledgement::Positive | Acknowledgement::Negative => {
+                    self.learn(now, from, frame)?;
+                    self.receive_answer(now, frame)?;
+                    self.peers.note_answer(frame.source);
+                    return Ok(());
+                }
+                Acknowledgement::Request => self.acknowledge_within_limits(from, frame),
+                Acknowledgement::None => {}
             }
-            Acknowledgement::Request => self.acknowledge(from, frame),
-            Acknowledgement::None => {}
         }
         // Before learning: a copy that came another way must not move the peer there and back.
-        self.filter_duplicate(now, frame)?;
-        self.learn(now, from, frame);
+        let novelty = self.recall(now, from, frame, seen);
+        if novelty != Novelty::New {
+            self.peers.note_duplicate(frame.source);
+            if passes && novelty == Novelty::Repeated {
+                self.pass_on(now, from, frame);
+            }
+            return Err(Counter::Duplicate);
+        }
+        if passes && self.is_astray(now, from, frame) {
+            self.counters.add(Counter::NotTheWayBack);
+        } else {
+            self.learn(now, from, frame)?;
+            if passes {
+                self.pass_on(now, from, frame);
+            }
+        }
+        self.put_together(now, from, frame, broadcast, &receivers)
+    }
+
+    /// Delivers a message to components of ours when it is whole.
+    fn put_together(
+        &mut self,
+        now: Instant,
+        from: Path,
+        frame: &Frame,
+        broadcast: Broadcast,
+        receivers: &[JausId],
+    ) -> Result<(), Counter> {
+        if receivers.is_empty() {
+            return Ok(());
+        }
         let payload = match frame.flags.data() {
             DataControl::Single => frame.payload.clone(),
             _ => {
@@ -95,8 +166,31 @@ impl Endpoint {
                 whole.payload
             }
         };
-        self.deliver(from, frame, broadcast, &payload, &receivers);
+        self.deliver(from, frame, broadcast, &payload, receivers);
         Ok(())
+    }
+
+    /// Whether one more message may come from there, and from somebody who was not known.
+    fn admit(&mut self, now: Instant, from: Path, source: JausId) -> Result<(), Counter> {
+        self.gate.admit_message(now, from, source)?;
+        if self.peers.knows(source) {
+            Ok(())
+        } else {
+            self.gate.admit_new_id(now, from)
+        }
+    }
+
+    /// Acknowledges a message. Strangers get no more octets of acknowledgements for a datagram than
+    /// it had, or others could be flooded through us in their name.
+    fn acknowledge_within_limits(&mut self, from: Path, request: &Frame) {
+        if self.peers.is_stranger(request.source) {
+            const COST: usize = 1 + as5669a::MIN_LEN + DATAGRAM_OVERHEAD;
+            let Some(rest) = self.credit.checked_sub(COST) else {
+                return self.counters.add(Counter::AcknowledgementsWithheld);
+            };
+            self.credit = rest;
+        }
+        self.acknowledge(from, request);
     }
 
     /// The local components that a message is for, or why there are none.
@@ -115,17 +209,32 @@ impl Endpoint {
         }
     }
 
-    /// Whether this is our own multicast come back. A component that has gone meanwhile is known by
-    /// what it sent.
-    fn is_own_echo(&self, now: Instant, from: Path, frame: &Frame) -> bool {
-        let mut own_addresses = self.links.values().flat_map(|link| &link.own).peekable();
-        let may_be_own =
-            own_addresses.peek().is_none() || own_addresses.any(|&own| from.peer == own);
+    /// Drops what is said in our own name.
+    ///
+    /// Our own multicast comes back from our own address, and is known by what it says when the
+    /// component that said it has gone. Whatever else is said in our name is an id conflict.
+    fn refuse_own(
+        &mut self,
+        now: Instant,
+        from: Path,
+        source: JausId,
+        seen: Fingerprint,
+    ) -> Result<(), Counter> {
         let window = self.config.echo_window;
-        may_be_own
-            && self
-                .sent_to_group
-                .contains(now, &self.sent_to_group.fingerprint(frame), window)
+        if self.sent_to_group.contains(now, &seen, window) && self.may_be_ours(from) {
+            return Err(Counter::OwnEcho);
+        }
+        if self.components.contains(source) {
+            self.announce_conflict(now, from, source);
+            return Err(Counter::IdConflict);
+        }
+        Ok(())
+    }
+
+    /// Whether something may have been sent by ourselves, as far as the address tells.
+    fn may_be_ours(&self, from: Path) -> bool {
+        let mut own = self.links.values().flat_map(|link| &link.own).peekable();
+        own.peek().is_none() || own.any(|&own| from.peer == own)
     }
 
     /// Tells that somebody else has taken an id of ours, not for each of its messages.
@@ -140,14 +249,10 @@ impl Endpoint {
         }
     }
 
-    fn learn(&mut self, now: Instant, from: Path, frame: &Frame) {
+    /// Learns where a sender is, if there is room for it.
+    fn learn(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
         let (id, version) = (frame.source, frame.version);
-        match self.peers.learn(Peer {
-            id,
-            path: from,
-            version,
-            last_heard: now,
-        }) {
+        match self.peers.learn(now, from, frame) {
             Learned::Known => {}
             Learned::New { evicted } => {
                 if let Some(id) = evicted {
@@ -169,32 +274,56 @@ impl Endpoint {
                     to: from,
                 });
             }
+            Learned::NoRoom => return Err(Counter::PeersFull),
         }
+        Ok(())
     }
 
-    /// Drops what was received before.
+    /// How a message stands to what was heard lately.
     ///
     /// The older headers' peers leave the sequence number at 0, so there only a message that wants
-    /// an acknowledgement, and hence may be repeated, can be told.
-    fn filter_duplicate(&mut self, now: Instant, frame: &Frame) -> Result<(), Counter> {
-        let repeats = frame.flags.acknowledgement() == Acknowledgement::Request;
-        if !repeats && frame.version != Version::As5669a {
-            return Ok(());
+    /// an acknowledgement, and hence may be repeated, can be told from another.
+    fn recall(&mut self, now: Instant, from: Path, frame: &Frame, seen: Fingerprint) -> Novelty {
+        let forwarding = self.config.forwarding;
+        let repeats = frame.flags.acknowledgement() != Acknowledgement::None;
+        let numbered = repeats || frame.version == Version::As5669a;
+        if !numbered && !forwarding {
+            return Novelty::New;
         }
-        let window = match frame.flags.broadcast() {
-            _ if !repeats => self.config.duplicate_window,
-            Some(Broadcast::None) => self.config.retransmission_window,
-            _ => self.config.first_contact_window,
+        let seen = seen.in_round(self.peers.round(frame));
+        let way = self.heard.way(forwarding.then_some(from));
+        let novelty = match self.heard.sighting(seen) {
+            None => Novelty::New,
+            Some(before) => {
+                let age = now.saturating_duration_since(before.time);
+                let elsewhere = before.way != way;
+                if elsewhere && age < self.config.retransmission_window {
+                    Novelty::Copy
+                } else if numbered && age < self.duplicate_window(frame) {
+                    if repeats && age >= REPEAT_INTERVAL {
+                        Novelty::Repeated
+                    } else {
+                        Novelty::Copy
+                    }
+                } else {
+                    Novelty::New
+                }
+            }
         };
-        let fingerprint = self.heard.fingerprint(frame);
-        let known = self.heard.contains(now, &fingerprint, window);
-        if repeats || !known {
-            self.heard.insert(now, fingerprint);
+        if novelty != Novelty::Copy {
+            let stranger = self.peers.is_stranger(frame.source);
+            let class = Class { stranger, repeats };
+            self.heard.insert_as(now, seen, way, class);
         }
-        if known {
-            Err(Counter::Duplicate)
-        } else {
-            Ok(())
+        novelty
+    }
+
+    /// For how long the same message is taken for a duplicate.
+    fn duplicate_window(&self, frame: &Frame) -> Duration {
+        match (frame.flags.acknowledgement(), frame.flags.broadcast()) {
+            (Acknowledgement::None, _) => self.config.duplicate_window,
+            (_, Some(Broadcast::None)) => self.config.retransmission_window,
+            _ => self.config.first_contact_window,
         }
     }
 

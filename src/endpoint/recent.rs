@@ -1,90 +1,177 @@
-//! A bounded memory of messages seen lately, to tell duplicates and our own echoes.
+//! A bounded memory of messages seen lately, to tell duplicates, loops and our own echoes.
+//!
+//! What is remembered belongs to a [class](Class), and each class has a bound of its own. So what
+//! strangers send cannot push out what is known of peers we are in conversation with, and a stream
+//! of messages that nobody repeats cannot push out those that will be.
 
-use std::collections::hash_map::RandomState;
 use std::collections::{HashMap, VecDeque};
-use std::hash::BuildHasher;
+use std::hash::{BuildHasher, BuildHasherDefault, Hasher, RandomState};
 use std::time::{Duration, Instant};
 
-use crate::address::JausId;
+use super::Path;
 use crate::wire::Frame;
 
-/// What makes two frames the same: addresses, number and content.
-///
-/// The content is represented by a keyed hash, so that nobody can make two messages look alike.
+/// What makes two frames the same: addresses, number and content, as one keyed hash, so that nobody
+/// can make two messages look alike. Of 64 bits, so that two among the thousands in memory are
+/// mistaken for each other once in many years.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Fingerprint {
-    source: JausId,
-    destination: JausId,
-    sequence: u16,
-    content: u64,
+pub(super) struct Fingerprint(u64);
+
+impl Fingerprint {
+    /// The same in the given round of the sender's sequence numbers: a fast sender comes back to a
+    /// number within seconds, with the same content perhaps.
+    pub(super) fn in_round(self, round: u16) -> Self {
+        Self(self.0 ^ u64::from(round).wrapping_mul(0x9E37_79B9_7F4A_7C15))
+    }
 }
 
-/// Fingerprints with the time at which they were put in.
+/// The way by which something came, as a keyed hash.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Way(u64);
+
+/// Whose message, and whether it is one that its sender may repeat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Class {
+    /// Whether its sender is a stranger; see [`Peers`](super::peers::Peers).
+    pub(super) stranger: bool,
+    /// Whether it wants an acknowledgement, and hence may be repeated for some time.
+    pub(super) repeats: bool,
+}
+
+impl Class {
+    const COUNT: usize = 4;
+
+    const fn index(self) -> usize {
+        self.stranger as usize + 2 * self.repeats as usize
+    }
+}
+
+/// When a frame was put in, and by which way it had come at first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Sighting {
+    pub(super) time: Instant,
+    pub(super) way: Way,
+}
+
+/// A hasher for what is a hash already.
+#[derive(Clone, Copy, Debug, Default)]
+struct AlreadyHashed(u64);
+
+impl Hasher for AlreadyHashed {
+    fn write(&mut self, octets: &[u8]) {
+        for &octet in octets {
+            self.0 = self.0.rotate_left(8) ^ u64::from(octet);
+        }
+    }
+
+    fn write_u64(&mut self, hash: u64) {
+        self.0 = hash;
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
+
+/// Sightings of frames.
 #[derive(Debug)]
 pub(super) struct Recent {
-    times: HashMap<Fingerprint, Instant>,
-    order: VecDeque<(Instant, Fingerprint)>,
+    sightings: HashMap<Fingerprint, Sighting, BuildHasherDefault<AlreadyHashed>>,
+    order: [VecDeque<(Instant, Fingerprint)>; Class::COUNT],
     limit: usize,
     longest: Duration,
-    hasher: RandomState,
+    keys: RandomState,
 }
 
 impl Recent {
-    /// A memory of at most `limit` frames for at most `longest`.
-    pub(super) fn new(limit: usize, longest: Duration) -> Self {
+    /// A memory for at most `longest` of at most `limit` frames of each class, a quarter of that for
+    /// strangers. Memories with the same `keys` have the same fingerprints.
+    pub(super) fn new(limit: usize, longest: Duration, keys: RandomState) -> Self {
         Self {
-            times: HashMap::new(),
-            order: VecDeque::new(),
-            limit,
+            sightings: HashMap::default(),
+            order: Default::default(),
+            limit: limit.max(1),
             longest,
-            hasher: RandomState::new(),
+            keys,
         }
     }
 
     /// What tells `frame` from others.
     pub(super) fn fingerprint(&self, frame: &Frame) -> Fingerprint {
-        Fingerprint {
-            source: frame.source,
-            destination: frame.destination,
-            sequence: frame.sequence,
-            content: self
-                .hasher
-                .hash_one((frame.flags.data() as u8, &frame.payload)),
-        }
+        let answer = frame.flags.acknowledgement().is_answer();
+        let head = u128::from(frame.source.to_u32())
+            | u128::from(frame.destination.to_u32()) << 32
+            | u128::from(frame.sequence) << 64
+            | u128::from(frame.flags.data() as u8) << 80
+            | u128::from(answer) << 88;
+        let mut hasher = self.keys.build_hasher();
+        hasher.write_u128(head);
+        hasher.write(&frame.payload);
+        Fingerprint(hasher.finish())
+    }
+
+    /// What tells a way from others; `None` if ways do not matter.
+    pub(super) fn way(&self, path: Option<Path>) -> Way {
+        Way(path.map_or(0, |path| self.keys.hash_one(path)))
+    }
+
+    /// When it was put in last, if that is remembered.
+    pub(super) fn sighting(&self, seen: Fingerprint) -> Option<Sighting> {
+        self.sightings.get(&seen).copied()
     }
 
     /// Whether it was put in less than `window` ago.
     pub(super) fn contains(&self, now: Instant, seen: &Fingerprint, window: Duration) -> bool {
-        self.times
+        self.sightings
             .get(seen)
-            .is_some_and(|&time| now.saturating_duration_since(time) < window)
+            .is_some_and(|sighting| now.saturating_duration_since(sighting.time) < window)
     }
 
-    /// Remembers it from now on.
+    /// Remembers, from now on, something of ours.
     pub(super) fn insert(&mut self, now: Instant, seen: Fingerprint) {
-        self.forget_old(now);
-        while self.order.len() >= self.limit.max(1) {
-            self.forget_oldest();
-        }
-        self.times.insert(seen, now);
-        self.order.push_back((now, seen));
+        let class = Class {
+            stranger: false,
+            repeats: false,
+        };
+        self.insert_as(now, seen, Way(0), class);
     }
 
-    fn forget_old(&mut self, now: Instant) {
-        while let Some(&(time, _)) = self.order.front()
+    /// Remembers, from now on, that it came by that way.
+    pub(super) fn insert_as(&mut self, now: Instant, seen: Fingerprint, way: Way, class: Class) {
+        let limit = if class.stranger {
+            self.limit.div_ceil(4)
+        } else {
+            self.limit
+        };
+        let class = class.index();
+        while let Some(&(time, _)) = self.order[class].front()
             && now.saturating_duration_since(time) >= self.longest
         {
-            self.forget_oldest();
+            self.forget_oldest(class);
+        }
+        while self.order[class].len() >= limit {
+            self.forget_oldest(class);
+        }
+        let sighting = Sighting { time: now, way };
+        self.sightings.insert(seen, sighting);
+        self.order[class].push_back((now, seen));
+    }
+
+    fn forget_oldest(&mut self, class: usize) {
+        // The same frame may have been put in again since: then the younger entry keeps it.
+        if let Some((time, seen)) = self.order[class].pop_front()
+            && self
+                .sightings
+                .get(&seen)
+                .is_some_and(|sighting| sighting.time == time)
+        {
+            self.sightings.remove(&seen);
         }
     }
 
-    fn forget_oldest(&mut self) {
-        // The same frame may have been put in again since: then the younger entry keeps it.
-        if let Some((time, seen)) = self.order.pop_front()
-            && self.times.get(&seen) == Some(&time)
-        {
-            self.times.remove(&seen);
-        }
+    /// How many frames are remembered.
+    pub(super) fn len(&self) -> usize {
+        self.sightings.len()
     }
 }
 
@@ -93,6 +180,12 @@ mod tests {
     use bytes::Bytes;
 
     use super::*;
+    use crate::address::JausId;
+
+    const STRANGER: Class = Class {
+        stranger: true,
+        repeats: false,
+    };
 
     fn frame(sequence: u16, payload: &'static [u8]) -> Frame {
         let payload = Bytes::from_static(payload);
@@ -100,6 +193,10 @@ mod tests {
             sequence,
             ..Frame::new(JausId::new(1, 1, 1), JausId::new(2, 1, 1), payload)
         }
+    }
+
+    fn memory(limit: usize, longest: Duration) -> Recent {
+        Recent::new(limit, longest, RandomState::new())
     }
 
     #[test]
@@ -110,7 +207,7 @@ mod tests {
     fn the_memory_is_bounded_in_number_and_time() {
         let start = Instant::now();
         let window = Duration::from_millis(500);
-        let mut recent = Recent::new(2, window);
+        let mut recent = memory(2, window);
         let seen = [0, 1, 2].map(|sequence| recent.fingerprint(&frame(sequence, b"\x00\x2B\x02")));
         for seen in seen {
             recent.insert(start, seen);
@@ -121,7 +218,7 @@ mod tests {
         );
         assert!(!recent.contains(start + window, &seen[2], window));
         recent.insert(start + window, seen[0]);
-        assert_eq!((recent.times.len(), recent.order.len()), (1, 1));
+        assert_eq!((recent.len(), recent.order[0].len()), (1, 1));
     }
 
     #[test]
@@ -132,7 +229,7 @@ mod tests {
     fn what_is_put_in_again_is_remembered_from_then_on() {
         let start = Instant::now();
         let window = Duration::from_millis(500);
-        let mut recent = Recent::new(8, window);
+        let mut recent = memory(8, window);
         let seen = recent.fingerprint(&frame(7, b"\x02\x22"));
         recent.insert(start, seen);
         recent.insert(start + window / 2, seen);
@@ -141,10 +238,31 @@ mod tests {
     }
 
     #[test]
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "an arbitrary beginning of virtual time"
+    )]
+    fn strangers_push_out_only_what_strangers_sent() {
+        let start = Instant::now();
+        let window = Duration::from_millis(500);
+        let mut recent = memory(4, window);
+        let known = recent.fingerprint(&frame(7, b"\x02\x22"));
+        recent.insert(start, known);
+        for sequence in 100..200 {
+            let seen = recent.fingerprint(&frame(sequence, b"\x02\x22"));
+            recent.insert_as(start, seen, Way(0), STRANGER);
+        }
+        assert!(recent.contains(start, &known, window));
+        assert_eq!(recent.len(), 2, "a quarter for strangers");
+    }
+
+    #[test]
     fn the_content_counts_not_only_the_number() {
-        let recent = Recent::new(8, Duration::from_secs(1));
+        let recent = memory(8, Duration::from_secs(1));
         let fingerprint = |payload| recent.fingerprint(&frame(1, payload));
         assert_ne!(fingerprint(b"\x00\x2B\x02"), fingerprint(b"\x00\x2B\x03"));
         assert_eq!(fingerprint(b"\x00\x2B\x02"), fingerprint(b"\x00\x2B\x02"));
+        let seen = fingerprint(b"\x00\x2B\x02");
+        assert_ne!(seen.in_round(1), seen.in_round(2));
     }
 }

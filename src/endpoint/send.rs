@@ -100,6 +100,7 @@ impl Endpoint {
         let scope = self.check(&message)?;
         self.latest = Some(now);
         let handle = self.deliveries.next_handle();
+        let (destination, length) = (message.destination, message.payload.len());
         if self.components.contains(message.destination) {
             self.send_to_sibling(handle, message)?;
         } else {
@@ -107,6 +108,7 @@ impl Endpoint {
             self.send_to_siblings(&message, scope);
         }
         self.counters.add(Counter::MessagesSent);
+        self.peers.note_sent(destination, length);
         Ok(handle)
     }
 

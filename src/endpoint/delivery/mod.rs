@@ -302,6 +302,7 @@ impl Endpoint {
         };
         if tries > 1 {
             self.counters.add(Counter::Retransmissions);
+            self.peers.note_retransmission(destination);
         }
         let frame = Frame {
             destination,
@@ -377,6 +378,7 @@ impl Endpoint {
             } = undelivered;
             self.deliveries.settle(length);
             self.counters.add(Counter::MessagesGivenUp);
+            self.peers.note_lost(destination);
             if !awaited {
                 continue;
             }

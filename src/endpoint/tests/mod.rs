@@ -9,6 +9,7 @@ mod fragments;
 mod identity;
 mod output;
 mod receiving;
+mod routing;
 mod sending;
 mod wire;
 

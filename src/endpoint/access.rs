@@ -1,0 +1,275 @@
+//! Who may speak to this node: allow and deny lists by subsystem and by network.
+//!
+//! JAUS proves nobody's identity. The lists keep out what does not belong, such as another team's
+//! vehicles on a shared network; they are no protection from somebody who writes a wrong id or
+//! address on purpose.
+
+use std::fmt;
+use std::net::{IpAddr, Ipv4Addr};
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+use super::Counter;
+use crate::address::JausId;
+
+/// The lists. Who is denied is out; if a list of allowed is not empty, who is not on it is out too.
+/// So deny wins, and empty lists let everybody in.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Access {
+    /// The only subsystems to hear and to forward for, unless empty. The node's own subsystem is
+    /// no exception: its other nodes are heard only if it is listed.
+    pub allow_subsystems: Vec<Subsystems>,
+    /// Subsystems neither to hear nor to forward for.
+    pub deny_subsystems: Vec<Subsystems>,
+    /// The only networks to hear, unless empty. Lines without an address are always heard.
+    pub allow_networks: Vec<Network>,
+    /// Networks not to hear.
+    pub deny_networks: Vec<Network>,
+}
+
+impl Access {
+    /// Whether a message may come from, or be forwarded to, this subsystem.
+    #[must_use]
+    pub fn allows_subsystem(&self, subsystem: u16) -> bool {
+        let is_on = |list: &[Subsystems]| list.iter().any(|range| range.contains(subsystem));
+        !is_on(&self.deny_subsystems)
+            && (self.allow_subsystems.is_empty() || is_on(&self.allow_subsystems))
+    }
+
+    /// Whether anything may come from this address.
+    #[must_use]
+    pub fn allows_address(&self, address: IpAddr) -> bool {
+        let is_on = |list: &[Network]| list.iter().any(|network| network.contains(address));
+        !is_on(&self.deny_networks)
+            && (self.allow_networks.is_empty() || is_on(&self.allow_networks))
+    }
+
+    /// Checks who sent a message.
+    pub(super) fn check_source(&self, source: JausId) -> Result<(), Counter> {
+        if self.allows_subsystem(source.subsystem()) {
+            Ok(())
+        } else {
+            Err(Counter::SubsystemDenied)
+        }
+    }
+}
+
+/// A subsystem or several in a row, as text `101` or `200-299`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Subsystems(RangeInclusive<u16>);
+
+impl Subsystems {
+    /// Whether this subsystem is one of them.
+    #[must_use]
+    pub fn contains(&self, subsystem: u16) -> bool {
+        self.0.contains(&subsystem)
+    }
+}
+
+/// Why a text is no entry of a list.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AccessError {
+    /// Neither a subsystem number nor a range of them.
+    #[error(
+        "`{0}` names no subsystems: write a number from 1 to 65534 such as \"101\", or a range \
+         with the smaller first such as \"200-299\""
+    )]
+    Subsystems(String),
+    /// Not a network.
+    #[error(
+        "`{0}` is no network: write an address and the number of its leading bits that count, \
+         such as \"10.0.9.0/24\" or \"fd00::/8\", or one address such as \"10.0.9.7\""
+    )]
+    Network(String),
+    /// Octets of an address behind the bits that count.
+    #[error("`{text}` has bits set behind the first {prefix}: write \"{meant}\"")]
+    HostBits {
+        /// What was given.
+        text: String,
+        /// How many bits count.
+        prefix: u8,
+        /// The network that the address is in.
+        meant: Network,
+    },
+}
+
+impl FromStr for Subsystems {
+    type Err = AccessError;
+
+    fn from_str(text: &str) -> Result<Self, AccessError> {
+        let number = |part: &str| {
+            let part = part.trim();
+            let plain = part.bytes().all(|octet| octet.is_ascii_digit());
+            let number = part.parse::<u16>().ok().filter(|_| plain);
+            number.filter(|number| (1..JausId::ANY_SUBSYSTEM).contains(number))
+        };
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        match (number(first), number(last)) {
+            (Some(first), Some(last)) if first <= last => Ok(Self(first..=last)),
+            _ => Err(AccessError::Subsystems(text.to_owned())),
+        }
+    }
+}
+
+impl fmt::Display for Subsystems {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (first, last) = (self.0.start(), self.0.end());
+        if first == last {
+            write!(f, "{first}")
+        } else {
+            write!(f, "{first}-{last}")
+        }
+    }
+}
+
+/// A network of IPv4 or IPv6, as text `10.0.9.0/24`, `fd00::/8`, or one address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Network {
+    address: IpAddr,
+    prefix: u8,
+}
+
+impl Network {
+    /// Whether an address is in the network. An IPv4 address written in IPv6's form
+    /// (`::ffff:10.0.9.7`) is the IPv4 address.
+    #[must_use]
+    pub fn contains(self, address: IpAddr) -> bool {
+        let address = address.to_canonical();
+        address.is_ipv4() == self.address.is_ipv4()
+            && first_bits(address, self.prefix) == self.bits()
+    }
+
+    fn bits(self) -> u128 {
+        first_bits(self.address, self.prefix)
+    }
+}
+
+/// The first `count` bits of an address, the others 0.
+fn first_bits(address: IpAddr, count: u8) -> u128 {
+    let (bits, length) = match address {
+        IpAddr::V4(address) => (u128::from(address.to_bits()), Ipv4Addr::BITS),
+        IpAddr::V6(address) => (address.to_bits(), u128::BITS),
+    };
+    let others = length.saturating_sub(count.into());
+    bits.checked_shr(others)
+        .and_then(|bits| bits.checked_shl(others))
+        .unwrap_or(0)
+}
+
+impl FromStr for Network {
+    type Err = AccessError;
+
+    fn from_str(text: &str) -> Result<Self, AccessError> {
+        let wrong = || AccessError::Network(text.to_owned());
+        let (address, prefix) = match text.split_once('/') {
+            Some((address, prefix)) => (address, Some(prefix.parse::<u8>().map_err(|_| wrong())?)),
+            None => (text, None),
+        };
+        let address: IpAddr = address.parse().map_err(|_| wrong())?;
+        let longest = if address.is_ipv4() { 32 } else { 128 };
+        let prefix = prefix.unwrap_or(longest);
+        if prefix > longest {
+            return Err(wrong());
+        }
+        let bits = first_bits(address, prefix);
+        let meant = match address {
+            IpAddr::V4(_) => IpAddr::from(Ipv4Addr::from_bits(bits as u32)),
+            IpAddr::V6(_) => IpAddr::from(bits.to_be_bytes()),
+        };
+        let network = Self {
+            address: meant,
+            prefix,
+        };
+        if meant == address {
+            Ok(network)
+        } else {
+            let text = text.to_owned();
+            let meant = network;
+            Err(AccessError::HostBits {
+                text,
+                prefix,
+                meant,
+            })
+        }
+    }
+}
+
+impl fmt::Display for Network {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.address, self.prefix)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn network(text: &str) -> Network {
+        text.parse().unwrap()
+    }
+
+    fn subsystems(texts: &[&str]) -> Vec<Subsystems> {
+        texts.iter().map(|text| text.parse().unwrap()).collect()
+    }
+
+    #[test]
+    fn deny_wins_over_allow_and_empty_lists_let_everybody_in() {
+        let mut access = Access::default();
+        assert!(access.allows_subsystem(7) && access.allows_address([10, 0, 9, 7].into()));
+        access.allow_subsystems = subsystems(&["101", "200-299"]);
+        access.deny_subsystems = subsystems(&["250"]);
+        let allowed: Vec<_> = (1..400).filter(|&id| access.allows_subsystem(id)).collect();
+        assert_eq!(allowed.len(), 100);
+        assert!(allowed.contains(&101) && allowed.contains(&299) && !allowed.contains(&250));
+        access.allow_networks = vec![network("10.0.0.0/8")];
+        access.deny_networks = vec![network("10.0.9.0/24")];
+        let allows = |text: &str| access.allows_address(text.parse().unwrap());
+        assert!(allows("10.0.8.1") && !allows("10.0.9.1") && !allows("11.0.0.1"));
+    }
+
+    #[test]
+    fn networks_of_both_families_hold_what_is_in_them() {
+        let holds = |net: &str, address: &str| network(net).contains(address.parse().unwrap());
+        assert!(holds("fd00::/8", "fdff::1") && !holds("fd00::/8", "fe80::1"));
+        assert!(holds("0.0.0.0/0", "1.2.3.4") && !holds("0.0.0.0/0", "::1"));
+        assert!(holds("::/0", "2001:db8::1"));
+        assert!(holds("10.0.9.7", "10.0.9.7") && !holds("10.0.9.7", "10.0.9.6"));
+        assert!(
+            holds("10.0.9.0/24", "::ffff:10.0.9.1"),
+            "IPv4 in IPv6's form"
+        );
+    }
+
+    #[test]
+    fn entries_are_written_as_they_are_read() {
+        for text in ["101", "200-299"] {
+            assert_eq!(text.parse::<Subsystems>().unwrap().to_string(), text);
+        }
+        for text in ["10.0.9.0/24", "fd00::/8"] {
+            assert_eq!(network(text).to_string(), text);
+        }
+    }
+
+    #[test]
+    fn a_wrong_entry_is_named_with_what_to_write() {
+        for wrong in ["", "0", "65535", "299-200", "a", "1-", "+1", "1-2-3"] {
+            let error = wrong.parse::<Subsystems>().unwrap_err().to_string();
+            assert!(error.contains(&format!("`{wrong}`")), "{error}");
+            assert!(error.contains("\"200-299\""), "{error}");
+        }
+        for wrong in [
+            "",
+            "10.0.9.0/33",
+            "fd00::/129",
+            "10.0.9/24",
+            "10.0.9.0/",
+            "eth0",
+        ] {
+            let error = wrong.parse::<Network>().unwrap_err().to_string();
+            assert!(error.contains("\"10.0.9.0/24\""), "{error}");
+        }
+        let error = "10.0.9.7/24".parse::<Network>().unwrap_err().to_string();
+        assert!(error.contains("write \"10.0.9.0/24\""), "{error}");
+    }
+}

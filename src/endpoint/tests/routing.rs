@@ -1,0 +1,631 @@
+//! Passing on between links: chains, parallel routers and rings of them. Each world is a few
+//! networks in memory; what is sent arrives 100 µs later.
+
+use std::collections::VecDeque;
+
+use super::*;
+use crate::wire::Framing;
+
+const A: JausId = JausId::new(1, 1, 1);
+const B: JausId = JausId::new(2, 1, 1);
+const C: JausId = JausId::new(3, 1, 1);
+
+/// A place where a node is connected to a network.
+struct Plug {
+    node: usize,
+    link: LinkId,
+    network: usize,
+    framing: Framing,
+    address: SocketAddr,
+}
+
+/// Nodes, and networks between them.
+struct World {
+    now: Instant,
+    nodes: Vec<Endpoint>,
+    plugs: Vec<Plug>,
+    flying: VecDeque<(usize, usize, Bytes)>,
+    carried: usize,
+}
+
+impl World {
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "an arbitrary beginning of virtual time"
+    )]
+    fn new() -> Self {
+        Self {
+            now: Instant::now(),
+            nodes: Vec::new(),
+            plugs: Vec::new(),
+            flying: VecDeque::new(),
+            carried: 0,
+        }
+    }
+
+    /// A node with a component, on a network.
+    fn host(&mut self, id: JausId, network: usize) -> usize {
+        let node = self.add(Config::default(), &[network]);
+        self.nodes[node].attach(id).unwrap();
+        node
+    }
+
+    /// A node that forwards between networks.
+    fn router(&mut self, networks: &[usize]) -> usize {
+        self.add(router_config(), networks)
+    }
+
+    fn add(&mut self, config: Config, networks: &[usize]) -> usize {
+        self.nodes.push(Endpoint::new(config));
+        let node = self.nodes.len() - 1;
+        for &network in networks {
+            self.plug(node, network, Framing::Judp);
+        }
+        node
+    }
+
+    /// Connects a node; its links are numbered like the networks.
+    fn plug(&mut self, node: usize, network: usize, framing: Framing) {
+        let link = LinkId(network as u16);
+        let address = SocketAddr::from(([10, 0, network as u8, node as u8 + 1], judp::PORT));
+        self.plugs.push(Plug {
+            node,
+            link,
+            network,
+            framing,
+            address,
+        });
+        self.announce(node);
+    }
+
+    /// Tells a node its links, as the owner of an endpoint does.
+    fn announce(&mut self, node: usize) {
+        let own = |plug: &&Plug| plug.node == node && plug.framing == Framing::Judp;
+        let addresses: Vec<_> = self.plugs.iter().filter(own).map(|p| p.address).collect();
+        for plug in self.plugs.iter().filter(|plug| plug.node == node) {
+            let profile = LinkProfile {
+                framing: plug.framing,
+                ..LinkProfile::judp(addresses.clone())
+            };
+            self.nodes[node].add_link(plug.link, profile);
+        }
+    }
+
+    fn restart(&mut self, node: usize, config: Config) {
+        self.nodes[node] = Endpoint::new(config);
+        self.announce(node);
+    }
+
+    /// Puts what a node has to send on the networks. Multicast comes back to its sender, too.
+    fn collect(&mut self, node: usize) {
+        while let Some(transmit) = self.nodes[node].poll_transmit() {
+            let from = self
+                .plugs
+                .iter()
+                .position(|plug| plug.node == node && plug.link == transmit.link)
+                .unwrap();
+            self.carried += 1;
+            let network = self.plugs[from].network;
+            for (to, plug) in self.plugs.iter().enumerate() {
+                let reached = match transmit.to {
+                    To::Group => plug.framing == Framing::Judp || to != from,
+                    To::Peer(peer) => peer == plug.address,
+                };
+                if plug.network == network && reached {
+                    self.flying.push_back((from, to, transmit.payload.clone()));
+                }
+            }
+        }
+    }
+
+    fn send(&mut self, node: usize, message: Outgoing) -> MessageHandle {
+        let handle = self.nodes[node].send(self.now, message).unwrap();
+        self.collect(node);
+        handle
+    }
+
+    /// Lets all that flies arrive, and what follows from it.
+    fn settle(&mut self) {
+        for _round in 0..1_000_000 {
+            let Some((from, to, octets)) = self.flying.pop_front() else {
+                return;
+            };
+            self.now += Duration::from_micros(1);
+            let (node, path) = (self.plugs[to].node, self.path(from, to));
+            // The same octets, but that a connection hands over frames.
+            match self.plugs[to].framing {
+                Framing::Judp => self.nodes[node].handle_datagram(self.now, path, octets),
+                _ => {
+                    for frame in judp::frames(octets).unwrap() {
+                        self.nodes[node].handle_frame(self.now, path, &frame.unwrap());
+                    }
+                }
+            }
+            self.collect(node);
+        }
+        panic!("a storm");
+    }
+
+    fn path(&self, from: usize, to: usize) -> Path {
+        Path {
+            link: self.plugs[to].link,
+            peer: self.plugs[from].address.into(),
+        }
+    }
+
+    /// Lets time pass, with all that happens in it.
+    fn pass(&mut self, time: Duration) {
+        let end = self.now + time;
+        while self.now < end {
+            self.settle();
+            self.now += Duration::from_millis(1);
+            for node in 0..self.nodes.len() {
+                self.nodes[node].handle_timeout(self.now);
+                self.collect(node);
+            }
+        }
+        self.settle();
+    }
+
+    fn events(&mut self, node: usize) -> Vec<Event> {
+        std::iter::from_fn(|| self.nodes[node].poll_event()).collect()
+    }
+
+    /// The messages that have come to a node.
+    fn received(&mut self, node: usize) -> Vec<Received> {
+        let message = |event| match event {
+            Event::Received(received) => Some(received),
+            _ => None,
+        };
+        self.events(node).into_iter().filter_map(message).collect()
+    }
+
+    fn count(&self, node: usize, counter: Counter) -> u64 {
+        self.nodes[node].counters().get(counter)
+    }
+
+    /// Where a node thinks that somebody is.
+    fn whereabouts(&self, node: usize, id: JausId) -> Option<Path> {
+        self.nodes[node]
+            .peers()
+            .find(|peer| peer.id == id)
+            .map(|peer| peer.path)
+    }
+
+    /// The address of a node on a network.
+    fn address(&self, node: usize, network: usize) -> Remote {
+        let on = |plug: &&Plug| plug.node == node && plug.network == network;
+        self.plugs.iter().find(on).unwrap().address.into()
+    }
+}
+
+fn router_config() -> Config {
+    Config {
+        forwarding: true,
+        ..Config::default()
+    }
+}
+
+fn query(source: JausId, destination: JausId) -> Outgoing {
+    Outgoing::new(
+        source,
+        destination,
+        Bytes::from_static(QUERY_IDENTIFICATION),
+    )
+}
+
+/// Networks 0 and 1 with a host each, and a router between them.
+fn chain() -> (World, usize, usize, usize) {
+    let mut world = World::new();
+    let (a, c) = (world.host(A, 0), world.host(C, 1));
+    let router = world.router(&[0, 1]);
+    (world, a, router, c)
+}
+
+#[test]
+fn ends_find_each_other_through_a_router_and_go_on_by_unicast() {
+    let (mut world, a, router, c) = chain();
+    world.send(a, query(A, C));
+    world.settle();
+    assert_eq!(world.received(c).len(), 1);
+    assert_eq!(
+        [
+            world.whereabouts(a, C).unwrap().peer,
+            world.whereabouts(c, A).unwrap().peer
+        ],
+        [world.address(router, 0), world.address(router, 1)],
+        "each sees the router's address as the other's"
+    );
+    world.carried = 0;
+    world.send(c, query(C, A));
+    world.settle();
+    assert_eq!((world.received(a).len(), world.carried), (1, 2));
+    for node in [a, c] {
+        assert_eq!(world.count(node, Counter::IdConflict), 0);
+    }
+}
+
+#[test]
+fn a_large_acknowledged_message_passes_in_fragments_and_is_acknowledged_by_its_receiver() {
+    for second in [Framing::Judp, Framing::Jtcp] {
+        let mut world = World::new();
+        let (a, c) = (world.host(A, 0), world.add(Config::default(), &[]));
+        let router = world.router(&[0]);
+        world.plug(c, 1, second);
+        world.plug(router, 1, second);
+        world.nodes[c].attach(C).unwrap();
+        let payload: Bytes = (0..1 << 20).map(|at| (at % 251) as u8).collect();
+        let message = Outgoing {
+            acknowledge: true,
+            payload: payload.clone(),
+            ..query(A, C)
+        };
+        let handle = world.send(a, message);
+        world.pass(Duration::from_secs(2));
+        let received = world.received(c);
+        assert_eq!(received.len(), 1, "{second:?}");
+        assert!(received[0].payload == payload);
+        let acknowledged = Event::Acknowledged {
+            message: handle,
+            by: C,
+        };
+        assert!(world.events(a).contains(&acknowledged));
+        assert_eq!(world.nodes[router].reassembly.cost(), 0);
+        assert_eq!(world.count(router, Counter::AcknowledgementsSent), 0);
+    }
+}
+
+#[test]
+fn whoever_does_not_forward_by_wish_does_not() {
+    let mut world = World::new();
+    let (a, c) = (world.host(A, 0), world.host(C, 1));
+    let between = world.add(Config::default(), &[0, 1]);
+    world.send(a, query(A, C));
+    world.pass(Duration::from_secs(1));
+    assert_eq!(world.received(c), []);
+    assert_eq!(world.whereabouts(between, A), None);
+    assert!(world.count(between, Counter::NotForUs) > 0);
+}
+
+#[test]
+fn a_broadcast_reaches_the_routers_components_and_goes_on() {
+    let (mut world, a, router, c) = chain();
+    world.nodes[router].attach(B).unwrap();
+    for scope in [Broadcast::Global, Broadcast::Local] {
+        let message = Outgoing {
+            broadcast: scope,
+            ..query(A, JausId::EVERYONE)
+        };
+        world.send(a, message);
+        world.settle();
+        let mine = usize::from(scope == Broadcast::Global);
+        assert_eq!(world.received(router).len(), mine, "{scope:?}");
+        assert_eq!(world.received(c).len(), mine, "{scope:?}");
+    }
+    let sibling = JausId::new(A.subsystem(), 2, 1);
+    world.nodes[c].attach(sibling).unwrap();
+    let local = Outgoing {
+        broadcast: Broadcast::Local,
+        ..query(A, JausId::EVERYONE)
+    };
+    world.send(a, local);
+    world.settle();
+    let to: Vec<_> = world.received(c).iter().map(|message| message.to).collect();
+    assert_eq!(to, [sibling], "a subsystem may span networks");
+}
+
+/// Two routers between the same two networks: 1 datagram of the sender, at most 1 of each router.
+#[test]
+fn two_routers_in_parallel_deliver_once_and_make_no_storm() {
+    let mut world = World::new();
+    let (a, near, c) = (world.host(A, 0), world.host(B, 0), world.host(C, 1));
+    let routers = [world.router(&[0, 1]), world.router(&[0, 1])];
+    for _broadcast in 0..100 {
+        world.carried = 0;
+        world.send(a, query(A, JausId::EVERYONE));
+        world.settle();
+        assert_eq!(
+            (world.received(near).len(), world.received(c).len()),
+            (1, 1)
+        );
+        assert_eq!(world.carried, 1 + 2);
+        world.pass(Duration::from_millis(10));
+    }
+    world.send(c, query(C, JausId::EVERYONE));
+    world.settle();
+    assert_eq!(world.received(a).len(), 1);
+    // The way there is one of the two.
+    world.carried = 0;
+    world.send(c, query(C, A));
+    world.settle();
+    assert_eq!((world.received(a).len(), world.carried), (1, 2));
+    for router in routers {
+        assert_eq!(world.whereabouts(router, A).unwrap().link, LinkId(0));
+        assert_eq!(world.whereabouts(router, C).unwrap().link, LinkId(1));
+    }
+    assert_eq!(world.count(a, Counter::IdConflict), 0);
+}
+
+/// A ring of three networks and three routers: 1 datagram of the sender, and each router passes it
+/// on at most once.
+#[test]
+fn a_ring_of_three_routers_delivers_once_and_makes_no_storm() {
+    let mut world = World::new();
+    let (a, b, c) = (world.host(A, 0), world.host(B, 1), world.host(C, 2));
+    for pair in [[0, 1], [1, 2], [2, 0]] {
+        world.router(&pair);
+    }
+    for _broadcast in 0..100 {
+        world.carried = 0;
+        world.send(a, query(A, JausId::EVERYONE));
+        world.settle();
+        assert_eq!((world.received(b).len(), world.received(c).len()), (1, 1));
+        assert!(world.carried <= 1 + 3, "{}", world.carried);
+        world.pass(Duration::from_millis(10));
+    }
+    assert_eq!(world.received(a), []);
+    // Messages for somebody who is nowhere do not circle either.
+    world.carried = 0;
+    world.send(a, query(A, JausId::new(9, 9, 9)));
+    world.settle();
+    assert!(world.carried <= 1 + 3, "{}", world.carried);
+    // And one for somebody who is somewhere comes back acknowledged.
+    let handle = world.send(
+        b,
+        Outgoing {
+            acknowledge: true,
+            ..query(B, C)
+        },
+    );
+    world.pass(Duration::from_secs(1));
+    let acknowledged = Event::Acknowledged {
+        message: handle,
+        by: C,
+    };
+    assert!(world.events(b).contains(&acknowledged));
+    assert_eq!(world.received(c).len(), 1);
+}
+
+#[test]
+fn a_restarted_router_goes_on() {
+    let (mut world, a, router, c) = chain();
+    world.send(a, query(A, C));
+    world.settle();
+    world.restart(router, router_config());
+    for (node, from, to) in [(a, A, C), (c, C, A)] {
+        let message = Outgoing {
+            acknowledge: true,
+            ..query(from, to)
+        };
+        let handle = world.send(node, message);
+        world.pass(Duration::from_secs(1));
+        let acknowledged = Event::Acknowledged {
+            message: handle,
+            by: to,
+        };
+        assert!(world.events(node).contains(&acknowledged), "{from}");
+    }
+}
+
+#[test]
+fn a_component_that_moves_to_another_network_is_found_there() {
+    let mut world = World::new();
+    let (a, before) = (world.host(A, 0), world.host(C, 1));
+    let router = world.router(&[0, 1, 2]);
+    world.send(before, query(C, JausId::EVERYONE));
+    world.settle();
+    assert_eq!(world.whereabouts(router, C).unwrap().link, LinkId(1));
+    world.nodes[before].detach(C);
+    let config = Config {
+        first_sequence: 999,
+        ..Config::default()
+    };
+    let after = world.add(config, &[2]);
+    world.nodes[after].attach(C).unwrap();
+    world.pass(Duration::from_secs(2));
+    world.send(after, query(C, JausId::EVERYONE));
+    world.settle();
+    assert_eq!(world.whereabouts(router, C).unwrap().link, LinkId(2));
+    world.send(a, query(A, C));
+    world.settle();
+    assert_eq!(world.received(after).len(), 1);
+    assert_eq!(world.received(before), []);
+}
+
+/// A router with A known on network 0 and C on network 1, fed by hand.
+struct Between {
+    world: World,
+    router: usize,
+}
+
+impl Between {
+    fn new(config: Config) -> Self {
+        let mut world = World::new();
+        let router = world.add(config, &[0, 1]);
+        let mut between = Self { world, router };
+        between.hear(0, 7, &message(A, JausId::EVERYONE, 1));
+        between.hear(1, 8, &message(C, JausId::EVERYONE, 1));
+        between.sent();
+        between
+    }
+
+    fn hear(&mut self, network: u8, host: u8, frame: &Frame) {
+        let path = Path {
+            link: LinkId(network.into()),
+            peer: SocketAddr::from(([10, 0, network, host], judp::PORT)).into(),
+        };
+        let datagram = judp::encode(frame).unwrap();
+        let now = self.world.now;
+        self.world.nodes[self.router].handle_datagram(now, path, datagram);
+    }
+
+    fn sent(&mut self) -> Vec<(LinkId, To, Frame)> {
+        let router = &mut self.world.nodes[self.router];
+        let read = |transmit: Transmit| {
+            let mut frames = judp::frames(transmit.payload).unwrap();
+            let frame = frames.next().unwrap().unwrap();
+            (transmit.link, transmit.to, frame)
+        };
+        std::iter::from_fn(|| router.poll_transmit())
+            .map(read)
+            .collect()
+    }
+
+    fn count(&self, counter: Counter) -> u64 {
+        self.world.count(self.router, counter)
+    }
+}
+
+fn message(source: JausId, destination: JausId, sequence: u16) -> Frame {
+    let payload = Bytes::from_static(QUERY_IDENTIFICATION);
+    Frame {
+        sequence,
+        ..Frame::new(source, destination, payload)
+    }
+}
+
+/// As recorded: Junior sends a message for an unknown id to the group, with the flags of a global
+/// broadcast and the wish to be acknowledged, and its relay leaves them so.
+#[test]
+fn flags_ids_and_number_stay_as_they_came() {
+    let mut between = Between::new(router_config());
+    let flags = Flags::new(Priority::High)
+        .with_broadcast(Broadcast::Global)
+        .with_acknowledgement(Acknowledgement::Request);
+    let frame = Frame {
+        flags,
+        ..message(A, C, 77)
+    };
+    between.hear(0, 7, &frame);
+    let there = To::Peer(SocketAddr::from(([10, 0, 1, 8], judp::PORT)).into());
+    assert_eq!(between.sent(), [(LinkId(1), there, frame)]);
+}
+
+#[test]
+fn a_repeated_message_is_passed_on_again_and_a_copy_from_elsewhere_is_not() {
+    let mut between = Between::new(router_config());
+    let wish = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    let frame = Frame {
+        flags: wish,
+        ..message(A, C, 5)
+    };
+    for _try in 0..3 {
+        between.hear(0, 7, &frame);
+        between.hear(0, 7, &frame);
+        between.hear(0, 99, &frame);
+        assert_eq!(between.sent().len(), 1, "once for each true repetition");
+        between.world.now += Duration::from_millis(100);
+    }
+    let once = message(A, C, 6);
+    between.hear(0, 7, &once);
+    between.world.now += Duration::from_millis(50);
+    between.hear(0, 7, &once);
+    assert_eq!(between.sent().len(), 1, "nobody waits for it");
+    let known = between.world.whereabouts(between.router, A).unwrap();
+    assert_eq!(known.peer, SocketAddr::from(([10, 0, 0, 7], judp::PORT)));
+}
+
+#[test]
+fn the_next_hops_header_is_spoken() {
+    let mut between = Between::new(router_config());
+    let old = |frame| Frame {
+        version: Version::Ra,
+        ..frame
+    };
+    between.hear(1, 8, &old(message(C, A, 0)));
+    assert_eq!(between.sent()[0].2.version, Version::As5669a);
+    between.hear(0, 7, &message(A, C, 9));
+    let there = between.sent();
+    assert_eq!(there[0].2.version, Version::Ra);
+    assert_eq!(there[0].2.payload, QUERY_IDENTIFICATION);
+    let wish = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    let answer = Frame {
+        flags: wish,
+        ..old(message(C, A, 9))
+    };
+    let bare = answer.payload.slice(..2);
+    between.hear(
+        1,
+        8,
+        &Frame {
+            payload: bare,
+            ..answer
+        },
+    );
+    let back = between.sent();
+    assert!(back[0].2.is_acknowledgement() && back[0].2.version == Version::As5669a);
+    let later = Flags::default().with_data(crate::wire::DataControl::Last);
+    between.hear(
+        0,
+        7,
+        &Frame {
+            flags: later,
+            ..message(A, C, 10)
+        },
+    );
+    assert_eq!(between.sent(), [], "an older header would need the code");
+    assert_eq!(between.count(Counter::CannotForward), 1);
+}
+
+#[test]
+fn broadcasts_are_passed_on_at_a_bounded_rate_and_only_from_where_their_sender_is() {
+    let mut between = Between::new(router_config());
+    for sequence in 0..10_000 {
+        between.hear(0, 7, &message(A, JausId::EVERYONE, sequence));
+        between.world.now += Duration::from_micros(100);
+    }
+    let passed = between.count(Counter::MessagesForwarded);
+    assert!((1400..=1600).contains(&passed), "{passed} in a second");
+    between.sent();
+    between.world.now += Duration::from_millis(100);
+    between.hear(0, 7, &message(A, JausId::EVERYONE, 20_000));
+    assert_eq!(between.sent().len(), 1);
+    between.hear(1, 66, &message(A, JausId::EVERYONE, 20_001));
+    assert_eq!(
+        between.sent(),
+        [],
+        "A was heard on the other network just now"
+    );
+    assert_eq!(between.count(Counter::NotTheWayBack), 1);
+}
+
+#[test]
+fn nothing_goes_back_to_where_it_came_from() {
+    let mut between = Between::new(router_config());
+    between.hear(0, 7, &message(B, JausId::EVERYONE, 1));
+    between.sent();
+    // Both live at one address, or heard each other through the group.
+    between.hear(0, 7, &message(A, B, 2));
+    let group = Flags::default().with_broadcast(Broadcast::Global);
+    between.hear(
+        0,
+        9,
+        &Frame {
+            flags: group,
+            ..message(JausId::new(4, 1, 1), A, 3)
+        },
+    );
+    assert_eq!(between.sent(), []);
+    // Sent to us alone, to be passed on to a neighbour.
+    between.hear(0, 9, &message(JausId::new(4, 1, 1), A, 4));
+    assert_eq!(between.sent().len(), 1);
+}
+
+#[test]
+fn what_the_lists_do_not_allow_is_not_passed_on() {
+    let mut between = Between::new(Config {
+        access: Access {
+            deny_subsystems: vec!["3".parse().unwrap(), "5-6".parse().unwrap()],
+            ..Access::default()
+        },
+        ..router_config()
+    });
+    between.hear(0, 7, &message(A, C, 2));
+    between.hear(0, 7, &message(JausId::new(6, 1, 1), A, 2));
+    assert_eq!(between.sent(), []);
+    assert_eq!(
+        between.count(Counter::SubsystemDenied),
+        3,
+        "C at first, too"
+    );
+}
