@@ -15,8 +15,31 @@ use crate::report::{self, median, ratio, spread};
 use crate::roles::{self, CODE, COUNT, Role};
 use crate::{Effort, baseline};
 
-/// Octets of a message, and of all messages that may be on their way without acknowledgement.
+/// Octets of a message.
 const LENGTHS: [usize; 5] = [8, 64, 1024, 64 << 10, 1 << 20];
+/// Octets of acknowledged messages that are on their way at once, and the most messages.
+const UNDERWAY: (usize, usize) = (4 << 20, 256);
+/// Small messages a second, where the sender keeps to a pace.
+const PACE: f64 = 300_000.0;
+
+/// How the messages are sent.
+#[derive(Clone, Copy, PartialEq)]
+enum Manner {
+    /// As fast as the node takes them.
+    AllOut,
+    /// Small ones at a steady pace.
+    Paced,
+    /// Each is acknowledged, many at a time.
+    Acknowledged,
+}
+
+impl Manner {
+    const ALL: [(Self, &str); 3] = [
+        (Self::AllOut, ""),
+        (Self::Paced, ", 300 000/s"),
+        (Self::Acknowledged, ", acknowledged"),
+    ];
+}
 
 /// What one run gave.
 #[derive(Clone, Copy)]
@@ -59,10 +82,11 @@ pub(crate) fn measure(effort: Effort) {
             };
             note(format!("raw UDP, datagrams of {datagram}"), raw);
             for setting in Setting::ALL {
-                for acknowledge in [false, true] {
-                    let how = if acknowledge { ", acknowledged" } else { "" };
-                    let flow = flow(setting, length, acknowledge, time);
-                    note(format!("{}{how}", setting.name()), flow);
+                for (manner, how) in Manner::ALL {
+                    if manner != Manner::Paced || length <= 64 {
+                        let flow = flow(setting, length, manner, time);
+                        note(format!("{}{how}", setting.name()), flow);
+                    }
                 }
             }
             copies.push(baseline::memcpy(length) / 1e6);
@@ -95,55 +119,99 @@ fn print(length: usize, flows: &[(String, Vec<Flow>)], copies: &[f64]) {
 }
 
 /// Sends for a time from here to a child that counts.
-fn flow(setting: Setting, length: usize, acknowledge: bool, time: Duration) -> Flow {
+fn flow(setting: Setting, length: usize, manner: Manner, time: Duration) -> Flow {
     let (_nodes, [here, there]) = setting.start();
     let [ours, theirs] = setting.ids();
     let _sink = Process::start(&Role::Sink(theirs, there));
     let mut message = vec![0; length];
     message[..2].copy_from_slice(&CODE);
-    let message = Bytes::from(message);
+    let message = Outgoing::new(ours, theirs, message.into());
     roles::runtime().block_on(async {
         let mut component = here.attach(ours).await;
         let port = &mut component.port;
         // Also makes the two known to each other.
         assert_eq!(count(port, theirs).await, 0);
         let start = Instant::now();
-        let mut sent = 0;
-        while start.elapsed() < time {
-            // A sink that answers has a say now and then.
-            for _ in 0..32 {
-                let mut outgoing = Outgoing::new(port.id(), theirs, message.clone());
-                outgoing.acknowledge = acknowledge;
-                if port.send(outgoing).is_err() {
-                    // Full: let the node work.
-                    break;
-                }
-                sent += 1;
-            }
-            tokio::task::yield_now().await;
-        }
-        let (mut received, mut unchanged) = (0, 0);
-        let mut seconds = start.elapsed().as_secs_f64();
-        loop {
-            let now = count(port, theirs).await;
-            if now > received {
-                received = now;
-                unchanged = 0;
-                seconds = start.elapsed().as_secs_f64();
-            } else {
-                unchanged += 1;
-            }
-            if received == sent || unchanged == 20 {
-                break;
-            }
-            sleep(Duration::from_millis(10)).await;
-        }
+        let sent = match manner {
+            Manner::AllOut => all_out(port, &message, time).await,
+            Manner::Paced => paced(port, &message, time).await,
+            Manner::Acknowledged => acknowledged(port, &message, time).await,
+        };
+        let (received, seconds) = arrived(port, theirs, sent, start).await;
         Flow {
             sent,
             received,
             seconds,
         }
     })
+}
+
+async fn all_out(port: &Port, message: &Outgoing, time: Duration) -> u64 {
+    let (mut sent, start) = (0, Instant::now());
+    let sender = port.sender();
+    while start.elapsed() < time {
+        for _ in 0..32 {
+            if port.send(message.clone()).is_err() {
+                // Full: let the node work.
+                break;
+            }
+            sent += 1;
+        }
+        sender.flushed().await;
+        tokio::task::yield_now().await;
+    }
+    sent
+}
+
+async fn paced(port: &Port, message: &Outgoing, time: Duration) -> u64 {
+    let (mut sent, start) = (0, Instant::now());
+    while start.elapsed() < time {
+        let due = (start.elapsed().as_secs_f64() * PACE) as u64;
+        while sent < due {
+            port.send(message.clone()).expect("room");
+            sent += 1;
+        }
+        sleep(Duration::from_millis(1)).await;
+    }
+    sent
+}
+
+/// Messages that were acknowledged.
+async fn acknowledged(port: &Port, message: &Outgoing, time: Duration) -> u64 {
+    let (octets, most) = UNDERWAY;
+    let underway = (octets / message.payload.len()).clamp(1, most);
+    let mut tasks = tokio::task::JoinSet::new();
+    for _ in 0..underway {
+        let (sender, message) = (port.sender(), message.clone());
+        tasks.spawn(async move {
+            let (mut sent, start) = (0, Instant::now());
+            while start.elapsed() < time {
+                sender.deliver(message.clone()).await.expect("delivered");
+                sent += 1;
+            }
+            sent
+        });
+    }
+    tasks.join_all().await.into_iter().sum()
+}
+
+/// How many messages have come when all have or no more come, and the time until the last.
+async fn arrived(port: &mut Port, sink: JausId, sent: u64, start: Instant) -> (u64, f64) {
+    let (mut received, mut unchanged) = (0, 0);
+    let mut seconds = start.elapsed().as_secs_f64();
+    loop {
+        let now = count(port, sink).await;
+        if now > received {
+            (received, unchanged) = (now, 0);
+            seconds = start.elapsed().as_secs_f64();
+        } else {
+            unchanged += 1;
+        }
+        if received >= sent || unchanged == 20 {
+            return (received, seconds);
+        }
+        sleep(Duration::from_millis(10)).await;
+    }
 }
 
 /// Asks the sink how many messages came.

@@ -149,8 +149,9 @@ impl Sender {
     }
 
     /// Sends a message, up to the network's door: when this returns, the datagram is with the
-    /// operating system, or a local receiver has it in its mailbox. To the node of another
-    /// process, when this returns the message is on its way there; what that node finds wrong
+    /// operating system, or a local receiver has it in its mailbox. Of a burst that holds for the
+    /// first; the others leave together, as soon as the sender lets the node's task have a turn;
+    /// those above standard priority never wait. To the node of another process, when this returns the message is on its way there; what that node finds wrong
     /// with it comes as [`HostEvent::Rejected`](super::HostEvent::Rejected).
     ///
     /// # Errors
