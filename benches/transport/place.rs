@@ -116,11 +116,12 @@ impl Setting {
         }
     }
 
-    /// The ids of the two components.
+    /// The ids of the two components; others for each setting, because all are in one group.
     pub(crate) const fn ids(self) -> [JausId; 2] {
         match self {
-            Self::OneNode => [JausId::new(101, 1, 33), JausId::new(101, 1, 34)],
-            Self::OwnNodes | Self::TwoNodes => [JausId::new(101, 1, 33), JausId::new(102, 1, 33)],
+            Self::OwnNodes => [JausId::new(101, 1, 33), JausId::new(102, 1, 33)],
+            Self::OneNode => [JausId::new(103, 1, 33), JausId::new(103, 1, 34)],
+            Self::TwoNodes => [JausId::new(104, 1, 33), JausId::new(105, 1, 33)],
         }
     }
 

@@ -69,10 +69,10 @@ impl Role {
             Self::UdpEcho => baseline::udp_echo(),
             Self::UdpSink => baseline::udp_sink(),
             Self::UnixEcho => baseline::unix_echo(),
-            Self::Echo(id, place) => runtime().block_on(echo(id, place)),
-            Self::Sink(id, place) => runtime().block_on(sink(id, place)),
-            Self::Node(id, place) => runtime().block_on(node(id, place)),
-            Self::Idle(components) => runtime().block_on(idle::stay(components)),
+            Self::Echo(id, place) => run(echo(id, place)),
+            Self::Sink(id, place) => run(sink(id, place)),
+            Self::Node(id, place) => run(node(id, place)),
+            Self::Idle(components) => run(idle::stay(components)),
         }
     }
 }
@@ -89,6 +89,14 @@ pub(crate) fn runtime() -> tokio::runtime::Runtime {
         .enable_all()
         .build()
         .expect("a runtime")
+}
+
+/// Runs a component in a task of its own, as most are: what a runtime blocks on costs it one call
+/// into the kernel more for each turn.
+fn run(role: impl Future<Output = ()> + Send + 'static) {
+    let runtime = runtime();
+    let task = runtime.spawn(role);
+    runtime.block_on(task).expect("a role without surprises");
 }
 
 async fn echo(id: JausId, place: Place) {

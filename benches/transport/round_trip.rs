@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::Outgoing;
+use jaus::node::Port;
 use tokio::runtime::Runtime;
 use tokio::time::timeout;
 
@@ -20,7 +21,8 @@ const LENGTHS: [usize; 2] = [64, 1024];
 /// Something that goes to and fro.
 trait Pair {
     fn name(&self) -> &str;
-    fn round_trip(&mut self, message: &Bytes) -> Duration;
+    /// So many round trips, one after the other.
+    fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration>;
 }
 
 impl Pair for UdpEcho {
@@ -28,8 +30,8 @@ impl Pair for UdpEcho {
         "raw UDP echo"
     }
 
-    fn round_trip(&mut self, message: &Bytes) -> Duration {
-        Self::round_trip(self, message)
+    fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration> {
+        (0..count).map(|_| self.round_trip(message)).collect()
     }
 }
 
@@ -38,8 +40,8 @@ impl Pair for UnixEcho {
         "raw Unix socket echo"
     }
 
-    fn round_trip(&mut self, message: &Bytes) -> Duration {
-        Self::round_trip(self, message)
+    fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration> {
+        (0..count).map(|_| self.round_trip(message)).collect()
     }
 }
 
@@ -47,7 +49,7 @@ impl Pair for UnixEcho {
 struct Components {
     name: &'static str,
     runtime: Runtime,
-    ours: Component,
+    ours: Option<Component>,
     theirs: JausId,
     _others: Vec<Process>,
 }
@@ -62,7 +64,7 @@ impl Components {
         Self {
             name: setting.name(),
             runtime,
-            ours,
+            ours: Some(ours),
             theirs,
             _others: others,
         }
@@ -74,20 +76,33 @@ impl Pair for Components {
         self.name
     }
 
-    fn round_trip(&mut self, message: &Bytes) -> Duration {
-        let (port, theirs) = (&mut self.ours.port, self.theirs);
-        self.runtime.block_on(async {
-            loop {
-                let start = Instant::now();
-                port.send(Outgoing::new(port.id(), theirs, message.clone()))
-                    .expect("sent");
-                // The first may go astray while the two do not know each other.
-                if let Ok(answer) = timeout(Duration::from_secs(1), port.recv()).await {
-                    assert!(answer.is_some(), "the node has stopped");
-                    return start.elapsed();
-                }
+    fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration> {
+        let mut component = self.ours.take().expect("given back after each run");
+        let (theirs, message) = (self.theirs, message.clone());
+        // A task of its own, as a component is.
+        let run = self.runtime.spawn(async move {
+            let mut times = Vec::with_capacity(count);
+            while times.len() < count {
+                times.push(round_trip(&mut component.port, theirs, &message).await);
             }
-        })
+            (component, times)
+        });
+        let (component, times) = self.runtime.block_on(run).expect("a run");
+        self.ours = Some(component);
+        times
+    }
+}
+
+async fn round_trip(port: &mut Port, theirs: JausId, message: &Bytes) -> Duration {
+    loop {
+        let start = Instant::now();
+        port.send(Outgoing::new(port.id(), theirs, message.clone()))
+            .expect("sent");
+        // The first may go astray while the two do not know each other.
+        if let Ok(answer) = timeout(Duration::from_secs(1), port.recv()).await {
+            assert!(answer.is_some(), "the node has stopped");
+            return start.elapsed();
+        }
     }
 }
 
@@ -106,9 +121,8 @@ pub(crate) fn measure(effort: Effort) {
         for run in 0..=effort.runs {
             for (pair, (medians, tails)) in pairs.iter_mut().zip(medians.iter_mut().zip(&mut tails))
             {
-                let times: Vec<_> = (0..effort.round_trips)
-                    .map(|_| micros(pair.round_trip(&message)))
-                    .collect();
+                let times = pair.round_trips(&message, effort.round_trips);
+                let times: Vec<_> = times.into_iter().map(micros).collect();
                 // The first run only warms up.
                 if run > 0 {
                     medians.push(median(&times));
