@@ -52,7 +52,9 @@ use std::sync::Arc;
 use tokio::sync::broadcast;
 
 pub use self::attendance::{ComponentEvent, Departure};
-pub use self::config::{Config, ConfigError, InvalidListen, Listen, Peer, Tcp, units};
+pub use self::config::{
+    Config, ConfigError, Delivery, InvalidDelivery, InvalidListen, Listen, Peer, Tcp, units,
+};
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::host::{Host, HostEvent, HostEvents};
 pub use self::mailbox::{MailboxCounters, MailboxLimits};

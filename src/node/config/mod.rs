@@ -22,12 +22,14 @@
 //!
 //! Each section has a file of its own here.
 
+mod delivery;
 mod peer;
 #[cfg(feature = "serial")]
 mod serial;
 mod tcp;
 pub mod units;
 
+pub use self::delivery::{Delivery, InvalidDelivery};
 pub use self::peer::Peer;
 pub use self::tcp::{InvalidListen, Listen, Tcp};
 use super::mailbox::MailboxLimits;
@@ -100,6 +102,8 @@ pub struct Config {
     /// Serial lines.
     #[cfg(feature = "serial")]
     pub serial: Vec<SerialLine>,
+    /// Acknowledged messages, and how datagrams leave.
+    pub delivery: Delivery,
 }
 
 impl Default for Config {
@@ -134,6 +138,7 @@ impl Config {
             tcp: Tcp::default(),
             #[cfg(feature = "serial")]
             serial: Vec::new(),
+            delivery: Delivery::default(),
         }
     }
 
@@ -252,19 +257,20 @@ impl Config {
         if self.mailbox.messages == 0 {
             return Err(ConfigError::Mailbox);
         }
+        self.delivery.validate().map_err(ConfigError::Delivery)?;
         self.udp().validate().map_err(ConfigError::Group)
     }
 
     /// The endpoint's settings; its bounds leave room for two of the longest messages.
     pub(super) fn endpoint(&self, first_sequence: u16) -> endpoint::Config {
         let usual = endpoint::Config::default();
-        endpoint::Config {
+        self.delivery.apply(endpoint::Config {
             payload_limit: self.payload_limit,
             max_message: self.max_message,
             max_reassembly: usual.max_reassembly.max(2 * self.max_message),
             first_sequence,
             ..usual
-        }
+        })
     }
 
     /// Whether other links than UDP are wanted.
@@ -342,6 +348,9 @@ pub enum ConfigError {
     /// A mailbox without room.
     #[error("a mailbox must hold at least 1 message")]
     Mailbox,
+    /// A setting of the section `delivery`.
+    #[error(transparent)]
+    Delivery(InvalidDelivery),
     /// Not a multicast group.
     #[error(transparent)]
     Group(InvalidGroup),

@@ -1,0 +1,234 @@
+//! The `[delivery]` section: acknowledged messages, and how datagrams leave.
+
+#[cfg(feature = "serde")]
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+#[cfg(feature = "serde")]
+use super::units;
+use crate::address::JausId;
+use crate::endpoint::{self, LargeStyle, Pacing, Packing};
+
+const PATIENCES: RangeInclusive<Duration> = Duration::from_millis(100)..=Duration::from_secs(600);
+const WINDOWS: RangeInclusive<usize> = 2..=16_384;
+const BURSTS: RangeInclusive<usize> = 8192..=1 << 30;
+const LONGEST_PACKING: Duration = Duration::from_secs(1);
+
+/// How messages are delivered, beyond the network's best effort.
+///
+/// ```toml
+/// [delivery]
+/// patience = "3s"          # until a message that is not acknowledged is given up
+/// window = 512             # packets on their way to one destination, at most
+/// waiting = "64MiB"        # of messages that wait for acknowledgements
+/// packing = "off"          # or for how long small messages wait for company: "2ms"
+/// pace_burst = "192kB"     # of a receive buffer that a large message may fill at once
+/// pace_rate = "200MB"      # of it that is emptied each second; 0: no pacing
+/// repeat_code_to = ["7.255.255"]   # JAUS++ nodes, whose large messages are cut otherwise
+/// ```
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
+pub struct Delivery {
+    /// How long a destination may be silent before a message that waits for its acknowledgement is
+    /// given up; 0.1 s to 10 minutes.
+    #[cfg_attr(
+        feature = "serde",
+        serde(
+            deserialize_with = "units::read_duration",
+            serialize_with = "units::write_duration"
+        )
+    )]
+    pub patience: Duration,
+    /// The most packets on their way to one destination, 2 to 16384.
+    pub window: usize,
+    /// The most octets of messages that wait for acknowledgements.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
+    pub waiting: usize,
+    /// Whether small messages share datagrams; they wait for company up to 1 s.
+    #[cfg_attr(
+        feature = "serde",
+        serde(deserialize_with = "read_packing", serialize_with = "write_packing")
+    )]
+    pub packing: Packing,
+    /// Octets of a receive buffer that the fragments of an unacknowledged large message may fill at
+    /// once; at least 8192. See [`Pacing`].
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
+    pub pace_burst: usize,
+    /// Octets of a receive buffer that are taken to be emptied each second; 0 turns pacing off.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
+    pub pace_rate: usize,
+    /// Peers that repeat the message code in each fragment of a large message, by id, which may
+    /// hold wildcards. That a peer does is also learned when it sends one.
+    pub repeat_code_to: Vec<JausId>,
+}
+
+impl Default for Delivery {
+    fn default() -> Self {
+        let (usual, pacing) = (endpoint::Config::default(), Pacing::default());
+        Self {
+            patience: usual.acknowledge_patience,
+            window: usual.max_window,
+            waiting: usual.max_unacknowledged_octets,
+            packing: usual.packing,
+            pace_burst: pacing.burst,
+            pace_rate: pacing.rate as usize,
+            repeat_code_to: Vec::new(),
+        }
+    }
+}
+
+impl Delivery {
+    /// Whether a node can be started with this.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range, and the range.
+    pub(super) fn validate(&self) -> Result<(), InvalidDelivery> {
+        if !PATIENCES.contains(&self.patience) {
+            return Err(InvalidDelivery::Patience(self.patience));
+        }
+        if !WINDOWS.contains(&self.window) {
+            return Err(InvalidDelivery::Window(self.window));
+        }
+        if matches!(self.packing, Packing::Within(time) if time > LONGEST_PACKING) {
+            return Err(InvalidDelivery::Packing);
+        }
+        if self.pace_rate > 0 && !BURSTS.contains(&self.pace_burst) {
+            return Err(InvalidDelivery::Burst(self.pace_burst));
+        }
+        Ok(())
+    }
+
+    /// Puts the settings to the others of the endpoint.
+    pub(super) fn apply(&self, to: endpoint::Config) -> endpoint::Config {
+        let repeat = |&id: &JausId| (id, LargeStyle::RepeatedCode);
+        endpoint::Config {
+            acknowledge_patience: self.patience,
+            retransmission_window: self.patience + Duration::from_millis(500),
+            max_window: self.window,
+            max_unacknowledged_octets: self.waiting,
+            packing: self.packing,
+            pacing: (self.pace_rate > 0).then_some(Pacing {
+                burst: self.pace_burst,
+                rate: self.pace_rate as u64,
+            }),
+            large_styles: self.repeat_code_to.iter().map(repeat).collect(),
+            ..to
+        }
+    }
+}
+
+/// A setting of the section that no node can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum InvalidDelivery {
+    /// Too little for a round trip, or more than anybody waits.
+    #[error("delivery.patience {0:?} cannot be: choose from 0.1s to 10min")]
+    Patience(Duration),
+    /// A window without room, or with more than there are numbers for.
+    #[error("delivery.window {0} cannot be: choose from 2 to 16384 packets")]
+    Window(usize),
+    /// Messages would be stale.
+    #[error("delivery.packing cannot be so long: choose \"off\" or a time up to 1s")]
+    Packing,
+    /// Less than a packet occupies.
+    #[error(
+        "delivery.pace_burst {0} cannot be: choose from 8192 octets to 1GiB, or turn pacing off \
+         with pace_rate = 0"
+    )]
+    Burst(usize),
+}
+
+#[cfg(feature = "serde")]
+fn read_packing<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Packing, D::Error> {
+    struct Visitor;
+    impl serde::de::Visitor<'_> for Visitor {
+        type Value = Packing;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("\"off\" or a time such as \"2ms\"")
+        }
+
+        fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Packing, E> {
+            match text {
+                "off" => Ok(Packing::Off),
+                time => units::duration(time)
+                    .map(Packing::Within)
+                    .map_err(E::custom),
+            }
+        }
+    }
+    deserializer.deserialize_str(Visitor)
+}
+
+#[cfg(feature = "serde")]
+fn write_packing<S: serde::Serializer>(
+    packing: &Packing,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    match packing {
+        Packing::Off => serializer.serialize_str("off"),
+        Packing::Within(time) => units::write_duration(time, serializer),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_out_of_range_is_refused_with_the_range() {
+        let refused = |delivery: Delivery| delivery.validate().unwrap_err().to_string();
+        let usual = Delivery::default;
+        assert_eq!(usual().validate(), Ok(()));
+        assert_eq!(
+            refused(Delivery {
+                patience: Duration::from_millis(5),
+                ..usual()
+            }),
+            "delivery.patience 5ms cannot be: choose from 0.1s to 10min"
+        );
+        assert_eq!(
+            refused(Delivery {
+                window: 1,
+                ..usual()
+            }),
+            "delivery.window 1 cannot be: choose from 2 to 16384 packets"
+        );
+        let short = Delivery {
+            pace_burst: 100,
+            ..usual()
+        };
+        assert!(refused(short.clone()).starts_with("delivery.pace_burst 100 cannot be"));
+        let unpaced = Delivery {
+            pace_rate: 0,
+            ..short
+        };
+        assert_eq!(unpaced.validate(), Ok(()));
+        assert_eq!(unpaced.apply(endpoint::Config::default()).pacing, None);
+    }
+
+    #[cfg(feature = "cli")]
+    #[test]
+    fn a_file_says_times_and_sizes_with_their_units() {
+        let read = |text: &str| toml::from_str::<Delivery>(text).map_err(|error| error.to_string());
+        let text = "patience = \"1.5s\"\npacking = \"2ms\"\npace_rate = \"1MB\"\nwaiting = \"1MiB\"\n\
+                    repeat_code_to = [\"7.255.255\"]";
+        let endpoint = read(text).unwrap().apply(endpoint::Config::default());
+        assert_eq!(endpoint.acknowledge_patience, Duration::from_millis(1500));
+        assert_eq!(endpoint.packing, Packing::Within(Duration::from_millis(2)));
+        assert_eq!(endpoint.pacing.unwrap().rate, 1_000_000);
+        assert_eq!(endpoint.max_unacknowledged_octets, 1 << 20);
+        assert_eq!(endpoint.large_styles[0].0, JausId::new(7, 255, 255));
+        assert_eq!(read("packing = \"off\"").unwrap(), Delivery::default());
+        assert!(
+            read("packing = 5")
+                .unwrap_err()
+                .contains("\"off\" or a time")
+        );
+        assert!(read("patience = 3").unwrap_err().contains("time"));
+        assert!(read("windwo = 3").unwrap_err().contains("windwo"));
+    }
+}
