@@ -188,12 +188,14 @@ impl Endpoint {
         if self.links.is_empty() && scope == Broadcast::None {
             return Err(SendError::NoLink(destination));
         }
-        self.check_length(message)?;
+        let route = self.route(destination);
+        let version = route.map_or(Version::As5669a, |(_, version)| version);
+        let repeat_code = self.repeats_code(destination, version);
         let length = message.payload.len();
-        let repeat_code = self.repeats_code(message.destination);
+        self.check_length(length, repeat_code)?;
         let cut = Cut::new(length, self.config.payload_limit, repeat_code);
         // What is large goes to everybody only until the address is known.
-        let seeks = scope == Broadcast::None && self.route(message.destination).is_none();
+        let seeks = scope == Broadcast::None && route.is_none();
         if message.acknowledge || cut.count() > 1 && seeks {
             return self.deliver_reliably(now, handle, message, scope);
         }
@@ -267,15 +269,12 @@ impl Endpoint {
     }
 
     /// Whether what is sent to `destination` names the message code in each fragment.
-    pub(super) fn repeats_code(&self, destination: JausId) -> bool {
-        let route = self.route(destination);
-        let older_header = route.is_some_and(|(_, version)| version != Version::As5669a);
-        older_header || self.large_styles.of(destination) == Some(LargeStyle::RepeatedCode)
+    pub(super) fn repeats_code(&self, destination: JausId, version: Version) -> bool {
+        version != Version::As5669a
+            || self.large_styles.of(destination) == Some(LargeStyle::RepeatedCode)
     }
 
-    fn check_length(&self, message: &Outgoing) -> Result<(), SendError> {
-        let length = message.payload.len();
-        let repeat_code = self.repeats_code(message.destination);
+    fn check_length(&self, length: usize, repeat_code: bool) -> Result<(), SendError> {
         let longest = Cut::longest(self.config.payload_limit, repeat_code);
         let limit = self.config.max_message.min(longest);
         if length > limit {
@@ -315,6 +314,21 @@ impl Endpoint {
         ways.iter()
             .map(|way| Ok(self.transmit_of(way, &frame)?))
             .collect()
+    }
+
+    /// The datagram that carries a frame, with its own header, along a path.
+    pub(super) fn transmit_along(
+        &self,
+        path: Path,
+        frame: &Frame,
+    ) -> Result<Transmit, EncodeError> {
+        Ok(Transmit {
+            link: path.link,
+            to: To::Peer(path.peer),
+            priority: frame.flags.priority(),
+            payload: self.framing(path.link).encode(frame)?,
+            segment: None,
+        })
     }
 
     fn transmit_of(&self, way: &Way, frame: &Frame) -> Result<Transmit, EncodeError> {

@@ -233,14 +233,14 @@ impl Flow {
     }
 
     /// The next packet to send, of that priority or, if that must wait for numbers, of a lower one;
-    /// without its destination. The message's cut and header version are asked for when its first
-    /// packet is due.
+    /// without its destination. How a message of that length is cut, and for which header, is asked
+    /// when its first packet is due.
     pub(super) fn take(
         &mut self,
         now: Instant,
         priority: Priority,
         numbers: &mut Numbers,
-        mut begin: impl FnMut(&Parcel) -> (Cut, Version),
+        mut begin: impl FnMut(usize) -> (Cut, Version),
     ) -> Option<(Frame, u32)> {
         (0..=usize::from(priority.bits())).rev().find_map(|level| {
             self.repeat(now, level)
@@ -272,7 +272,7 @@ impl Flow {
         now: Instant,
         level: usize,
         numbers: &mut Numbers,
-        begin: &mut impl FnMut(&Parcel) -> (Cut, Version),
+        begin: &mut impl FnMut(usize) -> (Cut, Version),
     ) -> Option<(Frame, u32)> {
         loop {
             let message = *self.waiting[level].front()?;
@@ -311,13 +311,13 @@ impl Flow {
         &mut self,
         message: u64,
         numbers: &mut Numbers,
-        begin: &mut impl FnMut(&Parcel) -> (Cut, Version),
+        begin: &mut impl FnMut(usize) -> (Cut, Version),
     ) -> Option<()> {
         let parcel = self.parcels.get(&message)?;
         if parcel.started.is_some() {
             return Some(());
         }
-        let (cut, version) = begin(parcel);
+        let (cut, version) = begin(parcel.payload.len());
         let count = cut.count();
         let end = numbers.peek(count as u64) + count as u64;
         if end - self.floor >= ROUND {

@@ -28,7 +28,7 @@ use super::{
     Config, Counter, Endpoint, Event, MessageHandle, Outgoing, SendError, Transmit, Unacknowledged,
 };
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, Frame, Priority, Version};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Priority, Version};
 use flow::{Flow, Parcel, Progress};
 
 /// So many packets of a flow go one after the other, which lets links send them with one call.
@@ -269,15 +269,11 @@ impl Endpoint {
     pub(super) fn next_delivery(&mut self, priority: Priority) -> Option<Transmit> {
         let now = self.latest?;
         while let Some(destination) = self.deliveries.next_ready(priority) {
-            let transmits = self.next_packet(now, destination, priority);
+            let transmit = self.next_packet(now, destination, priority);
             self.deliveries.take_turn(destination);
             self.deliveries.touch(destination);
-            let mut transmits = transmits.into_iter();
-            if let Some(first) = transmits.next() {
-                transmits.for_each(|other| {
-                    self.transmit(other);
-                });
-                return Some(first);
+            if transmit.is_some() {
+                return transmit;
             }
         }
         None
@@ -288,33 +284,49 @@ impl Endpoint {
         now: Instant,
         destination: JausId,
         priority: Priority,
-    ) -> Vec<Transmit> {
+    ) -> Option<Transmit> {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
-        let (limit, repeat) = (self.config.payload_limit, self.repeats_code(destination));
-        let Some(flow) = self.deliveries.flows.get_mut(&destination) else {
-            return Vec::new();
-        };
+        let repeat = self.repeats_code(destination, version);
+        let limit = self.config.payload_limit;
+        let flow = self.deliveries.flows.get_mut(&destination)?;
         flow.known = route.is_some();
-        let cut = |parcel: &Parcel| (Cut::new(parcel.payload.len(), limit, repeat), version);
-        let Some((frame, tries)) = flow.take(now, priority, &mut self.numbers, cut) else {
-            return Vec::new();
-        };
+        let begin = |length| (Cut::new(length, limit, repeat), version);
+        let (mut frame, tries) = flow.take(now, priority, &mut self.numbers, begin)?;
+        frame.destination = destination;
         if tries > 1 {
             self.counters.add(Counter::Retransmissions);
             self.peers.note_retransmission(destination);
         }
-        let frame = Frame {
-            destination,
-            ..frame
-        };
-        match self.transmits_of(&frame) {
-            Ok(transmits) => self.remember_echo(now, &frame, transmits),
-            Err(error) => {
-                debug!(%destination, %error, "cannot be sent");
-                Vec::new()
-            }
+        if frame.flags.data() == DataControl::Single {
+            frame.version = version;
         }
+        let sent = match route {
+            Some((path, _)) if frame.flags.broadcast() == Some(Broadcast::None) => self
+                .transmit_along(path, &frame)
+                .map(Some)
+                .map_err(SendError::Header),
+            _ => self.transmit_to_all(now, &frame),
+        };
+        sent.unwrap_or_else(|error| {
+            debug!(%destination, %error, "cannot be sent");
+            None
+        })
+    }
+
+    /// Sends a packet by all ways that there are to its destination; gives back the first.
+    fn transmit_to_all(
+        &mut self,
+        now: Instant,
+        frame: &Frame,
+    ) -> Result<Option<Transmit>, SendError> {
+        let transmits = self.transmits_of(frame)?;
+        let mut transmits = self.remember_echo(now, frame, transmits).into_iter();
+        let first = transmits.next();
+        for other in transmits {
+            self.transmit(other);
+        }
+        Ok(first)
     }
 
     /// Takes the answer to a message of ours.
