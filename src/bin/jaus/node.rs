@@ -129,6 +129,20 @@ fn introduce(node: &Node, component: &Component, output: &mut Output) -> Result<
             link.interface.name, link.local
         ))?;
     }
+    if let Some(tcp) = node.tcp() {
+        let listening = tcp.listening.map_or_else(
+            || "connecting only".to_owned(),
+            |address| format!("listening on {address}"),
+        );
+        output.line(format_args!("TCP connections: {listening}"))?;
+    }
+    for line in node.serial_lines() {
+        let settings = line.settings;
+        output.line(format_args!(
+            "on {}: serial line, {} baud",
+            settings.device, settings.baud
+        ))?;
+    }
     if let Some(place) = node.local_place() {
         output.line(format_args!(
             "components of this host may attach at {place}"
