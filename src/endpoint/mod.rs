@@ -94,6 +94,8 @@ pub struct Endpoint {
     gate: Gate,
     /// Octets of acknowledgements that a stranger may have for what is being received.
     credit: usize,
+    /// Octets of memory that a payload of what is being received holds on to.
+    held_by_payload: usize,
     /// For what is passed on to many.
     broadcasts: Bucket,
     heard: Recent,
@@ -132,6 +134,7 @@ impl Endpoint {
             numbers: Numbers::after(config.first_sequence),
             gate: Gate::new(&config.rates, config.max_peers),
             credit: 0,
+            held_by_payload: 0,
             broadcasts: Bucket::default(),
             heard: Recent::new(config.max_recent, longest, keys.clone()),
             sent_to_group: Recent::new(config.max_recent, config.echo_window, keys),

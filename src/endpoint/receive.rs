@@ -41,6 +41,7 @@ impl Endpoint {
             return self.counters.add(reason);
         }
         self.credit = data.len() + DATAGRAM_OVERHEAD;
+        self.held_by_payload = data.len();
         let mut frames = match judp::frames(data) {
             Ok(frames) => frames,
             Err(error) => {
@@ -74,6 +75,7 @@ impl Endpoint {
         }
         // Whoever is at the other end has shown that it is there.
         self.credit = usize::MAX;
+        self.held_by_payload = usize::MAX;
         self.receive(now, from, frame);
     }
 
@@ -158,9 +160,13 @@ impl Endpoint {
             DataControl::Single => frame.payload.clone(),
             _ => {
                 let style = self.large_styles.of(frame.source);
-                let whole = self
-                    .reassembly
-                    .insert(now, frame, style, &mut self.counters)?;
+                let whole = self.reassembly.insert(
+                    now,
+                    frame,
+                    self.held_by_payload,
+                    style,
+                    &mut self.counters,
+                )?;
                 let Some(whole) = whole else { return Ok(()) };
                 self.large_styles.learn(frame.source, whole.style);
                 whole.payload

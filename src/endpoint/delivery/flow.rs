@@ -9,15 +9,14 @@
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
-use bytes::Bytes;
-
+use super::parcel::{Parcel, Started};
 use super::round_trip::RoundTrip;
 use super::window::Window;
 use super::{FlowStatus, Undelivered};
 use crate::address::JausId;
 use crate::endpoint::large::{Cut, Numbers};
-use crate::endpoint::{Config, Outgoing, Unacknowledged};
-use crate::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version};
+use crate::endpoint::{Config, Unacknowledged};
+use crate::wire::{Frame, Priority, Version};
 
 /// So many packets may be on their way to somebody whose address is unknown: they go to everybody.
 const SEEKING: usize = 1;
@@ -35,66 +34,6 @@ const STALE: Duration = Duration::from_secs(1);
 const SILENT_PART: u32 = 6;
 /// Numbers go round after so many.
 const ROUND: u64 = 1 << 16;
-
-/// A message on its way.
-#[derive(Debug)]
-pub(super) struct Parcel {
-    pub(super) source: JausId,
-    pub(super) priority: Priority,
-    pub(super) broadcast: Broadcast,
-    pub(super) payload: Bytes,
-    /// Whether the sender wants to be told the result.
-    pub(super) awaited: bool,
-    /// When it was handed in.
-    pub(super) accepted: Instant,
-    /// How it was cut, once the first of it was sent.
-    started: Option<Started>,
-    /// Octets that were acknowledged.
-    acknowledged: usize,
-}
-
-#[derive(Debug)]
-struct Started {
-    cut: Cut,
-    version: Version,
-    /// The serial number of the first fragment.
-    first: u64,
-    /// The first fragment that was never sent.
-    next: usize,
-    /// How many fragments were not acknowledged yet.
-    missing: usize,
-}
-
-impl Parcel {
-    pub(super) fn new(accepted: Instant, message: &Outgoing, scope: Broadcast) -> Self {
-        Self {
-            source: message.source,
-            priority: message.priority,
-            broadcast: scope,
-            payload: message.payload.clone(),
-            awaited: message.acknowledge,
-            accepted,
-            started: None,
-            acknowledged: 0,
-        }
-    }
-
-    /// The frame that carries a fragment; without its destination.
-    fn frame(&self, index: usize) -> Option<Frame> {
-        let started = self.started.as_ref()?;
-        let (data, payload) = started.cut.fragment(&self.payload, index);
-        let flags = Flags::new(self.priority)
-            .with_broadcast(self.broadcast)
-            .with_acknowledgement(Acknowledgement::Request)
-            .with_data(data);
-        Some(Frame {
-            version: started.version,
-            flags,
-            sequence: (started.first + index as u64) as u16,
-            ..Frame::new(self.source, self.source, payload)
-        })
-    }
-}
 
 /// A fragment, or a message that is not cut, that was sent and not acknowledged.
 #[derive(Debug)]

@@ -15,6 +15,7 @@
 //! datagrams a millisecond from a buffer of 70000 octets, which the window finds out by loss.
 
 mod flow;
+mod parcel;
 mod round_trip;
 mod window;
 
@@ -29,7 +30,8 @@ use super::{
 };
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Priority, Version};
-use flow::{Flow, Parcel, Progress};
+use flow::{Flow, Progress};
+use parcel::Parcel;
 
 /// So many packets of a flow go one after the other, which lets links send them with one call.
 const TURN: usize = 32;

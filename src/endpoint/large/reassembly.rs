@@ -27,13 +27,23 @@ const MAX_RUNS: usize = 1024;
 /// What has not grown while the sender took so many numbers is stale.
 const STALE: u64 = 1 << 14;
 
-/// What a fragment adds to its message. The older headers name the code with each fragment.
-fn part_of_message(frame: &Frame) -> Bytes {
-    match (frame.version, frame.flags.data()) {
+/// A piece is copied if it holds on to more than so many times its length, so that it cannot keep
+/// a large datagram alive which was mostly about something else.
+const MOST_HELD: usize = 4;
+
+/// What a fragment adds to its message. The older headers name the code with each fragment. The
+/// payload holds on to `held` octets.
+fn part_of_message(frame: &Frame, held: usize) -> Bytes {
+    let payload = match (frame.version, frame.flags.data()) {
         (Version::As5669a, _) | (_, DataControl::First) => frame.payload.clone(),
         (Version::As5669 | Version::Ra, _) => {
             frame.payload.slice(ra::CODE_LEN.min(frame.payload.len())..)
         }
+    };
+    if held > payload.len().saturating_mul(MOST_HELD) {
+        Bytes::copy_from_slice(&payload)
+    } else {
+        payload
     }
 }
 
@@ -215,11 +225,13 @@ impl Reassembly {
     }
 
     /// Takes a fragment of a sender that is known to cut in some style, and gives the message if it
-    /// is whole now. What a bound makes it forget is counted.
+    /// is whole now. Its payload holds on to `held` octets of memory. What a bound makes it forget
+    /// is counted.
     pub(in crate::endpoint) fn insert(
         &mut self,
         now: Instant,
         frame: &Frame,
+        held: usize,
         style: Option<LargeStyle>,
         counters: &mut Counters,
     ) -> Result<Option<Whole>, Counter> {
@@ -229,7 +241,7 @@ impl Reassembly {
             Sender::new(now, frame.sequence)
         });
         let before = sender.cost;
-        let inserted = sender.take_in(now, frame, self.max_message, counters);
+        let inserted = sender.take_in(now, frame, held, self.max_message, counters);
         let (cost, runs) = (sender.cost, sender.runs.len());
         self.cost = self.cost + cost - before;
         match inserted {
@@ -340,6 +352,7 @@ impl Sender {
         &mut self,
         now: Instant,
         frame: &Frame,
+        held: usize,
         max_message: usize,
         counters: &mut Counters,
     ) -> Result<Option<Run>, Counter> {
@@ -357,7 +370,7 @@ impl Sender {
             self.take(place);
             counters.add(Counter::FragmentsForgotten);
         }
-        let piece = part_of_message(frame);
+        let piece = part_of_message(frame, held);
         let run = Run {
             kind: Kind {
                 version: frame.version,
@@ -384,5 +397,28 @@ impl Sender {
         } else {
             None
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_piece_does_not_keep_a_large_datagram_alive() {
+        let datagram = Bytes::from(vec![7; 60_000]);
+        let frame = |length| {
+            let (source, destination) = (JausId::new(1, 1, 1), JausId::new(2, 1, 1));
+            Frame::new(source, destination, datagram.slice(..length))
+        };
+        let is_shared = |length: usize, held| {
+            let piece = part_of_message(&frame(length), held);
+            assert_eq!(piece.len(), length);
+            datagram.as_ptr_range().contains(&piece.as_ptr())
+        };
+        assert!(!is_shared(100, datagram.len()));
+        assert!(is_shared(15_000, datagram.len()));
+        assert!(is_shared(1425, 1440));
+        assert!(!is_shared(1425, usize::MAX), "of a stream nothing is known");
     }
 }
