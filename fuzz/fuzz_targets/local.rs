@@ -4,7 +4,7 @@
 //! The first octet chooses the side, the second the length of the pieces; the rest is the stream.
 #![no_main]
 
-use bytes::{BufMut, Bytes};
+use bytes::Bytes;
 use jaus::link::local::record::{RecordError, Reply, Request};
 use jaus::link::local::{Assembler, Body};
 use libfuzzer_sys::fuzz_target;
@@ -44,10 +44,10 @@ fn read(stream: &[u8], piece: usize, mut each: impl FnMut(&Body<'_>) -> Result<(
     for mut octets in stream.chunks(piece) {
         while !octets.is_empty() {
             let taken = match assembler.room() {
-                Some(mut room) => {
-                    assert!(room.get_ref().capacity() <= KEPT + 2 * stream.len());
-                    let now = octets.len().min(room.chunk_mut().len());
-                    room.put_slice(&octets[..now]);
+                Some((buffer, room)) => {
+                    assert!(buffer.capacity() <= KEPT + 2 * stream.len());
+                    let now = octets.len().min(room);
+                    buffer.extend_from_slice(&octets[..now]);
                     let result = assembler.filled().map_or(Ok(()), |body| each(&body));
                     result.map(|()| now)
                 }

@@ -88,7 +88,9 @@ async fn a_sender_learns_whether_its_message_has_arrived() {
 #[tokio::test]
 async fn what_cannot_be_sent_is_told_at_once_or_by_the_node() {
     let place = Place::new();
-    let _node = place.node();
+    let mut config = place.config();
+    config.max_message = 500_000;
+    let _node = jaus::node::Node::start(config).unwrap();
     let port = place.host().attach(33).await.unwrap();
     let mut events = port.host_events();
     let to = JausId::new(101, 1, 1);
@@ -96,7 +98,7 @@ async fn what_cannot_be_sent_is_told_at_once_or_by_the_node() {
     let short = Outgoing::new(port.id(), to, Bytes::from_static(&[1]));
     assert!(matches!(port.send(short), Err(SendError::Endpoint(_))));
     let long = port.send(message(&port, to, vec![0; 1 << 20])).unwrap_err();
-    assert!(long.to_string().contains("524288"), "{long}");
+    assert!(long.to_string().contains("500000"), "{long}");
     let forged = Outgoing {
         source: to,
         ..message(&port, to, b"x")

@@ -5,8 +5,7 @@
 //! of which its payload then is a slice, so that a large message is copied by the kernel alone.
 //! Such a buffer grows with what arrives, whatever the record's head announces.
 
-use bytes::buf::Limit;
-use bytes::{BufMut, Bytes, BytesMut};
+use bytes::Bytes;
 
 use super::record::{LENGTH, RecordError};
 
@@ -57,7 +56,7 @@ pub struct Assembler {
 #[derive(Debug)]
 struct Large {
     length: usize,
-    octets: BytesMut,
+    octets: Vec<u8>,
 }
 
 impl Assembler {
@@ -83,23 +82,24 @@ impl Assembler {
         &self.begun
     }
 
-    /// Where the next octets are best read to, if a large record has begun: so many and not more.
-    /// Then call [`filled`](Self::filled).
-    pub fn room(&mut self) -> Option<Limit<&mut BytesMut>> {
+    /// A buffer to which the next octets are best appended, if a large record has begun: so many
+    /// and not more. Then call [`filled`](Self::filled).
+    pub fn room(&mut self) -> Option<(&mut Vec<u8>, usize)> {
         let large = self.large.as_mut()?;
         let missing = large.length - large.octets.len();
-        let growth = large.octets.len().max(GROWTH);
+        let growth = missing.min(large.octets.len().max(GROWTH));
         if large.octets.capacity() == large.octets.len() {
-            large.octets.reserve(missing.min(growth));
+            large.octets.reserve_exact(growth);
         }
-        Some((&mut large.octets).limit(missing))
+        let room = large.octets.capacity() - large.octets.len();
+        Some((&mut large.octets, missing.min(room)))
     }
 
-    /// The large record, if [`room`](Self::room) is full now.
+    /// The large record, if all of it has come.
     pub fn filled(&mut self) -> Option<Body<'static>> {
         let whole = |large: &mut Large| large.octets.len() == large.length;
         let large = self.large.take_if(whole)?;
-        Some(Body::Large(large.octets.freeze()))
+        Some(Body::Large(large.octets.into()))
     }
 
     /// Takes octets in, and gives each whole record to `each`. What is left of a record that has
@@ -112,13 +112,15 @@ impl Assembler {
         mut octets: &[u8],
         mut each: impl FnMut(Body<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
-        if let Some(mut room) = self.room() {
-            let now = octets.len().min(room.remaining_mut());
-            room.put_slice(&octets[..now]);
+        while let Some((buffer, room)) = self.room() {
+            let now = octets.len().min(room);
+            buffer.extend_from_slice(&octets[..now]);
             octets = &octets[now..];
-        }
-        if let Some(body) = self.filled() {
-            each(body)?;
+            match self.filled() {
+                Some(body) => each(body)?,
+                None if octets.is_empty() => return Ok(()),
+                None => {}
+            }
         }
         while let Some((head, rest)) = octets.split_first_chunk::<LENGTH>() {
             let length = u32::from_le_bytes(*head) as usize;
@@ -144,7 +146,7 @@ impl Assembler {
     }
 
     fn begin_large(&mut self, length: usize, beginning: &[u8]) {
-        let mut octets = BytesMut::with_capacity(length.min(GROWTH.max(2 * beginning.len())));
+        let mut octets = Vec::with_capacity(length.min(GROWTH.max(2 * beginning.len())));
         octets.extend_from_slice(beginning);
         self.begun.clear();
         self.large = Some(Large { length, octets });

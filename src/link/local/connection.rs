@@ -1,18 +1,20 @@
 //! The reading side of a connection: octets in, whole records out.
 
-use std::mem::MaybeUninit;
-use std::pin::{Pin, pin};
+use std::cell::RefCell;
 use std::task::{Context, Poll, ready};
-
-use tokio::io::{AsyncRead, AsyncReadExt, ReadBuf};
 
 use super::record::RecordError;
 use super::stream::ReadHalf;
 use super::{Assembler, Body, Error};
 
-/// Octets read at once, unless a large record is on its way. They stand on the stack, so that a
-/// connection on which nothing happens has no buffer at all.
+/// Octets read at once, unless a large record is on its way.
 const CHUNK: usize = 16 << 10;
+
+thread_local! {
+    /// What is read into. All connections of a thread share it, so that one on which nothing
+    /// happens has no buffer at all.
+    static SHARED: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+}
 
 /// What is read from the other side.
 #[derive(Debug)]
@@ -41,9 +43,8 @@ impl Connection {
         cx: &mut Context<'_>,
         mut each: impl FnMut(Body<'_>) -> Result<(), RecordError>,
     ) -> Poll<Result<(), Error>> {
-        let failed = |source| Error::io("reading from the local link")(source);
-        if let Some(mut room) = self.assembler.room() {
-            let read = ready!(pin!(self.stream.read_buf(&mut room)).poll(cx));
+        if let Some((buffer, missing)) = self.assembler.room() {
+            let read = ready!(self.stream.poll_append(cx, buffer, missing));
             if read.map_err(failed)? == 0 {
                 return Poll::Ready(Err(Error::Closed));
             }
@@ -52,19 +53,31 @@ impl Connection {
             }
             return Poll::Ready(Ok(()));
         }
-        let mut chunk = [const { MaybeUninit::uninit() }; CHUNK];
-        let mut chunk = ReadBuf::uninit(&mut chunk);
-        let begun = self.assembler.begun();
-        chunk.put_slice(begun);
-        let before = begun.len();
-        ready!(Pin::new(&mut self.stream).poll_read(cx, &mut chunk)).map_err(failed)?;
-        if chunk.filled().len() == before {
+        let mut chunk = SHARED.take();
+        chunk.resize(CHUNK, 0);
+        let result = self.poll_chunk(cx, &mut chunk, each);
+        SHARED.set(chunk);
+        result
+    }
+
+    fn poll_chunk(
+        &mut self,
+        cx: &mut Context<'_>,
+        chunk: &mut [u8],
+        each: impl FnMut(Body<'_>) -> Result<(), RecordError>,
+    ) -> Poll<Result<(), Error>> {
+        let begun = self.assembler.begun().len();
+        let (before, room) = chunk.split_at_mut(begun);
+        let read = ready!(self.stream.poll_read(cx, room)).map_err(failed)?;
+        if read == 0 {
             return Poll::Ready(Err(Error::Closed));
         }
-        Poll::Ready(
-            self.assembler
-                .take(chunk.filled(), each)
-                .map_err(Error::Record),
-        )
+        before.copy_from_slice(self.assembler.begun());
+        let taken = self.assembler.take(&chunk[..begun + read], each);
+        Poll::Ready(taken.map_err(Error::Record))
     }
+}
+
+fn failed(source: std::io::Error) -> Error {
+    Error::io("reading from the local link")(source)
 }

@@ -26,6 +26,8 @@ pub mod record;
 mod stream;
 #[cfg(unix)]
 mod unix_door;
+#[cfg(unix)]
+mod unix_stream;
 
 pub use address::{Address, InvalidAddress, Local};
 pub use assembler::{Assembler, Body};

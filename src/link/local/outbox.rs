@@ -102,6 +102,7 @@ impl Outbox {
                 Err(error) => return Poll::Ready(Err(error)),
             }
         }
+        stream.rest();
         Poll::Ready(Ok(()))
     }
 

@@ -2,14 +2,17 @@
 
 use std::fmt;
 use std::io::{self, IoSlice};
-use std::pin::Pin;
-use std::task::{Context, Poll};
+use std::pin::{Pin, pin};
+use std::task::{Context, Poll, ready};
 
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use bytes::BufMut;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, ReadBuf};
 use tokio::net::{TcpStream, tcp};
 #[cfg(unix)]
-use tokio::net::{UnixStream, unix};
+use tokio::net::{UnixStream, unix::UCred};
 
+#[cfg(unix)]
+use super::unix_stream::{UnixReadHalf, UnixWriteHalf, halves};
 use super::{Address, Error};
 
 /// The process at the other end.
@@ -37,37 +40,57 @@ impl fmt::Display for Process {
 #[derive(Debug)]
 pub(crate) enum ReadHalf {
     #[cfg(unix)]
-    Unix(unix::OwnedReadHalf),
+    Unix(UnixReadHalf),
     Tcp(tcp::OwnedReadHalf),
 }
 
-/// The half of a stream that is written.
+/// The half of a stream that is written. When it is dropped the other side sees the end.
 #[derive(Debug)]
 pub(crate) enum WriteHalf {
     #[cfg(unix)]
-    Unix(unix::OwnedWriteHalf),
+    Unix(UnixWriteHalf),
     Tcp(tcp::OwnedWriteHalf),
 }
 
-impl AsyncRead for ReadHalf {
-    fn poll_read(
-        self: Pin<&mut Self>,
+impl ReadHalf {
+    /// Reads once; 0 octets mean the end.
+    pub(super) fn poll_read(
+        &mut self,
         cx: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<io::Result<()>> {
-        match self.get_mut() {
+        buffer: &mut [u8],
+    ) -> Poll<io::Result<usize>> {
+        match self {
             #[cfg(unix)]
-            Self::Unix(stream) => Pin::new(stream).poll_read(cx, buffer),
-            Self::Tcp(stream) => Pin::new(stream).poll_read(cx, buffer),
+            Self::Unix(stream) => stream.poll_read(cx, buffer),
+            Self::Tcp(stream) => {
+                let mut buffer = ReadBuf::new(buffer);
+                ready!(Pin::new(stream).poll_read(cx, &mut buffer))?;
+                Poll::Ready(Ok(buffer.filled().len()))
+            }
+        }
+    }
+
+    /// Appends up to `most` octets to a buffer, which should have room for them; 0 mean the end.
+    pub(super) fn poll_append(
+        &mut self,
+        cx: &mut Context<'_>,
+        buffer: &mut Vec<u8>,
+        most: usize,
+    ) -> Poll<io::Result<usize>> {
+        match self {
+            #[cfg(unix)]
+            Self::Unix(stream) => stream.poll_append(cx, buffer, most),
+            Self::Tcp(stream) => pin!(stream.read_buf(&mut buffer.limit(most))).poll(cx),
         }
     }
 }
 
 impl WriteHalf {
+    /// Writes as much as can be written without waiting.
     pub(super) fn try_write(&self, pieces: &[IoSlice<'_>]) -> io::Result<usize> {
         match self {
             #[cfg(unix)]
-            Self::Unix(stream) => stream.try_write_vectored(pieces),
+            Self::Unix(stream) => stream.try_write(pieces),
             Self::Tcp(stream) => stream.try_write_vectored(pieces),
         }
     }
@@ -79,16 +102,24 @@ impl WriteHalf {
     ) -> Poll<io::Result<usize>> {
         match self {
             #[cfg(unix)]
-            Self::Unix(stream) => Pin::new(stream).poll_write_vectored(cx, pieces),
+            Self::Unix(stream) => stream.poll_write(cx, pieces),
             Self::Tcp(stream) => Pin::new(stream).poll_write_vectored(cx, pieces),
+        }
+    }
+
+    /// Nothing waits to be written any more.
+    pub(super) fn rest(&mut self) {
+        #[cfg(unix)]
+        if let Self::Unix(stream) = self {
+            stream.rest();
         }
     }
 }
 
 #[cfg(unix)]
-pub(super) fn unix_halves(stream: UnixStream) -> (ReadHalf, WriteHalf) {
-    let (read, write) = stream.into_split();
-    (ReadHalf::Unix(read), WriteHalf::Unix(write))
+pub(super) fn unix_halves(stream: UnixStream) -> Result<(ReadHalf, WriteHalf), Error> {
+    let (read, write) = halves(stream).map_err(Error::io("taking up a local connection"))?;
+    Ok((ReadHalf::Unix(read), WriteHalf::Unix(write)))
 }
 
 pub(super) fn tcp_halves(stream: TcpStream) -> (ReadHalf, WriteHalf) {
@@ -109,7 +140,7 @@ pub(super) fn own_uid() -> Result<u32, Error> {
 
 /// The number of the process at the other end, as credentials tell it.
 #[cfg(unix)]
-pub(super) fn pid_of(credentials: &unix::UCred) -> Option<u32> {
+pub(super) fn pid_of(credentials: &UCred) -> Option<u32> {
     let pid = credentials.pid()?;
     // 0 is what a process of another pid namespace looks like.
     u32::try_from(pid).ok().filter(|&pid| pid != 0)
@@ -151,7 +182,7 @@ async fn connect_unix(path: &std::path::Path) -> Result<(ReadHalf, WriteHalf), E
             own,
         });
     }
-    Ok(unix_halves(stream))
+    unix_halves(stream)
 }
 
 async fn connect_tcp(port: std::net::SocketAddr) -> Result<(ReadHalf, WriteHalf), Error> {

@@ -56,7 +56,7 @@ impl UnixDoor {
             });
         }
         let pid = pid_of(&credentials);
-        let (read, write) = unix_halves(stream);
+        let (read, write) = unix_halves(stream)?;
         Ok(Guest { read, write, pid })
     }
 }
