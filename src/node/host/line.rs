@@ -5,7 +5,6 @@
 //! come together, so that a burst costs a few writes and not one for each message.
 
 use std::collections::HashMap;
-use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::Waker;
 
@@ -98,6 +97,8 @@ pub(super) struct Inner {
     pub(super) outbox: Outbox,
     /// Whether the next sender may write himself.
     pub(super) direct: bool,
+    /// Whether the socket has taken less than there was.
+    pub(super) full: bool,
     /// The component is detached, and what waits is its last words.
     pub(super) left: bool,
     max_message: usize,
@@ -114,6 +115,7 @@ impl Line {
                 write: None,
                 outbox: Outbox::default(),
                 direct: true,
+                full: false,
                 left: false,
                 max_message: 0,
                 sent: 0,
@@ -170,11 +172,7 @@ impl Line {
             acknowledge: message.acknowledge,
             payload: message.payload,
         }));
-        if inner.direct || inner.outbox.len() >= COLLECTED {
-            inner.direct = false;
-            // An error is noticed by the task too, which knows what to do.
-            let _ = inner.try_flush();
-        }
+        inner.flush_perhaps();
         inner.wake_task();
         Ok(MessageHandle(handle))
     }
@@ -217,6 +215,7 @@ impl Line {
             let mut inner = self.lock();
             inner.write = Some(write);
             inner.direct = true;
+            inner.full = false;
             inner.max_message = max_message;
         }
         self.connected.send_replace(true);
@@ -330,11 +329,18 @@ impl Inner {
         Ok(())
     }
 
-    fn try_flush(&mut self) -> io::Result<()> {
-        match &self.write {
-            Some(write) => self.outbox.try_flush(write),
-            None => Ok(()),
+    /// Writes what waits, if it is a sender's turn to do so.
+    fn flush_perhaps(&mut self) {
+        if self.full || !self.direct && self.outbox.len() < COLLECTED {
+            return;
         }
+        self.direct = false;
+        if let Some(write) = &self.write {
+            // An error is noticed by the task too, which knows what to do.
+            let _ = self.outbox.try_flush(write);
+        }
+        // Then the task waits for room.
+        self.full = !self.outbox.is_empty();
     }
 
     fn wake_task(&mut self) {

@@ -140,12 +140,14 @@ impl Task {
             Some(task) if task.will_wake(cx.waker()) => {}
             _ => inner.task = Some(cx.waker().clone()),
         }
-        inner.direct = true;
         let Some(write) = &mut inner.write else {
             return Poll::Ready(Err(Error::Closed));
         };
         let waited = !inner.outbox.is_empty();
-        match inner.outbox.poll_flush(write, cx) {
+        let flushed = inner.outbox.poll_flush(write, cx);
+        inner.full = flushed.is_pending();
+        inner.direct = !inner.full;
+        match flushed {
             Poll::Ready(Ok(())) if inner.left => Poll::Ready(Ok(())),
             Poll::Ready(Ok(())) => {
                 if waited {
@@ -155,10 +157,7 @@ impl Task {
                 Poll::Pending
             }
             Poll::Ready(Err(error)) => Poll::Ready(Err(Error::io("writing to the node")(error))),
-            Poll::Pending => {
-                inner.direct = false;
-                Poll::Pending
-            }
+            Poll::Pending => Poll::Pending,
         }
     }
 }
