@@ -8,8 +8,8 @@ use tokio::sync::oneshot;
 use super::error::Undelivered;
 use super::local::Replies;
 use crate::address::JausId;
-use crate::endpoint::{Event, MessageHandle, Unacknowledged};
-use crate::link::local::record::{Reply, Silence};
+use crate::endpoint::{Event, MessageHandle};
+use crate::link::local::record::Reply;
 
 /// Messages whose fate somebody waits for, at most. The endpoint gives up each of them some day,
 /// so that this is only reached if it forgets to say so.
@@ -52,7 +52,9 @@ impl Awaiting {
                 let _ = sender.send(outcome(event));
             }
             Some((_, Waiter::There { replies, handle })) => {
-                replies.push(reply(event, handle));
+                if let Some(reply) = reply(event, handle) {
+                    replies.push(reply);
+                }
             }
             None => {}
         }
@@ -82,16 +84,13 @@ fn outcome(event: &Event) -> Result<(), Undelivered> {
     match *event {
         Event::NotAcknowledged {
             destination,
-            reason: Unacknowledged::Refused,
-            ..
-        } => Err(Undelivered::Refused { destination }),
-        Event::NotAcknowledged {
-            destination,
+            reason,
             acknowledged,
             length,
             ..
         } => Err(Undelivered::NotAcknowledged {
             destination,
+            reason,
             acknowledged,
             length,
         }),
@@ -99,7 +98,8 @@ fn outcome(event: &Event) -> Result<(), Undelivered> {
     }
 }
 
-fn reply(event: &Event, handle: u64) -> Reply {
+fn reply(event: &Event, handle: u64) -> Option<Reply> {
+    let octets = |octets: usize| u32::try_from(octets).unwrap_or(u32::MAX);
     match *event {
         Event::NotAcknowledged {
             destination,
@@ -107,20 +107,14 @@ fn reply(event: &Event, handle: u64) -> Reply {
             acknowledged,
             length,
             ..
-        } => Reply::NotAcknowledged {
+        } => Some(Reply::NotAcknowledged {
             handle,
             destination,
-            reason: match reason {
-                Unacknowledged::Refused => Silence::Refused,
-                _ => Silence::TimedOut,
-            },
-            acknowledged: acknowledged as u32,
-            length: length as u32,
-        },
-        Event::Acknowledged { by, .. } => Reply::Acknowledged { handle, by },
-        _ => Reply::Rejected {
-            handle,
-            words: String::new(),
-        },
+            reason,
+            acknowledged: octets(acknowledged),
+            length: octets(length),
+        }),
+        Event::Acknowledged { by, .. } => Some(Reply::Acknowledged { handle, by }),
+        _ => None,
     }
 }

@@ -182,6 +182,11 @@ impl Core {
         message: Outgoing,
         waiter: Option<Waiter>,
     ) -> Result<MessageHandle, SendError> {
+        let full = |mailbox: &Arc<Mailbox>| mailbox.is_full();
+        if message.acknowledge && self.mailboxes.get(&message.destination).is_some_and(full) {
+            // What was acknowledged shall not be dropped at once.
+            return Err(SendError::ReceiverFull(message.destination));
+        }
         let (source, deadline) = (message.source, self.deadline());
         let urgent = message.priority > Priority::Standard;
         let result = self.endpoint.send(now(), message);

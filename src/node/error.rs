@@ -4,7 +4,7 @@ use std::net::IpAddr;
 
 use super::{ConfigError, Peer};
 use crate::address::JausId;
-use crate::endpoint;
+use crate::endpoint::{self, Unacknowledged};
 use crate::link;
 use crate::link::local::record::Reason;
 
@@ -59,6 +59,10 @@ pub enum SendError {
          node is back"
     )]
     NotConnected(JausId),
+    /// The message is to be acknowledged, and the receiver, a component of this host, has no room
+    /// for it.
+    #[error("{0} does not read fast enough: its mailbox is full")]
+    ReceiverFull(JausId),
     /// The host's node takes messages more slowly than the component sends them.
     #[error("{octets} octets wait for the node of this host already: send more slowly")]
     Busy {
@@ -77,20 +81,13 @@ pub enum Undelivered {
     /// The host's node would not send it, and says why in its own words.
     #[error("the node of this host did not send it: {0}")]
     Rejected(String),
-    /// The receiver refused it (NAK).
-    #[error("{destination} refused the message")]
-    Refused {
-        /// For whom it was.
-        destination: JausId,
-    },
-    /// It was sent, again and again, and not acknowledged.
-    #[error(
-        "{destination} has acknowledged {acknowledged} of {length} octets, and nothing more came \
-         in time"
-    )]
+    /// It was sent, and not or not wholly acknowledged.
+    #[error("{destination} has acknowledged {acknowledged} of {length} octets: {reason}")]
     NotAcknowledged {
         /// For whom it was.
         destination: JausId,
+        /// Why no more.
+        reason: Unacknowledged,
         /// Octets that were acknowledged.
         acknowledged: usize,
         /// Octets of the message.

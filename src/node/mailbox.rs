@@ -145,6 +145,12 @@ impl Mailbox {
         Poll::Pending
     }
 
+    /// Whether the next message makes another go, or may do so.
+    pub(super) fn is_full(&self) -> bool {
+        let inner = self.lock();
+        !inner.messages.is_empty() && !inner.messages.has_room(1)
+    }
+
     /// Messages taken out until now.
     pub(super) fn taken(&self) -> u64 {
         let inner = self.lock();

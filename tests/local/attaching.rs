@@ -201,3 +201,28 @@ async fn a_guest_that_passes_by_does_not_rename_the_vehicle() {
     .await;
     assert!(called(&rover, Level::Subsystem, rover.id(), "Rover"));
 }
+
+#[tokio::test]
+async fn what_is_to_be_acknowledged_is_refused_where_there_is_no_room_for_it() {
+    let place = Place::new();
+    let node = place.node();
+    let full = node.attach(1).unwrap();
+    let here = node.attach(2).unwrap();
+    let there = place.host().attach(33).await.unwrap();
+    let limit = node.config().mailbox.messages;
+    for _ in 0..limit {
+        here.send(message(&here, full.id(), b"x")).unwrap();
+    }
+    // Behind all of these, since components are served in the order of their messages.
+    assert_eq!(
+        within(here.deliver(message(&here, there.id(), b"x"))).await,
+        Ok(())
+    );
+    let refused = SendError::ReceiverFull(full.id());
+    let words = refused.to_string();
+    let outcome = within(here.deliver(message(&here, full.id(), b"x"))).await;
+    assert_eq!(outcome, Err(Undelivered::NotSent(refused)));
+    let outcome = within(there.deliver(message(&there, full.id(), b"x"))).await;
+    assert_eq!(outcome, Err(Undelivered::Rejected(words)));
+    assert_eq!(full.counters().dropped, 0);
+}

@@ -4,9 +4,9 @@ use std::net::{Ipv6Addr, SocketAddr, SocketAddrV6};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{LinkId, Path, Remote};
+use jaus::endpoint::{LinkId, Path, Remote, Unacknowledged};
 use jaus::link::local::record::{
-    Delivery, Hello, Reason, RecordError, Refusal, Reply, Request, Send, Silence, Want, Welcome,
+    Delivery, Hello, Reason, RecordError, Refusal, Reply, Request, Send, Want, Welcome,
 };
 use jaus::link::local::{Assembler, Body};
 use jaus::wire::{Broadcast, Priority};
@@ -100,15 +100,16 @@ fn reply() -> impl Strategy<Value = Reply> {
     );
     let acknowledged =
         (any::<u64>(), id()).prop_map(|(handle, by)| Reply::Acknowledged { handle, by });
-    let not = (any::<u64>(), id(), any::<(bool, u32, u32)>()).prop_map(
-        |(handle, destination, (refused, acknowledged, length))| Reply::NotAcknowledged {
+    let reason = prop::sample::select(vec![
+        Unacknowledged::Refused,
+        Unacknowledged::TimedOut,
+        Unacknowledged::NotSent,
+    ]);
+    let not = (any::<(u64, u32, u32)>(), id(), reason).prop_map(
+        |((handle, acknowledged, length), destination, reason)| Reply::NotAcknowledged {
             handle,
             destination,
-            reason: if refused {
-                Silence::Refused
-            } else {
-                Silence::TimedOut
-            },
+            reason,
             acknowledged,
             length,
         },

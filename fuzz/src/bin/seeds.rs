@@ -102,8 +102,8 @@ fn component() -> Vec<u8> {
 /// What the node says to a component: welcome, a message from the network, and outcomes.
 fn node() -> Vec<u8> {
     use jaus::address::JausId;
-    use jaus::endpoint::{LinkId, Path};
-    use jaus::link::local::record::{Delivery, Reply, Silence, Welcome};
+    use jaus::endpoint::{LinkId, Path, Unacknowledged};
+    use jaus::link::local::record::{Delivery, Reply, Welcome};
     use jaus::wire::{Broadcast, Priority};
     let id = JausId::new(101, 1, 33);
     let peer = std::net::SocketAddr::from(([10, 0, 0, 2], 3794)).into();
@@ -127,7 +127,7 @@ fn node() -> Vec<u8> {
         Reply::NotAcknowledged {
             handle: 2,
             destination: id,
-            reason: Silence::TimedOut,
+            reason: Unacknowledged::TimedOut,
             acknowledged: 5,
             length: 10,
         },

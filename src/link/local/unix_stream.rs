@@ -8,6 +8,7 @@
 
 use std::io::{self, ErrorKind, IoSlice, Read, Write};
 use std::net::Shutdown;
+use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
@@ -29,9 +30,20 @@ pub(crate) struct UnixWriteHalf {
 
 pub(super) fn halves(stream: tokio::net::UnixStream) -> io::Result<(UnixReadHalf, UnixWriteHalf)> {
     let stream = Arc::new(stream.into_std()?);
-    let read = AsyncFd::with_interest(stream.clone(), Interest::READABLE)?;
+    let read = watch(stream.clone(), Interest::READABLE)?;
     let full = None;
     Ok((UnixReadHalf(read), UnixWriteHalf { stream, full }))
+}
+
+/// Has the runtime watch a socket.
+#[allow(
+    deprecated,
+    reason = "the successor must be promised that the descriptor stays open as long as it is \
+              watched, by an unsafe call; an owned standard socket, which is what is watched here, \
+              keeps that promise by itself"
+)]
+fn watch<S: AsRawFd>(socket: S, interest: Interest) -> io::Result<AsyncFd<S>> {
+    AsyncFd::with_interest(socket, interest)
 }
 
 impl UnixReadHalf {
@@ -103,7 +115,7 @@ impl UnixWriteHalf {
                     Err(error) if error.kind() == ErrorKind::Interrupted => {}
                     Err(error) if error.kind() == ErrorKind::WouldBlock => {
                         let copy = self.stream.try_clone()?;
-                        self.full = Some(AsyncFd::with_interest(copy, Interest::WRITABLE)?);
+                        self.full = Some(watch(copy, Interest::WRITABLE)?);
                     }
                     result => return Poll::Ready(result),
                 }

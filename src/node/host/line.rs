@@ -14,7 +14,7 @@ use super::super::mailbox::{Mailbox, MailboxLimits};
 use super::super::{SendError, Undelivered};
 use crate::address::JausId;
 use crate::endpoint::{self, MessageHandle, Outgoing};
-use crate::link::local::record::{self, Reply, Request, Silence};
+use crate::link::local::record::{self, Reply, Request};
 use crate::link::local::{Outbox, WriteHalf};
 
 /// Octets collected before a sender writes them himself.
@@ -257,15 +257,13 @@ impl Line {
                 acknowledged,
                 length,
             } => {
-                let reason = match reason {
-                    Silence::Refused => Undelivered::Refused { destination },
-                    _ => Undelivered::NotAcknowledged {
-                        destination,
-                        acknowledged: acknowledged as usize,
-                        length: length as usize,
-                    },
+                let undelivered = Undelivered::NotAcknowledged {
+                    destination,
+                    reason,
+                    acknowledged: acknowledged as usize,
+                    length: length as usize,
                 };
-                (handle, Err(reason))
+                (handle, Err(undelivered))
             }
             Reply::Rejected { handle, words } => (handle, Err(Undelivered::Rejected(words))),
             _ => return,
