@@ -12,6 +12,8 @@ pub(crate) enum Outcome {
     Done,
     /// Something could not be read, or did not answer: exit status 1.
     Incomplete,
+    /// Something that was looked at does not work: exit status 2.
+    Broken,
 }
 
 impl Outcome {

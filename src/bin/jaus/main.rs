@@ -9,6 +9,7 @@ mod decode;
 mod definitions;
 mod demo;
 mod discover;
+mod doctor;
 mod encode;
 mod failure;
 mod network;
@@ -50,6 +51,7 @@ enum Command {
     Demo(demo::Demo),
     Node(node::NodeCommand),
     Discover(discover::Discover),
+    Doctor(doctor::Doctor),
     Ping(ping::Ping),
     Query(query::Query),
     Record(record::Record),
@@ -64,6 +66,7 @@ impl Command {
             Self::Demo(demo) => demo.run(),
             Self::Node(node) => node.run(),
             Self::Discover(discover) => discover.run(),
+            Self::Doctor(doctor) => doctor.run(),
             Self::Ping(ping) => ping.run(),
             Self::Query(query) => query.run(),
             Self::Record(record) => record.run(),
@@ -118,6 +121,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Incomplete) => ExitCode::from(1),
+        Ok(Outcome::Broken) => ExitCode::from(2),
         // Whoever read our output has seen enough, as `head` does.
         Err(Failure::OutputClosed) => ExitCode::SUCCESS,
         Err(failure) => {

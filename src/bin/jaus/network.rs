@@ -149,12 +149,30 @@ impl Network {
     /// the settings. `default` is the id of whoever chooses none.
     pub(crate) fn for_node(&self, default: JausId) -> Result<(JausId, Identity, Config), Failure> {
         let (identity, node) = self.settings()?;
+        let id = self.chosen_id(&identity, &node).unwrap_or(default);
+        Ok((id, identity, self.with_flags(node, id)?))
+    }
+
+    /// For a look at a node that is to be: the id that it is to have, if one is chosen, and its
+    /// settings, but with a passing id.
+    pub(crate) fn for_examination(&self) -> Result<(Option<JausId>, Config), Failure> {
+        let (identity, node) = self.settings()?;
+        let id = self.chosen_id(&identity, &node);
+        Ok((id, self.with_flags(node, passing_id())?))
+    }
+
+    /// Whether settings come from a file.
+    pub(crate) const fn has_file(&self) -> bool {
+        self.config.is_some()
+    }
+
+    /// The id that a flag or the file names.
+    fn chosen_id(&self, identity: &Identity, node: &Config) -> Option<JausId> {
         // A file may also have the node's own keys for its id.
         let of_node = (node.subsystem, node.node) != (0, 0);
         let of_node = of_node.then(|| OwnId(JausId::new(node.subsystem, node.node, 1)));
         let id = self.id.or(identity.id).or(of_node);
-        let id = id.map_or(default, |OwnId(id)| id);
-        Ok((id, identity, self.with_flags(node, id)?))
+        id.map(|OwnId(id)| id)
     }
 
     /// For a command that runs for a moment beside other nodes: a passing id, whatever the file

@@ -1,0 +1,139 @@
+//! `jaus doctor`: looks at everything that keeps nodes from finding each other, and says what to
+//! do. One file per check; a check gives [`Finding`]s.
+
+mod finding;
+mod host;
+mod neighbours;
+mod port;
+
+use std::time::Duration;
+
+use clap::Args;
+use serde_json::json;
+
+use self::finding::{Finding, Mark};
+use crate::failure::{Failure, Outcome};
+use crate::network::Network;
+use crate::output::{Output, colours_wanted, say};
+use crate::runtime;
+
+/// Find out why nodes do not find each other
+///
+/// Looks at this host's interfaces, port, buffers and clock, then goes on the network for a
+/// moment: does multicast come back, who is there, do two of them have one id? It needs no
+/// rights. Give it the flags or the settings file of the node that does not work. Exit status: 0
+/// all is well, 1 there are warnings, 2 there are problems.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus doctor\n  \
+    jaus doctor --config node.toml        with the settings of a node\n  \
+    jaus doctor --id 101.1.1              and whether somebody has that id already\n  \
+    jaus doctor --interface eth0 --seconds 10\n  \
+    jaus doctor --json | jq '.findings[] | select(.mark != \"ok\")'")]
+pub(crate) struct Doctor {
+    /// How long to listen to the network
+    #[arg(long, default_value = "3", value_parser = runtime::seconds)]
+    seconds: Duration,
+
+    /// Print the findings as one JSON object
+    #[arg(long)]
+    json: bool,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+impl Doctor {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let mut report = Report {
+            output: Output::new(),
+            colours: colours_wanted(&std::io::stdout()),
+            json: self.json,
+            findings: Vec::new(),
+        };
+        runtime::run(self.examine(&mut report))?;
+        report.close()
+    }
+
+    async fn examine(&self, report: &mut Report) -> Result<(), Failure> {
+        let (id, config) = match self.network.for_examination() {
+            Ok(settings) => settings,
+            Err(failure) => {
+                let advice = "correct it: nothing else can be looked at before";
+                return report.add(Finding::problem("settings", failure).advice(advice));
+            }
+        };
+        if self.network.has_file() {
+            report.add(Finding::ok("settings", "the settings file can be read"))?;
+        }
+        report.add_all(host::buffers(&config))?;
+        let (interfaces, findings) = host::interfaces(&config);
+        report.add_all(findings)?;
+        for interface in &interfaces {
+            report.add_all(port::check(&config, interface))?;
+        }
+        report.add_all(port::check_tcp(&config))?;
+        if !self.json {
+            let seconds = self.seconds.as_secs_f64();
+            say(format_args!("listening to the network for {seconds} s …"));
+        }
+        let clock = host::ClockWatch::start();
+        report.add_all(neighbours::look(config, id, self.seconds).await)?;
+        report.add(clock.finish())
+    }
+}
+
+/// What was found so far; printed as it is found, or at the end as JSON.
+struct Report {
+    output: Output,
+    colours: bool,
+    json: bool,
+    findings: Vec<Finding>,
+}
+
+impl Report {
+    fn add(&mut self, finding: Finding) -> Result<(), Failure> {
+        if !self.json {
+            self.output.line(finding.in_words(self.colours))?;
+        }
+        self.findings.push(finding);
+        Ok(())
+    }
+
+    fn add_all(&mut self, findings: impl IntoIterator<Item = Finding>) -> Result<(), Failure> {
+        findings
+            .into_iter()
+            .try_for_each(|finding| self.add(finding))
+    }
+
+    fn close(mut self) -> Result<Outcome, Failure> {
+        let count = |mark| self.findings.iter().filter(|f| f.mark == mark).count();
+        let (problems, warnings) = (count(Mark::Problem), count(Mark::Warning));
+        if self.json {
+            let findings: Vec<_> = self.findings.iter().map(Finding::to_json).collect();
+            self.output.line(json!({
+                "problems": problems,
+                "warnings": warnings,
+                "findings": findings,
+            }))?;
+        } else {
+            let counted = |count: usize, what: &str| match count {
+                1 => format!("1 {what}"),
+                _ => format!("{count} {what}s"),
+            };
+            self.output.line(match (problems, warnings) {
+                (0, 0) => "\nAll is well.".to_owned(),
+                _ => format!(
+                    "\n{}, {}.",
+                    counted(problems, "problem"),
+                    counted(warnings, "warning")
+                ),
+            })?;
+        }
+        Ok(match (problems, warnings) {
+            (0, 0) => Outcome::Done,
+            (0, _) => Outcome::Incomplete,
+            _ => Outcome::Broken,
+        })
+    }
+}

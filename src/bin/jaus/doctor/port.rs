@@ -1,0 +1,86 @@
+//! Whether the ports that a node wants can be had, and who is in the way.
+
+use std::net::{SocketAddr, TcpListener};
+
+use jaus::link::udp::{PortTaken, Settings, UdpLink};
+use jaus::link::{Error, Interface};
+use jaus::node::Config;
+
+use super::finding::Finding;
+
+const CHECK: &str = "port";
+
+/// Opens what a node would open on the interface, and closes it again.
+pub(super) fn check(config: &Config, interface: &Interface) -> Vec<Finding> {
+    let settings = Settings {
+        port: config.port,
+        port_taken: PortTaken::Refuse,
+        group: config.group,
+        group6: config.group6,
+        broadcast: config.broadcast,
+        ttl: config.ttl,
+        receive_buffer: config.receive_buffer,
+        ..Settings::default()
+    };
+    let first = UdpLink::open(interface, &settings);
+    let Err(Error::PortTaken { .. }) = &first else {
+        return vec![judge(config, interface, first)];
+    };
+    // The group may be out of reach too.
+    let any = Settings {
+        port: 0,
+        ..settings
+    };
+    let group = UdpLink::open(interface, &any).err();
+    let group = group.map(|error| judge(config, interface, Err(error)));
+    [judge(config, interface, first)]
+        .into_iter()
+        .chain(group)
+        .collect()
+}
+
+fn judge(config: &Config, interface: &Interface, opened: Result<UdpLink, Error>) -> Finding {
+    match opened {
+        Ok(_) if config.port == 0 => Finding::ok(
+            CHECK,
+            format_args!("any free UDP port is used on {}", interface.name),
+        ),
+        Ok(link) => Finding::ok(CHECK, format_args!("UDP {} is free", link.local())),
+        Err(Error::PortTaken { address, holder }) => {
+            let what = format!("UDP {address} is taken{holder}");
+            if config.port_taken == PortTaken::UseFree {
+                return Finding::ok(CHECK, what)
+                    .advice("another one is taken then (port_taken = \"use-free\")");
+            }
+            Finding::warning(CHECK, what).advice(
+                "if that is your node, all is well; a second node on this host needs another port \
+                 (--port 3795, or 0 for any free one)",
+            )
+        }
+        Err(Error::GroupTaken { group, holder }) => Finding::problem(
+            CHECK,
+            format_args!(
+                "the multicast group {group} cannot be received: its port is held{holder} for all \
+                 addresses, without sharing. Junior does that"
+            ),
+        )
+        .advice(
+            "end that program; or do without the group: --group off --peer 127.0.0.1 with a --port \
+             other than 3794; or move one of the two to another host",
+        ),
+        Err(error) => Finding::problem(CHECK, error),
+    }
+}
+
+/// The same for the address where TCP connections are taken, if that is wanted.
+pub(super) fn check_tcp(config: &Config) -> Option<Finding> {
+    let listen: SocketAddr = config.tcp.listen?.to_string().parse().ok()?;
+    Some(match TcpListener::bind(listen) {
+        Ok(_) => Finding::ok(CHECK, format_args!("TCP {listen} is free")),
+        Err(error) => Finding::problem(CHECK, format_args!("TCP {listen} is not free: {error}"))
+            .advice(format_args!(
+                "`sudo ss -tlpn 'sport = :{}'` shows who has it; choose another port in tcp.listen",
+                listen.port()
+            )),
+    })
+}
