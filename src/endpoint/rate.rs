@@ -15,6 +15,8 @@ use crate::address::JausId;
 
 /// So many in a second in the long run, and so many at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Rate {
     /// In the long run, each second; 0 is taken for 1.
     pub per_second: u32,

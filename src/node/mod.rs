@@ -53,7 +53,8 @@ use tokio::sync::broadcast;
 
 pub use self::attendance::{ComponentEvent, Departure};
 pub use self::config::{
-    Config, ConfigError, Delivery, InvalidDelivery, InvalidListen, Listen, Peer, Tcp, units,
+    Config, ConfigError, Delivery, InvalidDelivery, InvalidListen, Limits, Listen, Peer, Routing,
+    Tcp, units,
 };
 pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::host::{Host, HostEvent, HostEvents};

@@ -5,6 +5,7 @@ mod acknowledgements;
 mod anything;
 mod bounds;
 mod delivery;
+mod flood;
 mod fragments;
 mod identity;
 mod output;

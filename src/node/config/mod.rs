@@ -23,6 +23,7 @@
 //! Each section has a file of its own here.
 
 mod delivery;
+mod limits;
 mod peer;
 #[cfg(feature = "serial")]
 mod serial;
@@ -30,11 +31,12 @@ mod tcp;
 pub mod units;
 
 pub use self::delivery::{Delivery, InvalidDelivery};
+pub use self::limits::{Limits, Routing};
 pub use self::peer::Peer;
 pub use self::tcp::{InvalidListen, Listen, Tcp};
 use super::mailbox::MailboxLimits;
 use crate::address::{JausId, ParseIdError};
-use crate::endpoint::{self, PAYLOAD_LIMITS};
+use crate::endpoint::{self, Access, PAYLOAD_LIMITS};
 use crate::link::local::{Address, Local};
 #[cfg(feature = "serial")]
 use crate::link::serial::Settings as SerialLine;
@@ -104,6 +106,12 @@ pub struct Config {
     pub serial: Vec<SerialLine>,
     /// Acknowledged messages, and how datagrams leave.
     pub delivery: Delivery,
+    /// Whether messages for others are passed on between the links.
+    pub routing: Routing,
+    /// Who may speak to this node.
+    pub access: Access,
+    /// How much is taken from others.
+    pub limits: Limits,
 }
 
 impl Default for Config {
@@ -139,6 +147,9 @@ impl Config {
             #[cfg(feature = "serial")]
             serial: Vec::new(),
             delivery: Delivery::default(),
+            routing: Routing::default(),
+            access: Access::default(),
+            limits: Limits::default(),
         }
     }
 
@@ -254,6 +265,7 @@ impl Config {
         }
         #[cfg(feature = "serial")]
         serial::validate(&self.serial)?;
+        limits::validate(&self.routing, &self.limits)?;
         if self.mailbox.messages == 0 {
             return Err(ConfigError::Mailbox);
         }
@@ -268,6 +280,11 @@ impl Config {
             payload_limit: self.payload_limit,
             max_message: self.max_message,
             max_reassembly: usual.max_reassembly.max(2 * self.max_message),
+            max_peers: self.limits.max_peers,
+            forwarding: self.routing.forward,
+            forwarded_broadcasts: self.routing.broadcasts,
+            access: self.access.clone(),
+            rates: self.limits.rates(),
             first_sequence,
             ..usual
         })
@@ -323,6 +340,21 @@ pub enum ConfigError {
         payload: usize,
         /// The most, in octets: 16 MiB, and no more fragments than there are sequence numbers.
         longest: usize,
+    },
+    /// A table without room, or too large.
+    #[error("max_peers {0} cannot be: choose from 1 to 65536")]
+    MaxPeers(usize),
+    /// A rate of nothing.
+    #[error(
+        "{key} = {{ per_second = {per_second}, burst = {burst} }} cannot be: choose at least 1 for each"
+    )]
+    Rate {
+        /// Section and key.
+        key: &'static str,
+        /// How many in a second.
+        per_second: u32,
+        /// How many at once.
+        burst: u32,
     },
     /// Nothing is on a serial line at 0 bits per second.
     #[error(

@@ -1,0 +1,327 @@
+//! Floods of invented senders: what they may cost, and that a conversation goes on.
+
+use super::*;
+
+const FLOOD: u32 = 100_000;
+const SOURCES: u32 = 10_000;
+/// Packets of the flood between two messages of the conversation.
+const BETWEEN: u32 = 50;
+
+/// One of the invented senders.
+fn invented(number: u32) -> JausId {
+    let number = number % SOURCES;
+    JausId::new(1000 + (number / 250) as u16, 1, (number % 250 + 1) as u8)
+}
+
+/// A packet of the flood: now one kind, now another.
+fn packet(number: u32) -> Frame {
+    use crate::wire::DataControl::{First, Middle};
+    let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    let flags = match number % 5 {
+        0 => Flags::default(),
+        1 => ask,
+        2 => Flags::default().with_data(First),
+        3 => Flags::default().with_data(Middle),
+        _ => Flags::default().with_acknowledgement(Acknowledgement::Positive),
+    };
+    let payload = match number % 5 {
+        4 => Bytes::new(),
+        _ => Bytes::from(vec![number as u8; 40]),
+    };
+    Frame {
+        flags,
+        sequence: (number * 31) as u16,
+        ..Frame::new(invented(number), US, payload)
+    }
+}
+
+/// A message of [`PEER`] that wants an acknowledgement, with a number in it.
+fn said(number: u32) -> Frame {
+    let [one, two, three, four] = number.to_le_bytes();
+    let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    Frame {
+        flags: ask,
+        sequence: number as u16,
+        ..Frame::new(PEER, US, vec![2, 0x22, one, two, three, four].into())
+    }
+}
+
+/// Floods an endpoint from `hosts` addresses, 100 packets a millisecond, while [`PEER`] and [`US`]
+/// talk; each of the peer's messages comes a second time later, for want of an acknowledgement.
+fn flood(hosts: u32, config: Config) -> Rig {
+    let mut rig = Rig::with(config);
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    rig.send(to_peer()).unwrap();
+    let _ = (rig.events(), rig.transmits());
+    let mut heard = 0;
+    for number in 0..FLOOD {
+        let host = SocketAddr::from((
+            [
+                172,
+                16,
+                (number % hosts / 250) as u8,
+                (number % hosts % 250) as u8,
+            ],
+            4000,
+        ));
+        let from = Path {
+            link: WIRE,
+            peer: host.into(),
+        };
+        let datagram = judp::encode(&packet(number)).unwrap();
+        rig.endpoint.handle_datagram(rig.now, from, datagram);
+        if number % BETWEEN == 0 {
+            let turn = number / BETWEEN;
+            rig.hear(&said(turn));
+            if turn >= 200 {
+                rig.hear(&said(turn - 200));
+            }
+            let from_peer = |message: &&Received| message.source == PEER;
+            let received = rig.received();
+            let mine: Vec<_> = received.iter().filter(from_peer).collect();
+            assert_eq!(mine.len(), 1, "each message once, at {number}");
+            assert_eq!(mine[0].payload[2..], turn.to_le_bytes());
+            heard += 1;
+            rig.send(to_peer()).unwrap();
+            let peer = To::Peer(path(PEER_HOST).peer);
+            let to_peer = rig.sent().into_iter().filter(|(to, _)| *to == peer).count();
+            assert!(
+                to_peer >= 2,
+                "our message and an acknowledgement, at {number}"
+            );
+        }
+        rig.now += Duration::from_micros(10);
+    }
+    assert_eq!(heard, FLOOD / BETWEEN);
+    rig
+}
+
+/// With the usual settings: 1024 peers, 1024 buckets, 40 960 fingerprints, 16 MiB of fragments at
+/// the most.
+fn is_bounded(rig: &Rig) {
+    let (tables, config) = (rig.endpoint.occupancy(), Config::default());
+    assert!(tables.peers <= config.max_peers, "{tables:?}");
+    assert!(tables.sources <= config.max_peers, "{tables:?}");
+    assert!(tables.messages <= config.max_recent * 5 / 2, "{tables:?}");
+    assert!(rig.endpoint.reassembly.cost() <= config.max_reassembly);
+    assert!(rig.endpoint.peers().any(|peer| peer.id == PEER));
+}
+
+#[test]
+fn a_flood_from_one_address_is_kept_out_and_a_conversation_goes_on() {
+    let rig = flood(1, Config::default());
+    is_bounded(&rig);
+    let learned = 1024 + 64 * 2;
+    assert!(rig.count(Counter::NewIdRate) > u64::from(FLOOD) * 8 / 10);
+    assert!(rig.count(Counter::PeersEvicted) <= learned);
+}
+
+#[test]
+fn a_flood_from_many_addresses_pushes_out_only_itself() {
+    let rig = flood(10_000, Config::default());
+    is_bounded(&rig);
+    assert!(rig.count(Counter::PeersEvicted) > 0);
+    assert!(
+        rig.count(Counter::NewIdRate) > 0,
+        "most find no bucket of their own"
+    );
+}
+
+#[test]
+fn with_configured_rates_a_flood_is_cut_off_at_the_gate() {
+    let config = Config {
+        rates: Rates {
+            messages_per_address: Some(Rate::new(10_000, 1000)),
+            ..Rates::default()
+        },
+        ..Config::default()
+    };
+    let rig = flood(1, config);
+    let passed = u64::from(FLOOD) - rig.count(Counter::MessageRate);
+    assert!((9_000..=13_000).contains(&passed), "{passed} in a second");
+}
+
+#[test]
+fn our_answers_to_strangers_are_no_more_than_what_they_sent() {
+    let mut rig = Rig::new();
+    let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    let small = |sequence| Frame {
+        flags: ask,
+        sequence,
+        ..from_peer(QUERY_HEARTBEAT)
+    };
+    let mut datagram = vec![judp::VERSION_AS5669A];
+    for sequence in 0..60 {
+        datagram.extend_from_slice(&judp::encode(&small(sequence)).unwrap()[1..]);
+    }
+    let length = datagram.len();
+    rig.hear_octets(PEER_HOST, datagram.clone().into());
+    let answered: usize = rig.transmits().iter().map(|t| t.payload.len() + 28).sum();
+    assert!(
+        answered > 0 && answered <= length + 28,
+        "{answered} for {length}"
+    );
+    assert!(rig.count(Counter::AcknowledgementsWithheld) > 0);
+    // To whom we talk, there is an answer to each.
+    rig.send(to_peer()).unwrap();
+    let _ = rig.transmits();
+    rig.hear_octets(PEER_HOST, datagram.into());
+    assert_eq!(rig.transmits().len(), 60);
+}
+
+#[test]
+fn who_is_denied_is_not_heard() {
+    let access = Access {
+        deny_networks: vec!["10.0.0.2".parse().unwrap()],
+        allow_subsystems: vec!["42".parse().unwrap()],
+        ..Access::default()
+    };
+    let mut rig = Rig::with(Config {
+        access,
+        ..Config::default()
+    });
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    rig.hear_from(
+        3,
+        &Frame {
+            source: id("43.1.1"),
+            ..from_peer(QUERY_HEARTBEAT)
+        },
+    );
+    assert_eq!((rig.events(), rig.transmits()), (vec![], vec![]));
+    let denied = [Counter::NetworkDenied, Counter::SubsystemDenied];
+    assert_eq!(denied.map(|counter| rig.count(counter)), [1, 1]);
+    rig.hear_from(3, &from_peer(QUERY_HEARTBEAT));
+    assert_eq!(rig.received().len(), 1);
+}
+
+#[test]
+fn a_table_full_of_conversations_takes_in_nobody_until_one_falls_silent() {
+    let mut rig = Rig::with(Config {
+        max_peers: 2,
+        ..Config::default()
+    });
+    let peer = |component| Frame {
+        source: JausId::new(42, 1, component),
+        ..from_peer(QUERY_HEARTBEAT)
+    };
+    for component in [1, 2] {
+        rig.hear(&peer(component));
+        let answer = Outgoing {
+            destination: JausId::new(42, 1, component),
+            ..to_peer()
+        };
+        rig.send(answer).unwrap();
+    }
+    rig.events();
+    rig.hear(&peer(3));
+    assert_eq!(
+        (rig.received().len(), rig.count(Counter::PeersFull)),
+        (0, 1)
+    );
+    rig.pass(Duration::from_secs(6));
+    rig.hear(&Frame {
+        sequence: 2,
+        ..peer(2)
+    });
+    rig.hear(&peer(3));
+    let known: Vec<_> = rig
+        .endpoint
+        .peers()
+        .map(|peer| peer.id.component())
+        .collect();
+    assert_eq!(known, [2, 3]);
+}
+
+#[test]
+fn a_configured_address_is_not_learned_anew() {
+    let fixed = path(9);
+    let mut rig = Rig::with(Config {
+        static_peers: vec![StaticPeer {
+            id: PEER,
+            path: fixed,
+            gets_broadcasts: false,
+        }],
+        ..Config::default()
+    });
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    assert_eq!(rig.endpoint.peers().next().unwrap().path, fixed);
+    rig.send(to_peer()).unwrap();
+    assert_eq!(rig.sent()[0].0, To::Peer(fixed.peer));
+}
+
+#[test]
+fn what_passes_between_us_and_a_peer_is_counted() {
+    let mut rig = Rig::new();
+    rig.hear(&from_peer(QUERY_IDENTIFICATION));
+    rig.hear(&from_peer(QUERY_IDENTIFICATION));
+    let message = Outgoing {
+        acknowledge: true,
+        ..to_peer()
+    };
+    rig.send(message).unwrap();
+    let (_, sent) = rig.sent().remove(0);
+    rig.pass(Duration::from_millis(150));
+    assert_eq!(rig.sent().len(), 1, "sent again");
+    rig.now += Duration::from_millis(7);
+    let flags = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    rig.hear(&Frame {
+        flags,
+        sequence: sent.sequence,
+        ..from_peer(b"")
+    });
+    let peer = rig.endpoint.peers().next().unwrap();
+    let traffic = |messages, octets| Traffic { messages, octets };
+    assert_eq!((peer.received, peer.sent), (traffic(2, 3), traffic(1, 3)));
+    assert_eq!(
+        (peer.duplicates, peer.retransmissions, peer.lost),
+        (1, 1, 0)
+    );
+    assert_eq!(
+        peer.last_heard - peer.first_heard,
+        Duration::from_millis(157)
+    );
+}
+
+#[test]
+fn equal_messages_are_told_apart_when_the_numbers_have_gone_round() {
+    let mut rig = Rig::new();
+    let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    let mut delivered = 0;
+    for number in 0..140_000_u32 {
+        rig.hear(&Frame {
+            flags: ask,
+            sequence: number as u16,
+            ..from_peer(QUERY_HEARTBEAT)
+        });
+        rig.now += Duration::from_micros(10);
+        delivered += rig.received().len();
+        let _ = rig.transmits();
+    }
+    assert_eq!((delivered, rig.count(Counter::Duplicate)), (140_000, 0));
+}
+
+#[test]
+fn half_messages_wrong_sizes_and_wrong_versions_do_nothing() {
+    let mut rig = Rig::new();
+    let whole = judp::encode(&from_peer(&[0x02; 30])).unwrap();
+    for length in 0..whole.len() {
+        rig.hear_octets(PEER_HOST, whole.slice(..length));
+    }
+    for size in 0..=u16::MAX {
+        let mut wrong = whole.to_vec();
+        wrong[2..4].copy_from_slice(&size.to_le_bytes());
+        if usize::from(size) + 1 != whole.len() {
+            rig.hear_octets(9, wrong.into());
+        }
+    }
+    for version in (0..=u8::MAX).filter(|&version| version != judp::VERSION_AS5669A) {
+        let mut wrong = whole.to_vec();
+        wrong[0] = version;
+        rig.hear_octets(PEER_HOST, wrong.into());
+    }
+    let from_here = |message: &Received| message.path == Some(path(PEER_HOST));
+    assert!(!rig.received().iter().any(from_here));
+    let dropped = [Counter::NotJaus, Counter::Malformed].map(|counter| rig.count(counter));
+    assert!(dropped[0] >= 254 && dropped[1] > 60_000, "{dropped:?}");
+}

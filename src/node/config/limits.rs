@@ -1,0 +1,192 @@
+//! The sections `[routing]` and `[limits]`: whether a node passes messages on, and how much it takes
+//! from others. Who may speak to it is in `[access]`, which is [`Access`](crate::endpoint::Access).
+//!
+//! ```toml
+//! [routing]
+//! forward = true                                        # between the node's links
+//! broadcasts = { per_second = 500, burst = 1000 }       # what goes to many, in all
+//!
+//! [access]
+//! allow_subsystems = ["101", "200-299"]
+//! deny_networks = ["10.0.9.0/24", "fd00:9::/32"]
+//!
+//! [limits]
+//! max_peers = 1024
+//! new_ids_per_address = { per_second = 64, burst = 1024 }
+//! messages_per_address = { per_second = 20000, burst = 40000 }
+//! messages_per_id = { per_second = 5000, burst = 10000 }
+//! ```
+
+use super::ConfigError;
+use crate::endpoint::{self, Rate, Rates};
+
+/// The most peers that can be asked for.
+const MOST_PEERS: usize = 65_536;
+
+/// Whether and how much a node passes on between its links. By default it does not, also with
+/// several links: to join two networks is a decision.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
+pub struct Routing {
+    /// Whether messages for others are passed on.
+    pub forward: bool,
+    /// How many messages that go to many, or for ids that are not known, are passed on in all.
+    pub broadcasts: Rate,
+}
+
+impl Default for Routing {
+    fn default() -> Self {
+        let usual = endpoint::Config::default();
+        Self {
+            forward: usual.forwarding,
+            broadcasts: usual.forwarded_broadcasts,
+        }
+    }
+}
+
+/// How much a node takes from others.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
+#[non_exhaustive]
+pub struct Limits {
+    /// The most peers that are remembered, 1 to 65536.
+    pub max_peers: usize,
+    /// Ids heard for the first time, from each network address.
+    pub new_ids_per_address: Rate,
+    /// Messages from each network address; not limited if it is left out.
+    pub messages_per_address: Option<Rate>,
+    /// Messages from each id; not limited if it is left out.
+    pub messages_per_id: Option<Rate>,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        let usual = endpoint::Config::default();
+        Self {
+            max_peers: usual.max_peers,
+            new_ids_per_address: usual.rates.new_ids,
+            messages_per_address: usual.rates.messages_per_address,
+            messages_per_id: usual.rates.messages_per_id,
+        }
+    }
+}
+
+impl Limits {
+    pub(super) const fn rates(&self) -> Rates {
+        Rates {
+            new_ids: self.new_ids_per_address,
+            messages_per_address: self.messages_per_address,
+            messages_per_id: self.messages_per_id,
+        }
+    }
+}
+
+/// Checks what nothing would be left by.
+pub(super) fn validate(routing: &Routing, limits: &Limits) -> Result<(), ConfigError> {
+    if !(1..=MOST_PEERS).contains(&limits.max_peers) {
+        return Err(ConfigError::MaxPeers(limits.max_peers));
+    }
+    for (key, rate) in [
+        ("routing.broadcasts", Some(routing.broadcasts)),
+        (
+            "limits.new_ids_per_address",
+            Some(limits.new_ids_per_address),
+        ),
+        ("limits.messages_per_address", limits.messages_per_address),
+        ("limits.messages_per_id", limits.messages_per_id),
+    ] {
+        if let Some(Rate { per_second, burst }) = rate
+            && (per_second == 0 || burst == 0)
+        {
+            return Err(ConfigError::Rate {
+                key,
+                per_second,
+                burst,
+            });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::node::Config;
+
+    #[test]
+    fn nothing_is_no_rate_and_no_table() {
+        let error = |change: fn(&mut Config)| {
+            let mut config = Config::new(1, 1);
+            change(&mut config);
+            config.validate().unwrap_err().to_string()
+        };
+        let none = error(|config| config.limits.messages_per_id = Some(Rate::new(0, 5)));
+        assert!(none.contains("limits.messages_per_id"), "{none}");
+        assert!(
+            none.contains("per_second = 0") && none.contains("at least 1"),
+            "{none}"
+        );
+        let none = error(|config| config.routing.broadcasts = Rate::new(5, 0));
+        assert!(
+            none.contains("routing.broadcasts") && none.contains("burst = 0"),
+            "{none}"
+        );
+        let none = error(|config| config.limits.max_peers = 0);
+        assert!(
+            none.contains("max_peers 0") && none.contains("1 to 65536"),
+            "{none}"
+        );
+    }
+
+    #[cfg(feature = "cli")]
+    #[test]
+    fn a_file_sets_what_it_names_and_mistakes_are_named() {
+        let read = |text: &str| toml::from_str::<Config>(text).map_err(|error| error.to_string());
+        let config = read(
+            r#"
+            [routing]
+            forward = true
+            [access]
+            allow_subsystems = ["101", "200-299"]
+            deny_networks = ["10.0.9.0/24"]
+            [limits]
+            messages_per_id = { per_second = 50, burst = 100 }
+            "#,
+        )
+        .unwrap();
+        let endpoint = config.endpoint(0);
+        assert!(endpoint.forwarding && !endpoint.access.allows_subsystem(102));
+        assert!(!endpoint.access.allows_address([10, 0, 9, 1].into()));
+        assert_eq!(endpoint.rates.messages_per_id, Some(Rate::new(50, 100)));
+        assert_eq!(endpoint.rates.new_ids, Rates::default().new_ids);
+        for (text, value, remedy) in [
+            (
+                "[routing]\nforwards = true",
+                "forwards",
+                "expected `forward`",
+            ),
+            (
+                "[access]\nallow_subsystems = [\"9-2\"]",
+                "`9-2`",
+                "\"200-299\"",
+            ),
+            (
+                "[access]\ndeny_networks = [\"10.0.9.1/24\"]",
+                "`10.0.9.1/24`",
+                "\"10.0.9.0/24\"",
+            ),
+            (
+                "[limits]\nmessages_per_id = { per_second = 5 }",
+                "per_second",
+                "burst",
+            ),
+        ] {
+            let error = read(text).unwrap_err();
+            assert!(error.contains("line 2"), "{error}");
+            assert!(error.contains(value) && error.contains(remedy), "{error}");
+        }
+    }
+}
