@@ -326,6 +326,7 @@ fn a_flood_of_invented_peers_is_bounded_and_leaves_the_node_working() {
             .unwrap();
         network.endpoint(flooder).detach(invented);
     }
+    network.run_for(Duration::from_millis(1));
     let honest = network.join(endpoint(ONE), Mailbox::default());
     network.send(honest, message(1)).unwrap();
     network.run_until_idle();

@@ -39,7 +39,9 @@ pub struct Config {
     pub max_reassembly_per_sender: usize,
     /// The same for all senders.
     pub max_reassembly: usize,
-    /// How long an unfinished message is kept after its latest fragment.
+    /// How long a part of an unfinished message is kept that does not grow. Longer than senders
+    /// pause between two tries or try in vain: they do not send again what was acknowledged, and
+    /// would take a message for delivered of which the beginning was forgotten.
     pub reassembly_timeout: Duration,
     /// The most entries of each queue (datagrams to send and messages to deliver, both per
     /// priority; news). What comes when a queue is full is dropped and counted.
@@ -115,7 +117,7 @@ impl Default for Config {
             large_styles: Vec::new(),
             max_reassembly_per_sender: 24 << 20,
             max_reassembly: 48 << 20,
-            reassembly_timeout: Duration::from_secs(2),
+            reassembly_timeout: Duration::from_secs(6),
             queue_limit: 1024,
             duplicate_window: Duration::from_millis(100),
             retransmission_window: Duration::from_millis(3500),

@@ -211,6 +211,13 @@ impl Endpoint {
         })
     }
 
+    /// The octets that are kept of unfinished large messages, with what keeping them costs: at most
+    /// [`Config::max_reassembly`].
+    #[must_use]
+    pub fn unfinished(&self) -> usize {
+        self.reassembly.cost()
+    }
+
     /// Tells that time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached;
     /// early calls are harmless.
     pub fn handle_timeout(&mut self, now: Instant) {

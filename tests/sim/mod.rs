@@ -10,20 +10,28 @@
     clippy::panic,
     dead_code,
     unreachable_pub,
+    unused_imports,
     reason = "each test binary uses its own part"
 )]
 
-use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashSet};
+mod random;
+mod trace;
+mod wire;
+
 use std::net::SocketAddr;
-use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::endpoint::{
     Endpoint, Event, LinkId, LinkProfile, MessageHandle, Outgoing, Path, Received, SendError, To,
+    Transmit,
 };
 use jaus::wire::judp;
+
+pub use random::Random;
+pub use trace::Trace;
+pub use wire::{Conditions, Socket};
+use wire::{Flight, Wire};
 
 /// The only link of each node.
 pub const WIRE: LinkId = LinkId(0);
@@ -77,39 +85,6 @@ impl Mailbox {
     }
 }
 
-/// How well the wire works.
-#[derive(Clone, Debug)]
-pub struct Conditions {
-    /// How long a datagram travels; the spread is what reorders them.
-    pub latency: Range<Duration>,
-    /// How many of 1000 copies are lost.
-    pub lost: u32,
-    /// How many of 1000 copies arrive twice.
-    pub repeated: u32,
-}
-
-impl Conditions {
-    /// A quiet switch: 100 µs, nothing lost.
-    pub fn good() -> Self {
-        let latency = Duration::from_micros(100)..Duration::from_micros(101);
-        Self {
-            latency,
-            lost: 0,
-            repeated: 0,
-        }
-    }
-
-    /// A poor radio: 1 to 30 ms, one copy of ten lost, one of twenty repeated.
-    pub fn poor() -> Self {
-        let latency = Duration::from_millis(1)..Duration::from_millis(30);
-        Self {
-            latency,
-            lost: 100,
-            repeated: 50,
-        }
-    }
-}
-
 /// Names a node of the network, in order of joining.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Host(pub usize);
@@ -121,27 +96,14 @@ struct Node<O> {
     up: bool,
 }
 
-/// A datagram on its way. Ordered by arrival, then by departure.
-#[derive(PartialEq, Eq, PartialOrd, Ord)]
-struct Flight {
-    arrival: Instant,
-    number: u64,
-    to: usize,
-    from: SocketAddr,
-    datagram: Bytes,
-}
-
 /// The network. See the [module](self).
 pub struct Network<O = Mailbox> {
     now: Instant,
-    conditions: Conditions,
-    random: Random,
+    wire: Wire,
     nodes: Vec<Node<O>>,
-    flights: BinaryHeap<Reverse<Flight>>,
-    cut: HashSet<(usize, usize)>,
-    launched: u64,
     carried: u64,
     multicast: u64,
+    trace: Trace,
 }
 
 impl<O: Owner> Network<O> {
@@ -151,16 +113,14 @@ impl<O: Owner> Network<O> {
         reason = "an arbitrary beginning of virtual time"
     )]
     pub fn new(seed: u64, conditions: Conditions) -> Self {
+        let now = Instant::now();
         Self {
-            now: Instant::now(),
-            conditions,
-            random: Random(seed),
+            now,
+            wire: Wire::new(seed, conditions),
             nodes: Vec::new(),
-            flights: BinaryHeap::new(),
-            cut: HashSet::new(),
-            launched: 0,
             carried: 0,
             multicast: 0,
+            trace: Trace::new(now),
         }
     }
 
@@ -197,18 +157,12 @@ impl<O: Owner> Network<O> {
 
     /// Cuts or joins the wire between two nodes.
     pub fn set_cut(&mut self, one: Host, other: Host, cut: bool) {
-        for pair in [(one.0, other.0), (other.0, one.0)] {
-            if cut {
-                self.cut.insert(pair);
-            } else {
-                self.cut.remove(&pair);
-            }
-        }
+        self.wire.set_cut(one.0, other.0, cut);
     }
 
     /// Makes the wire better or worse from now on.
     pub fn set_conditions(&mut self, conditions: Conditions) {
-        self.conditions = conditions;
+        self.wire.conditions = conditions;
     }
 
     /// The virtual time.
@@ -239,6 +193,16 @@ impl<O: Owner> Network<O> {
     /// How many of them went to the group.
     pub fn multicast(&self) -> u64 {
         self.multicast
+    }
+
+    /// How many datagrams were lost because a receiver's socket was full.
+    pub fn overflowed(&self) -> u64 {
+        self.wire.overflowed
+    }
+
+    /// What has happened.
+    pub fn trace(&mut self) -> &mut Trace {
+        &mut self.trace
     }
 
     /// Sends a message from a node, and puts it on the wire.
@@ -289,14 +253,7 @@ impl<O: Owner> Network<O> {
             return false;
         };
         self.now = self.now.max(next);
-        while self
-            .flights
-            .peek()
-            .is_some_and(|Reverse(flight)| flight.arrival <= self.now)
-        {
-            let Some(Reverse(flight)) = self.flights.pop() else {
-                break;
-            };
+        while let Some(flight) = self.wire.receive(self.now) {
             self.arrive(flight);
         }
         for host in 0..self.nodes.len() {
@@ -306,16 +263,18 @@ impl<O: Owner> Network<O> {
     }
 
     fn next_time(&self) -> Option<Instant> {
-        let arrival = self.flights.peek().map(|Reverse(flight)| flight.arrival);
         let alarms = self.nodes.iter().filter(|node| node.up);
         let alarms =
             alarms.flat_map(|node| [node.endpoint.poll_timeout(), node.owner.poll_timeout()]);
-        alarms.chain([arrival]).flatten().min()
+        alarms.chain([self.wire.next_time()]).flatten().min()
     }
 
     fn arrive(&mut self, flight: Flight) {
         let node = &mut self.nodes[flight.to];
         if node.up {
+            let (to, from, length) = (flight.to, flight.from, flight.datagram.len());
+            let what = format_args!("{to} gets {length} octets from {from}");
+            self.trace.note(self.now, what);
             let path = Path {
                 link: WIRE,
                 peer: flight.from.into(),
@@ -344,12 +303,23 @@ impl<O: Owner> Network<O> {
         loop {
             let node = &mut self.nodes[host];
             if let Some(transmit) = node.endpoint.poll_transmit() {
-                self.carry(host, transmit.to, &transmit.payload);
+                self.carry_all(host, &transmit);
             } else if let Some(event) = node.endpoint.poll_event() {
+                note_event(&mut self.trace, self.now, host, &event);
                 node.owner.handle_event(self.now, &mut node.endpoint, event);
             } else {
                 return;
             }
+        }
+    }
+
+    /// Puts the datagrams of a transmit on the wire.
+    fn carry_all(&mut self, from: usize, transmit: &Transmit) {
+        let whole = transmit.payload.len();
+        let length = transmit.segment.unwrap_or(whole).max(1);
+        for start in (0..whole).step_by(length) {
+            let end = whole.min(start + length);
+            self.carry(from, transmit.to, &transmit.payload.slice(start..end));
         }
     }
 
@@ -360,59 +330,34 @@ impl<O: Owner> Network<O> {
         }
         self.carried += 1;
         self.multicast += u64::from(to == To::Group);
+        let (length, head) = (datagram.len(), &datagram[..datagram.len().min(17)]);
+        let what = format_args!("{from} sends {length} octets to {to:?}: {head:02x?}");
+        self.trace.note(self.now, what);
         for host in 0..self.nodes.len() {
             let meant = match to {
                 To::Group => true,
                 To::Peer(peer) => peer == self.nodes[host].address,
             };
-            if meant && !self.cut.contains(&(from, host)) {
-                self.launch(from, host, datagram);
+            if meant {
+                let sender = (from, self.nodes[from].address);
+                self.wire.launch(self.now, sender, host, datagram);
             }
-        }
-    }
-
-    fn launch(&mut self, from: usize, to: usize, datagram: &Bytes) {
-        if self.random.happens(self.conditions.lost) {
-            return;
-        }
-        let copies = if self.random.happens(self.conditions.repeated) {
-            2
-        } else {
-            1
-        };
-        for _copy in 0..copies {
-            let arrival = self.now + self.random.between(&self.conditions.latency);
-            self.launched += 1;
-            let (number, from, datagram) =
-                (self.launched, self.nodes[from].address, datagram.clone());
-            self.flights.push(Reverse(Flight {
-                arrival,
-                number,
-                to,
-                from,
-                datagram,
-            }));
         }
     }
 }
 
-/// A small generator of numbers that look random (SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
-    }
-
-    fn happens(&mut self, of_1000: u32) -> bool {
-        self.next() % 1000 < u64::from(of_1000)
-    }
-
-    fn between(&mut self, range: &Range<Duration>) -> Duration {
-        let spread = (range.end - range.start).as_nanos().max(1) as u64;
-        range.start + Duration::from_nanos(self.next() % spread)
+fn note_event(trace: &mut Trace, now: Instant, host: usize, event: &Event) {
+    match event {
+        Event::Received(Received {
+            source,
+            to,
+            payload,
+            ..
+        }) => {
+            let (length, code) = (payload.len(), &payload[..2]);
+            let what = format_args!("{host} delivers {code:02x?}, {length} octets, {source}→{to}");
+            trace.note(now, what);
+        }
+        news => trace.note(now, format_args!("{host} is told {news:?}")),
     }
 }

@@ -16,7 +16,7 @@ use bytes::Bytes;
 use super::style::{self, LargeStyle};
 use crate::address::JausId;
 use crate::endpoint::{Config, Counter, Counters};
-use crate::wire::{DataControl, Frame, Priority, Version, ra};
+use crate::wire::{Acknowledgement, DataControl, Frame, Priority, Version, ra};
 
 /// What a piece costs beside its octets.
 const PIECE_COST: usize = 64;
@@ -74,6 +74,13 @@ struct Run {
 impl Run {
     fn covers(&self, first: u16, sequence: u16) -> bool {
         sequence.wrapping_sub(first) <= self.last.wrapping_sub(first)
+    }
+
+    /// Whether it begins with the same first fragment, for which an acknowledgement is wanted.
+    fn is_begun_by(&self, frame: &Frame) -> bool {
+        frame.flags.acknowledgement() == Acknowledgement::Request
+            && self.begins
+            && self.pieces.front() == Some(&frame.payload)
     }
 
     fn cost(&self) -> usize {
@@ -340,8 +347,7 @@ impl Reassembly {
     }
 
     /// What is kept, with what keeping it costs, in octets.
-    #[cfg(test)]
-    pub(in crate::endpoint) fn cost(&self) -> usize {
+    pub(in crate::endpoint) const fn cost(&self) -> usize {
         self.cost
     }
 }
@@ -363,8 +369,10 @@ impl Sender {
             && let Some(known) = self.runs.get(&place)
             && known.covers(place.1, sequence)
         {
-            // The true repetitions were filtered before: here a restarted sender begins anew.
-            if data != DataControl::First && !self.is_stale(known) {
+            // Most repetitions were filtered before, so this is a restarted sender that begins anew;
+            // but one that waits for our acknowledgement may have been unheard for long.
+            let begins_anew = data == DataControl::First && !known.is_begun_by(frame);
+            if !begins_anew && !self.is_stale(known) {
                 return Err(Counter::Duplicate);
             }
             self.take(place);

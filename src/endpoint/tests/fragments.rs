@@ -452,3 +452,29 @@ fn large_messages_go_to_older_headers_with_the_code_in_each_fragment_and_come_ba
         }
     }
 }
+
+#[test]
+fn a_first_fragment_that_is_repeated_late_does_not_undo_the_message() {
+    let mut rig = Rig::new();
+    let message = large(600);
+    let mut fragments = fragments(1, &message, 200);
+    for fragment in &mut fragments {
+        fragment.flags = fragment
+            .flags
+            .with_acknowledgement(Acknowledgement::Request);
+    }
+    rig.hear(&fragments[0]);
+    rig.hear(&fragments[1]);
+    // Our acknowledgement of the first was lost, and so were its next copies.
+    rig.pass(Config::default().retransmission_window);
+    rig.hear(&fragments[0]);
+    rig.hear(&fragments[2]);
+    assert_eq!(payloads(&mut rig), [message]);
+}
+
+#[test]
+fn what_was_acknowledged_is_kept_while_the_sender_waits_longest() {
+    let config = Config::default();
+    let patience = config.acknowledge_patience + Duration::from_secs(2);
+    assert!(config.reassembly_timeout > patience);
+}

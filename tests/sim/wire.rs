@@ -1,0 +1,199 @@
+//! The wire between the nodes: what it does to each datagram, and the socket buffers at its ends.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashSet};
+use std::net::SocketAddr;
+use std::ops::Range;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::random::Random;
+
+/// How well the wire works.
+#[derive(Clone, Debug)]
+pub struct Conditions {
+    /// How long a datagram travels; the spread reorders them.
+    pub latency: Range<Duration>,
+    /// How many of 1000 copies are lost.
+    pub lost: u32,
+    /// How many of 1000 copies arrive twice.
+    pub repeated: u32,
+    /// How many of 1000 copies make a detour, so that others overtake them.
+    pub detoured: u32,
+    /// How long the longest detour takes.
+    pub detour: Duration,
+    /// The longest datagram, in octets, that gets through.
+    pub mtu: usize,
+    /// The socket of each receiver; `None` for one that is read at once.
+    pub socket: Option<Socket>,
+}
+
+/// A socket with a buffer, which its node reads at some speed.
+#[derive(Clone, Copy, Debug)]
+pub struct Socket {
+    /// Octets that are read in a second.
+    pub speed: usize,
+    /// Octets that fit in. What comes when it is full is lost.
+    pub buffer: usize,
+}
+
+impl Conditions {
+    /// A quiet switch: 100 µs, nothing lost.
+    pub fn good() -> Self {
+        Self {
+            latency: Duration::from_micros(100)..Duration::from_micros(101),
+            lost: 0,
+            repeated: 0,
+            detoured: 0,
+            detour: Duration::ZERO,
+            mtu: usize::MAX,
+            socket: None,
+        }
+    }
+
+    /// A poor radio: 1 to 30 ms, one copy of ten lost, one of twenty repeated.
+    pub fn poor() -> Self {
+        Self {
+            latency: Duration::from_millis(1)..Duration::from_millis(30),
+            lost: 100,
+            repeated: 50,
+            ..Self::good()
+        }
+    }
+}
+
+/// A datagram on its way. Ordered by arrival, then by departure.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Flight {
+    pub(super) arrival: Instant,
+    number: u64,
+    pub(super) to: usize,
+    pub(super) from: SocketAddr,
+    pub(super) datagram: Bytes,
+    /// It is in the receiver's socket already, and will be read.
+    buffered: bool,
+}
+
+/// What is in a node's socket.
+#[derive(Clone, Copy, Default)]
+struct Buffer {
+    octets: usize,
+    /// When what is in it will have been read.
+    read: Option<Instant>,
+}
+
+/// The wire. See the [module](self).
+pub(super) struct Wire {
+    pub(super) conditions: Conditions,
+    random: Random,
+    flights: BinaryHeap<Reverse<Flight>>,
+    cut: HashSet<(usize, usize)>,
+    buffers: Vec<Buffer>,
+    launched: u64,
+    pub(super) overflowed: u64,
+}
+
+impl Wire {
+    pub(super) fn new(seed: u64, conditions: Conditions) -> Self {
+        Self {
+            conditions,
+            random: Random::new(seed),
+            flights: BinaryHeap::new(),
+            cut: HashSet::new(),
+            buffers: Vec::new(),
+            launched: 0,
+            overflowed: 0,
+        }
+    }
+
+    pub(super) fn set_cut(&mut self, one: usize, other: usize, cut: bool) {
+        for pair in [(one, other), (other, one)] {
+            if cut {
+                self.cut.insert(pair);
+            } else {
+                self.cut.remove(&pair);
+            }
+        }
+    }
+
+    /// The next time at which something happens.
+    pub(super) fn next_time(&self) -> Option<Instant> {
+        self.flights.peek().map(|Reverse(flight)| flight.arrival)
+    }
+
+    /// A datagram leaves for one receiver.
+    pub(super) fn launch(
+        &mut self,
+        now: Instant,
+        (from, address): (usize, SocketAddr),
+        to: usize,
+        datagram: &Bytes,
+    ) {
+        let conditions = &self.conditions;
+        if self.cut.contains(&(from, to))
+            || datagram.len() > conditions.mtu
+            || self.random.happens(conditions.lost)
+        {
+            return;
+        }
+        let copies = 1 + u32::from(self.random.happens(conditions.repeated));
+        for _copy in 0..copies {
+            let mut arrival = now + self.random.between(&conditions.latency);
+            if self.random.happens(conditions.detoured) {
+                arrival += self.random.between(&(Duration::ZERO..conditions.detour));
+            }
+            self.launched += 1;
+            self.flights.push(Reverse(Flight {
+                arrival,
+                number: self.launched,
+                to,
+                from: address,
+                datagram: datagram.clone(),
+                buffered: false,
+            }));
+        }
+    }
+
+    /// The next datagram that has been received by now.
+    pub(super) fn receive(&mut self, now: Instant) -> Option<Flight> {
+        while self.next_time().is_some_and(|next| next <= now) {
+            let Reverse(flight) = self.flights.pop()?;
+            if flight.buffered {
+                self.buffer(flight.to).octets -= flight.datagram.len();
+                return Some(flight);
+            }
+            match self.conditions.socket {
+                None => return Some(flight),
+                Some(socket) => self.keep(flight, socket),
+            }
+        }
+        None
+    }
+
+    /// Puts a datagram into its receiver's socket, if there is room.
+    fn keep(&mut self, mut flight: Flight, socket: Socket) {
+        let length = flight.datagram.len();
+        let buffer = self.buffer(flight.to);
+        if buffer.octets + length > socket.buffer {
+            self.overflowed += 1;
+            return;
+        }
+        let begun = buffer
+            .read
+            .map_or(flight.arrival, |read| read.max(flight.arrival));
+        let read = begun + Duration::from_secs_f64(length as f64 / socket.speed as f64);
+        buffer.octets += length;
+        buffer.read = Some(read);
+        flight.arrival = read;
+        flight.buffered = true;
+        self.flights.push(Reverse(flight));
+    }
+
+    fn buffer(&mut self, host: usize) -> &mut Buffer {
+        if self.buffers.len() <= host {
+            self.buffers.resize(host + 1, Buffer::default());
+        }
+        &mut self.buffers[host]
+    }
+}
