@@ -139,4 +139,15 @@ mod tests {
             assert!(error.contains("127.0.0.1:37940"), "{error}");
         }
     }
+    #[test]
+    #[cfg(feature = "cli")]
+    fn a_mistake_in_a_settings_file_is_named_with_its_place_and_what_would_do() {
+        let error = toml::from_str::<crate::node::Config>("local = \"10.0.0.1:3794\"");
+        let error = error.unwrap_err().to_string();
+        assert!(
+            error.contains("line 1") && error.contains("`10.0.0.1:3794`"),
+            "{error}"
+        );
+        assert!(error.contains("127.0.0.1:37940"), "{error}");
+    }
 }

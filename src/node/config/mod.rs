@@ -13,6 +13,7 @@
 //! broadcast = "auto"                   # where there is no multicast; or "on", or "off"
 //! ttl = 16
 //! peers = ["192.168.7.2", "192.168.7.3:3795", "[fe80::2%eth0]:3794"]
+//! local = "default"                    # or a path, or "off" (the default)
 //! max_message = "4MiB"                 # sizes: octets, or with a unit (see `units`)
 //!
 //! [mailbox]
