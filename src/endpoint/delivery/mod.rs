@@ -272,9 +272,11 @@ impl Endpoint {
         let now = self.latest?;
         while let Some(destination) = self.deliveries.next_ready(priority) {
             let transmit = self.next_packet(now, destination, priority);
-            self.deliveries.take_turn(destination);
-            self.deliveries.touch(destination);
+            // What waits for numbers to be free has its next turn when something is acknowledged
+            // or given up.
             if transmit.is_some() {
+                self.deliveries.take_turn(destination);
+                self.deliveries.touch(destination);
                 return transmit;
             }
         }

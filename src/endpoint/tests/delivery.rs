@@ -229,3 +229,47 @@ fn a_packet_that_never_gets_through_ends_its_message_though_others_do() {
     };
     assert_eq!(reason, Unacknowledged::TimedOut);
 }
+
+#[test]
+fn a_message_whose_numbers_are_still_under_way_waits_and_holds_up_nobody() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    rig.hear_from(
+        9,
+        &Frame {
+            source: id("42.1.2"),
+            ..from_peer(QUERY_HEARTBEAT)
+        },
+    );
+    rig.events();
+    let first = rig.send(reliable(large(2000))).unwrap();
+    assert_eq!(rig.transmits().len(), 2);
+    // Nobody answers, and meanwhile all numbers are taken by messages to somebody else.
+    let other = Outgoing {
+        destination: id("42.1.2"),
+        ..to_peer()
+    };
+    for _number in 0..65_534 {
+        rig.send(other.clone()).unwrap();
+        assert_eq!(rig.transmits().len(), 1);
+    }
+    rig.send(reliable(large(2000))).unwrap();
+    assert_eq!(rig.transmits(), [], "its numbers are those of the first");
+    rig.send(other).unwrap();
+    assert_eq!(rig.transmits().len(), 1);
+    rig.endpoint.handle_timeout(rig.now);
+    let flags = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    for sequence in [1, 2] {
+        rig.hear(&Frame {
+            flags,
+            sequence,
+            ..from_peer(b"")
+        });
+    }
+    let told = Event::Acknowledged {
+        message: first,
+        by: PEER,
+    };
+    assert_eq!(rig.events(), [told]);
+    assert_eq!(rig.transmits().len(), 2);
+}
