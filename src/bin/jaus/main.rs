@@ -12,6 +12,7 @@ mod discover;
 mod doctor;
 mod encode;
 mod failure;
+mod monitor;
 mod network;
 mod node;
 mod output;
@@ -21,6 +22,7 @@ mod record;
 mod replay;
 mod runtime;
 mod settings;
+mod statistics;
 mod tree;
 
 use std::process::ExitCode;
@@ -50,6 +52,7 @@ struct Cli {
 enum Command {
     Demo(demo::Demo),
     Node(node::NodeCommand),
+    Monitor(monitor::Monitor),
     Discover(discover::Discover),
     Doctor(doctor::Doctor),
     Ping(ping::Ping),
@@ -65,6 +68,7 @@ impl Command {
         match self {
             Self::Demo(demo) => demo.run(),
             Self::Node(node) => node.run(),
+            Self::Monitor(monitor) => monitor.run(),
             Self::Discover(discover) => discover.run(),
             Self::Doctor(doctor) => doctor.run(),
             Self::Ping(ping) => ping.run(),

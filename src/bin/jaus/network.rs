@@ -184,6 +184,17 @@ impl Network {
         Ok((id, node))
     }
 
+    /// The same for a command that looks at the numbers of its node, so that it needs one of its
+    /// own.
+    pub(crate) fn for_own_node(&self, command: &str) -> Result<(JausId, Config), Failure> {
+        if self.attach.is_some() {
+            return Err(Failure::new(format!(
+                "`{command}` runs a node of its own: leave --attach out"
+            )));
+        }
+        self.for_a_moment()
+    }
+
     /// A component for a command that runs for a moment, on the host's node or on one of its own.
     pub(crate) async fn join_for_a_moment(&self) -> Result<(Port, Stay), Failure> {
         let Some(address) = &self.attach else {

@@ -7,12 +7,14 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind};
 use jaus::endpoint::Event;
-use jaus::node::{ComponentEvent, ComponentEvents, Events, Local, Node};
+use jaus::node::{ComponentEvent, ComponentEvents, Events, Local, Node, units};
+use tokio::time::{MissedTickBehavior, interval};
 
 use crate::failure::{Failure, Outcome};
 use crate::network::{Network, SubsystemKind};
 use crate::output::Output;
 use crate::runtime::{self, Clock};
+use crate::statistics::{self, DropWatch};
 use crate::tree;
 
 /// Run a node with one component that others can find
@@ -25,11 +27,20 @@ use crate::tree;
     jaus node --id 102.1 --interface eth0 --port 3795\n  \
     jaus node --id 101.1 --local          component processes of this host may attach\n  \
     jaus node --config node.toml --stats\n  \
+    jaus node --id 101.1 --stats=10s      tells its numbers every 10 s\n  \
     jaus node --loopback                  for trying things out on one computer")]
 pub(crate) struct NodeCommand {
-    /// When it ends, print how much was received, sent and dropped, and why
-    #[arg(long)]
-    stats: bool,
+    /// When it ends, print how much was received, sent and dropped, and why; with =TIME, such as
+    /// =10s, also each time that has passed
+    #[arg(
+        long,
+        value_name = "TIME",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0s",
+        value_parser = units::duration,
+    )]
+    stats: Option<Duration>,
 
     /// End after this time [default: at Ctrl-C]
     #[arg(long, value_parser = runtime::seconds)]
@@ -52,6 +63,9 @@ pub(crate) struct NodeCommand {
     network: Network,
 }
 
+/// The time between two looks at what was dropped, for the log.
+const LOG: Duration = Duration::from_secs(10);
+
 /// The id of whoever does not choose one.
 const ID: JausId = JausId::new(101, 1, 1);
 
@@ -73,9 +87,9 @@ impl NodeCommand {
                 .map_err(Failure::of)?;
             let mut output = Output::new();
             introduce(&node, &component, &mut output)?;
-            let outcome = self.watch(&component, events, &mut output).await;
-            if self.stats {
-                statistics(&node, &mut output)?;
+            let outcome = self.watch(&node, &component, events, &mut output).await;
+            if self.stats.is_some() {
+                statistics::print(&node, &mut output)?;
             }
             drop(component);
             node.shutdown().await;
@@ -86,6 +100,7 @@ impl NodeCommand {
     /// Prints what happens, until the end.
     async fn watch(
         &self,
+        node: &Node,
         component: &Component,
         (mut events, mut arrivals): (Events, ComponentEvents),
         output: &mut Output,
@@ -96,9 +111,20 @@ impl NodeCommand {
         let clock = Clock::start();
         // A conflict is news with every message of the other; once is enough for people.
         let mut conflicts = BTreeSet::new();
+        let mut turns = interval(self.stats.filter(|time| !time.is_zero()).unwrap_or(LOG));
+        turns.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        turns.tick().await;
+        let mut drops = DropWatch::default();
         loop {
             let words = tokio::select! {
                 () = &mut end => return Ok(Outcome::Done),
+                _ = turns.tick() => {
+                    drops.log(node);
+                    if self.stats.is_some_and(|time| !time.is_zero()) {
+                        statistics::print(node, output)?;
+                    }
+                    continue;
+                }
                 Some(change) = changes.next() => tree::in_words(change, &component.directory()),
                 Some(event) = events.recv() => match event {
                     Event::IdConflict { path, .. } if !conflicts.insert(path.peer) => None,
@@ -186,13 +212,4 @@ fn arrival_in_words(event: &ComponentEvent) -> Option<String> {
         )),
         _ => None,
     }
-}
-
-/// Prints every counter that is not zero.
-fn statistics(node: &Node, output: &mut Output) -> Result<(), Failure> {
-    output.line("")?;
-    for (counter, count) in node.counters().iter().filter(|&(_, count)| count > 0) {
-        output.line(format_args!("{count:>9}  {}", counter.name()))?;
-    }
-    Ok(())
 }

@@ -1,6 +1,6 @@
 //! Standard output, line by line; and what goes to standard error.
 
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::io::{self, IsTerminal, StdoutLock, Write};
 
 use crate::failure::Failure;
@@ -17,9 +17,19 @@ impl Output {
         }
     }
 
+    /// Prints what is no line: a screen.
+    pub(crate) fn part(&mut self, text: &str) -> Result<(), Failure> {
+        self.write(format_args!("{text}"))
+    }
+
     /// Prints a line.
     pub(crate) fn line(&mut self, text: impl Display) -> Result<(), Failure> {
-        writeln!(self.out, "{text}")
+        self.write(format_args!("{text}\n"))
+    }
+
+    fn write(&mut self, text: fmt::Arguments<'_>) -> Result<(), Failure> {
+        self.out
+            .write_fmt(text)
             .and_then(|()| self.out.flush())
             .map_err(|error| match error.kind() {
                 io::ErrorKind::BrokenPipe => Failure::OutputClosed,

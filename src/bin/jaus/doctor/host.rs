@@ -48,8 +48,11 @@ pub(super) fn interfaces(config: &Config) -> (Vec<Interface>, Vec<Finding>) {
 fn carries(config: &Config, interface: &Interface) -> Finding {
     const CHECK: &str = "interface";
     let name = format!("{} {}", interface.name, interface.address);
-    if interface.multicast || config.group == Group::Off {
+    if interface.multicast {
         return Finding::ok(CHECK, format_args!("{name} is up and carries multicast"));
+    }
+    if config.group == Group::Off {
+        return Finding::ok(CHECK, format_args!("{name} is up; multicast is turned off"));
     }
     if interface.broadcast.is_some() {
         return Finding::warning(

@@ -1,0 +1,211 @@
+//! What a node has counted at one moment, and what has happened between two.
+#![expect(clippy::disallowed_methods, reason = "rates are per second")]
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use jaus::address::JausId;
+use jaus::component::Directory;
+use jaus::endpoint::{Counter, Peer};
+use jaus::node::{LinkReport, Node};
+use serde_json::{Value as Json, json};
+use tokio::time::Instant;
+
+/// A node's numbers at one moment.
+pub(super) struct Sample {
+    time: Instant,
+    peers: BTreeMap<JausId, Peer>,
+    links: Vec<LinkReport>,
+    drops: BTreeMap<Counter, u64>,
+}
+
+/// What to show: everything per second.
+pub(super) struct View {
+    pub(super) peers: Vec<PeerRow>,
+    pub(super) links: Vec<LinkRow>,
+    pub(super) drops: Vec<DropRow>,
+}
+
+pub(super) struct PeerRow {
+    pub(super) id: JausId,
+    pub(super) name: String,
+    pub(super) kind: String,
+    pub(super) address: String,
+    link: u16,
+    header: &'static str,
+    pub(super) received: f64,
+    pub(super) received_octets: f64,
+    pub(super) sent: f64,
+    sent_octets: f64,
+    pub(super) lost: u64,
+    pub(super) repeated: u64,
+    resent: u64,
+    pub(super) round_trip: Option<Duration>,
+    pub(super) silent: Duration,
+}
+
+pub(super) struct LinkRow {
+    pub(super) name: String,
+    pub(super) received: f64,
+    pub(super) received_octets: f64,
+    pub(super) sent: f64,
+    pub(super) sent_octets: f64,
+    pub(super) errors: u64,
+}
+
+pub(super) struct DropRow {
+    pub(super) reason: &'static str,
+    pub(super) rate: f64,
+    pub(super) total: u64,
+}
+
+impl Sample {
+    pub(super) fn take(node: &Node) -> Self {
+        let peers = node.peers().into_iter().map(|peer| (peer.id, peer));
+        let is_drop = |&(counter, count): &(Counter, u64)| {
+            count > 0 && counter.name().starts_with("dropped: ")
+        };
+        Self {
+            time: Instant::now(),
+            peers: peers.collect(),
+            links: node.links(),
+            drops: node.counters().iter().filter(is_drop).collect(),
+        }
+    }
+
+    pub(super) fn ids(&self) -> impl Iterator<Item = JausId> {
+        self.peers.keys().copied()
+    }
+
+    /// What has happened since `before`, without what concerns `own`.
+    pub(super) fn since(&self, before: &Self, directory: &Directory, own: JausId) -> View {
+        let seconds = (self.time - before.time).as_secs_f64();
+        let others = self.peers.values().filter(|peer| peer.id != own);
+        let peer = |peer: &Peer| self.peer(peer, before.peers.get(&peer.id), seconds, directory);
+        let drop = |(&counter, &total): (&Counter, &u64)| DropRow {
+            reason: counter.name().trim_start_matches("dropped: "),
+            rate: rate(total, before.drops.get(&counter).copied(), seconds),
+            total,
+        };
+        View {
+            peers: others.map(peer).collect(),
+            links: self
+                .links
+                .iter()
+                .map(|link| link_row(link, before, seconds))
+                .collect(),
+            drops: self.drops.iter().map(drop).collect(),
+        }
+    }
+
+    fn peer(
+        &self,
+        peer: &Peer,
+        before: Option<&Peer>,
+        seconds: f64,
+        directory: &Directory,
+    ) -> PeerRow {
+        let told = directory
+            .subsystem(peer.id.subsystem())
+            .and_then(|subsystem| subsystem.identification());
+        let per_second = |count: fn(&Peer) -> u64| rate(count(peer), before.map(count), seconds);
+        PeerRow {
+            id: peer.id,
+            name: told.map_or_else(String::new, |told| told.name.clone()),
+            kind: told.map_or_else(String::new, |told| told.kind.to_string()),
+            address: peer.path.peer.to_string(),
+            link: peer.path.link.0,
+            header: peer.version.name(),
+            received: per_second(|peer| peer.received.messages),
+            received_octets: per_second(|peer| peer.received.octets),
+            sent: per_second(|peer| peer.sent.messages),
+            sent_octets: per_second(|peer| peer.sent.octets),
+            lost: peer.lost,
+            repeated: peer.duplicates,
+            resent: peer.retransmissions,
+            round_trip: peer.round_trip,
+            silent: self
+                .time
+                .into_std()
+                .saturating_duration_since(peer.last_heard),
+        }
+    }
+}
+
+fn link_row(link: &LinkReport, before: &Sample, seconds: f64) -> LinkRow {
+    let now = &link.counters;
+    let earlier = before.links.iter().find(|other| other.link == link.link);
+    let earlier = earlier.map(|other| &other.counters);
+    LinkRow {
+        name: format!("{} {}", link.interface.name, link.local),
+        received: rate(now.received, earlier.map(|c| c.received), seconds),
+        received_octets: rate(
+            now.received_octets,
+            earlier.map(|c| c.received_octets),
+            seconds,
+        ),
+        sent: rate(now.sent, earlier.map(|c| c.sent), seconds),
+        sent_octets: rate(now.sent_octets, earlier.map(|c| c.sent_octets), seconds),
+        errors: now.receive_errors
+            + now.send_errors
+            + now.send_overflows
+            + link.kernel_drops.unwrap_or(0),
+    }
+}
+
+/// How much was counted in a second. Whoever was not there before began with nothing.
+fn rate(now: u64, before: Option<u64>, seconds: f64) -> f64 {
+    let counted = now.saturating_sub(before.unwrap_or(0)) as f64;
+    if seconds > 0.0 {
+        counted / seconds
+    } else {
+        0.0
+    }
+}
+
+impl View {
+    pub(super) fn to_json(&self) -> Json {
+        let peers = self.peers.iter().map(|peer| {
+            json!({
+                "id": peer.id.to_string(),
+                "name": peer.name,
+                "kind": peer.kind,
+                "address": peer.address,
+                "link": peer.link,
+                "header": peer.header,
+                "received_per_s": rounded(peer.received),
+                "received_octets_per_s": rounded(peer.received_octets),
+                "sent_per_s": rounded(peer.sent),
+                "sent_octets_per_s": rounded(peer.sent_octets),
+                "lost": peer.lost,
+                "repeated": peer.repeated,
+                "resent": peer.resent,
+                "round_trip_ms": peer.round_trip.map(|time| rounded(time.as_secs_f64() * 1e3)),
+                "silent_s": rounded(peer.silent.as_secs_f64()),
+            })
+        });
+        let links = self.links.iter().map(|link| {
+            json!({
+                "link": link.name,
+                "received_per_s": rounded(link.received),
+                "received_octets_per_s": rounded(link.received_octets),
+                "sent_per_s": rounded(link.sent),
+                "sent_octets_per_s": rounded(link.sent_octets),
+                "errors": link.errors,
+            })
+        });
+        let drops = self.drops.iter().map(|drop| {
+            json!({ "reason": drop.reason, "per_s": rounded(drop.rate), "total": drop.total })
+        });
+        json!({
+            "peers": peers.collect::<Vec<_>>(),
+            "links": links.collect::<Vec<_>>(),
+            "drops": drops.collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// To three decimals: what is beyond is noise.
+fn rounded(number: f64) -> f64 {
+    (number * 1e3).round() / 1e3
+}
