@@ -176,6 +176,8 @@ impl Way {
         part: &[u8],
         segment: usize,
     ) -> io::Result<usize> {
+        #[cfg(not(all(feature = "udp-batch", target_os = "linux")))]
+        let _ = segment;
         let send = || {
             #[cfg(all(feature = "udp-batch", target_os = "linux"))]
             if part.len() > segment {

@@ -19,6 +19,14 @@
 //! [mailbox]
 //! messages = 1024
 //! octets = "2MiB"
+//!
+//! [tcp]                                # by default there are no connections
+//! listen = "0.0.0.0"                   # port 3794; or "10.0.0.5:3795"
+//! connect = ["10.0.0.7", "102.255.255@10.0.0.8:3794"]
+//!
+//! [[serial]]                           # one for each serial line (feature `serial`)
+//! device = "/dev/ttyUSB0"
+//! baud = 115200                        # the default
 //! ```
 //!
 //! Each section has a file of its own here.
@@ -264,6 +272,9 @@ impl Config {
                 longest,
             });
         }
+        if self.tcp.listen.is_some() && self.tcp.max_accepted == 0 {
+            return Err(ConfigError::MaxAccepted);
+        }
         #[cfg(feature = "serial")]
         serial::validate(&self.serial)?;
         limits::validate(&self.routing, &self.limits)?;
@@ -357,6 +368,9 @@ pub enum ConfigError {
         /// How many at once.
         burst: u32,
     },
+    /// A listener that lets nobody in.
+    #[error("tcp.max_accepted 0 lets nobody connect: choose 1 or more, or leave tcp.listen out")]
+    MaxAccepted,
     /// Nothing is on a serial line at 0 bits per second.
     #[error(
         "baud {baud} of the serial line {device} cannot be: choose what both ends have, such as 19200 or 115200"
@@ -445,6 +459,22 @@ mod toml_tests {
 
     fn error(text: &str) -> String {
         toml::from_str::<Config>(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_file_may_do_without_udp_where_there_is_another_way() {
+        let read = |streams: &str| -> Config {
+            toml::from_str(&format!(
+                "subsystem = 1\nnode = 1\ninterfaces = []\n{streams}"
+            ))
+            .unwrap()
+        };
+        let tcp = read("tcp = { connect = [\"10.0.0.7\"] }");
+        let serial = read("[[serial]]\ndevice = \"/dev/ttyUSB0\"");
+        assert!(!tcp.uses_udp() && !serial.uses_udp() && read("").uses_udp());
+        assert_eq!((tcp.validate(), serial.validate()), (Ok(()), Ok(())));
+        let closed = read("tcp = { listen = \"0.0.0.0\", max_accepted = 0 }").validate();
+        assert_eq!(closed, Err(ConfigError::MaxAccepted));
     }
 
     #[test]
