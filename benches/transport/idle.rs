@@ -14,8 +14,8 @@ use crate::place;
 use crate::report;
 use crate::roles::Role;
 
-/// Idle components of the larger node.
-const MANY: usize = 101;
+/// Idle components of each node that is watched.
+const COMPONENTS: [usize; 3] = [1, 11, 101];
 
 /// A child: a node with so many components, each with the core services, and nothing to do.
 pub(crate) async fn stay(components: usize) {
@@ -42,17 +42,29 @@ pub(crate) fn measure(effort: Effort) {
         let share = 100.0 * (processor_time(process.id()) - before) / time;
         (share, resident(process.id()))
     };
-    let (one_share, one) = watch(1);
-    let (many_share, many) = watch(MANY);
-    let each = (many - one) / (MANY - 1) as f64;
-    report::head("Idle node", ["components", "processor", "resident"]);
-    let row = |components: usize, share: f64, kib: f64| {
-        let share = format!("{share:.2} %");
-        report::row([&components.to_string(), &share, &format!("{kib:.0} KiB")]);
-    };
-    row(1, one_share, one);
-    row(MANY, many_share, many);
-    println!("\nEach further component: {each:.1} KiB.");
+    report::head(
+        "Idle node",
+        [
+            "components",
+            "processor",
+            "resident",
+            "each further component",
+        ],
+    );
+    let mut fewer = None;
+    for components in COMPONENTS {
+        let (share, kib) = watch(components);
+        let each = fewer.map_or(String::new(), |(count, before): (usize, f64)| {
+            format!("{:.1} KiB", (kib - before) / (components - count) as f64)
+        });
+        report::row([
+            &components.to_string(),
+            &format!("{share:.2} %"),
+            &format!("{kib:.0} KiB"),
+            &each,
+        ]);
+        fewer = Some((components, kib));
+    }
 }
 
 /// Seconds of processor time that a process has had.
@@ -66,7 +78,7 @@ fn processor_time(process: u32) -> f64 {
     nanoseconds / 1e9
 }
 
-/// Resident memory of a process, in KiB.
+/// Resident memory of a process, in KiB; the pages of the program itself are part of it.
 fn resident(process: u32) -> f64 {
     let status = fs::read_to_string(format!("/proc/{process}/status")).expect("Linux");
     status
