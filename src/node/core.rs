@@ -17,9 +17,8 @@ use super::awaiting::{Awaiting, Waiter};
 use super::error::SendError;
 use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
-use super::trains::Trains;
 use crate::address::JausId;
-use crate::endpoint::{AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, Transmit};
+use crate::endpoint::{AttachError, Endpoint, Event, MessageHandle, Outgoing, Received};
 use crate::link::Slab;
 use crate::link::local::Process;
 use crate::wire::Priority;
@@ -82,7 +81,6 @@ pub(super) struct Core {
     /// Gone when the node has stopped, which ends the listeners' streams.
     events: Option<broadcast::Sender<Event>>,
     slab: Slab,
-    trains: Trains,
     /// Messages sent since the last [`pump`](Self::pump).
     gathered: usize,
     driver: Option<Waker>,
@@ -103,7 +101,6 @@ impl Core {
             limits,
             events: Some(broadcast::Sender::new(EVENTS)),
             slab: Slab::new(),
-            trains: Trains::default(),
             gathered: 0,
             driver: None,
             follow_at,
@@ -259,15 +256,10 @@ impl Core {
         let mut transmitted = false;
         self.gathered = 0;
         while let Some(transmit) = self.endpoint.poll_transmit() {
-            let link = self.links.get_mut(transmit.link);
-            let most = link.map_or(1, |link| link.max_segments());
-            if let Some(train) = self.trains.add(transmit, most) {
-                self.transmit(&train);
+            if let Some(link) = self.links.get_mut(transmit.link) {
+                link.transmit(&transmit);
             }
             transmitted = true;
-        }
-        if let Some(train) = self.trains.take() {
-            self.transmit(&train);
         }
         while let Some(event) = self.endpoint.poll_event() {
             match event {
@@ -279,12 +271,6 @@ impl Core {
             }
         }
         transmitted
-    }
-
-    fn transmit(&mut self, transmit: &Transmit) {
-        if let Some(link) = self.links.get_mut(transmit.link) {
-            link.transmit(transmit);
-        }
     }
 
     fn deliver(&self, message: Received) {

@@ -65,14 +65,6 @@ impl Link {
         }
     }
 
-    /// How many datagrams to one peer are best given to [`transmit`](Self::transmit) at once.
-    pub(super) const fn max_segments(&self) -> usize {
-        match self {
-            Self::Udp(link) => link.max_segments(),
-            _ => 1,
-        }
-    }
-
     pub(super) fn transmit(&mut self, transmit: &Transmit) {
         match self {
             Self::Udp(link) => link.transmit(transmit),

@@ -44,7 +44,6 @@ mod links;
 mod local;
 mod mailbox;
 mod port;
-mod trains;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
