@@ -76,6 +76,24 @@ impl TwoHosts {
         format!("{}%{cable}", address.unwrap())
     }
 
+    /// Waits until both hosts are sure of their IPv6 addresses, which takes a second or two.
+    pub(crate) fn wait_for_addresses(&self) {
+        let deadline = Instant::now() + LIMIT;
+        for name in &self.names {
+            let shown = ["-n", name, "-6", "-o", "address", "show", "tentative"];
+            while !Command::new("ip")
+                .args(shown)
+                .output()
+                .unwrap()
+                .stdout
+                .is_empty()
+            {
+                assert!(Instant::now() < deadline, "addresses stay tentative");
+                std::thread::sleep(Duration::from_millis(100));
+            }
+        }
+    }
+
     /// Runs `ip` on one of the two hosts.
     pub(crate) fn ip(&self, host: usize, arguments: &[&str]) {
         ip(&[&["-n", &self.names[host]], arguments].concat()).unwrap();

@@ -52,7 +52,9 @@ fn what_comes_by_both_versions_of_ip_is_delivered_once() {
     on_two_hosts(
         "links::what_comes_by_both_versions_of_ip_is_delivered_once",
         |hosts| {
+            hosts.wait_for_addresses();
             let listener = hosts.start_with(0, "listener", "ip=both");
+            listener.says("listening on 2 links");
             let _announcer = hosts.start_with(1, "announcer", "ip=both");
             for number in 0..crate::roles::ANNOUNCEMENTS {
                 assert_eq!(listener.says("heard").parse(), Ok(number));
