@@ -8,11 +8,11 @@
 //! | file | what it is |
 //! |---|---|
 //! | [`record`] | what both sides say: pure functions between octets and records |
-//! | [`assembler`] | whole records out of a stream of octets, without I/O |
-//! | [`outbox`] | records on their way into the stream: small ones together, large ones uncopied |
-//! | [`address`] | where the node is found |
-//! | [`door`] | the node's side: directory and socket with their rights, stale sockets |
-//! | [`stream`] | the two kinds of stream, and who is at the other end |
+//! | `assembler` | whole records out of a stream of octets, without I/O |
+//! | `outbox` | records on their way into the stream: small ones together, large ones uncopied |
+//! | `address` | where the node is found |
+//! | `door` | the node's side: directory and socket with their rights, stale sockets |
+//! | `stream` | the two kinds of stream, and who is at the other end |
 //!
 //! What to do with the records is the business of [`node`](crate::node).
 

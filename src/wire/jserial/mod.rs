@@ -11,7 +11,7 @@
 //! | 0 or 2 | an address, which no known peer sends and which is read past |
 //! | 2 | `DLE STX` |
 //! | 2 | checksum of version, length and address, little-endian |
-//! | n | messages: [`as5669a`](super::as5669a); or AS5669's, each with a prefix of 4 octets |
+//! | n | messages: [`as5669a`]; or AS5669's, each with a prefix of 4 octets |
 //! | 2 | `DLE ETX` |
 //! | 2 | checksum of everything but the markers, little-endian |
 //!

@@ -3,10 +3,10 @@
 //! The first octet of each direction is the version, as in JUDP: 02h is AS5669A, 01h AS5669. Behind
 //! it come messages of that version:
 //!
-//! * AS5669A: the message of [`as5669a`](super::as5669a). Junior writes the version octet once,
+//! * AS5669A: the message of [`as5669a`]. Junior writes the version octet once,
 //!   JAUS++ before each message and as a segment of its own; both are read.
 //! * AS5669: the length of header and data (2 octets, big-endian), then the header of
-//!   [`ra`](super::ra). Only Junior writes it, and the version octet once.
+//!   [`ra`]. Only Junior writes it, and the version octet once.
 //!
 //! # Version octet or message?
 //!
