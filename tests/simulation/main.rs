@@ -9,6 +9,7 @@
 
 #![expect(clippy::expect_used, clippy::panic, reason = "tests")]
 
+mod large;
 mod ledger;
 mod scenario;
 mod seeds;
@@ -19,12 +20,23 @@ use seeds::for_each_seed;
 
 /// So many seeds are tried if nobody says otherwise.
 const SEEDS: u64 = 2000;
+/// So many of them send a large message: it has 736 fragments.
+const LARGE_SEEDS: u64 = 200;
 
 #[test]
 fn every_seed_keeps_the_promises() {
     for_each_seed("every_seed_keeps_the_promises", SEEDS, |seed| {
         scenario::run(seed).map(drop)
     });
+}
+
+#[test]
+fn one_mib_acknowledged_arrives_over_loss_and_reordering() {
+    for_each_seed(
+        "one_mib_acknowledged_arrives_over_loss_and_reordering",
+        LARGE_SEEDS,
+        large::run,
+    );
 }
 
 #[test]
