@@ -272,7 +272,16 @@ impl Peers {
         Some(id)
     }
 
-    /// Takes who was heard longest ago out of a queue, if that is long enough. Who was heard since
+    /// Whether somebody is known or could be: there is room, or somebody can go.
+    pub(super) fn has_room_for(&mut self, now: Instant, id: JausId) -> bool {
+        self.knows(id)
+            || self.learned.len() < self.limit
+            || Standing::ALL
+                .into_iter()
+                .any(|standing| self.oldest(now, standing).is_some())
+    }
+
+    /// Who of a queue was heard longest ago, if that is long enough. Who was heard since
     /// it queued up goes to the end again; so a look costs no more than was heard.
     fn oldest(&mut self, now: Instant, standing: Standing) -> Option<JausId> {
         loop {
@@ -286,12 +295,12 @@ impl Peers {
             let heard = known.peer.last_heard;
             if heard > place.heard {
                 self.queue_up(place.id);
-            } else if now.saturating_duration_since(heard) < standing.silence() {
-                self.queues[standing as usize].push_front(place);
-                return None;
-            } else {
-                return Some(place.id);
+                continue;
             }
+            let id = place.id;
+            self.queues[standing as usize].push_front(place);
+            let silent = now.saturating_duration_since(heard) >= standing.silence();
+            return silent.then_some(id);
         }
     }
 

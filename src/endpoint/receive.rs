@@ -112,6 +112,10 @@ impl Endpoint {
             receivers => receivers?,
         };
         self.admit(now, from, frame.source)?;
+        // Before acknowledging: what is dropped must not be taken for delivered.
+        if !self.peers.has_room_for(now, frame.source) {
+            return Err(Counter::PeersFull);
+        }
         if !receivers.is_empty() {
             match frame.flags.acknowledgement() {
                 Acknowledgement::Positive | Acknowledgement::Negative => {
