@@ -21,7 +21,7 @@ use seeds::for_each_seed;
 /// So many seeds are tried if nobody says otherwise.
 const SEEDS: u64 = 2000;
 /// So many of them send a large message: it has 736 fragments.
-const LARGE_SEEDS: u64 = 200;
+const LARGE_SEEDS: u64 = 1000;
 
 #[test]
 fn every_seed_keeps_the_promises() {
