@@ -33,6 +33,21 @@ fn main() -> Result<()> {
         write(&corpus.join("jtcp"), &name, &[&[5], &stream, &stream])?;
         write(&corpus.join("jserial"), &name, &[&[5, 0], &line, &line])?;
     }
+    let in_order: [&[u8]; 3] = [
+        &[0, 0, 0, 3, 20],
+        &[0, 0, 1, 2, 9],
+        &[9, 0, 1, 9, 0, 0, 9, 0, 3],
+    ];
+    write(
+        &corpus.join("fragments"),
+        "in-order",
+        &[&[0], &in_order.concat()],
+    )?;
+    write(
+        &corpus.join("fragments"),
+        "narrow",
+        &[&[1], &in_order.concat()],
+    )?;
     write(&corpus.join("local"), "component", &[&[0, 1], &component()])?;
     write(&corpus.join("local"), "node", &[&[1, 30], &node()])?;
     for entry in jsidl::catalogue::entries() {
