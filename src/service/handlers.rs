@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::Instant;
 
-use super::{Handled, Outbox, Service, code_of, read};
+use super::{Context, Handled, Service, Standing, code_of, read};
+use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 
-type Handler = Box<dyn FnMut(&Received, &mut Outbox) + Send>;
+type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) + Send>;
 
 /// A service whose messages are answered by functions of the application.
 ///
@@ -47,28 +48,55 @@ impl Handlers {
         mut self,
         mut function: impl FnMut(Q) -> R + Send + 'static,
     ) -> Self {
-        let handler = move |received: &Received, out: &mut Outbox| {
+        let handler = move |received: &Received, context: &mut Context<'_>| {
             if let Some(query) = read(received) {
-                out.reply(received, &function(query));
+                context.reply(received, &function(query));
             }
         };
         self.by_code.insert(Q::CODE, Box::new(handler));
         self
     }
 
-    /// Takes every message of type `M` with its sender's header; the outbox is for whatever is
-    /// to be said to it.
-    ///
-    /// Commands come from anyone: there is no Access Control yet that would ask who is in
-    /// control.
+    /// Takes every message of type `M` with its sender's header, whoever sent it; the context is
+    /// for whatever is to be said to it.
     #[must_use]
     pub fn receive<M: Message>(
-        mut self,
-        mut function: impl FnMut(M, &Received, &mut Outbox) + Send + 'static,
+        self,
+        function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
     ) -> Self {
-        let handler = move |received: &Received, out: &mut Outbox| {
-            if let Some(message) = read(received) {
-                function(message, received, out);
+        self.receive_if(|_, _| true, function)
+    }
+
+    /// Takes messages of type `M` from the client in control, and ignores all others: what sets
+    /// something up.
+    #[must_use]
+    pub fn configure<M: Message>(
+        self,
+        function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
+    ) -> Self {
+        self.receive_if(Standing::obeys, function)
+    }
+
+    /// Takes messages of type `M` from the client in control while the component is ready, and
+    /// ignores all others: what makes something act.
+    #[must_use]
+    pub fn command<M: Message>(
+        self,
+        function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
+    ) -> Self {
+        self.receive_if(Standing::acts_for, function)
+    }
+
+    fn receive_if<M: Message>(
+        mut self,
+        may: fn(&Standing, JausId) -> bool,
+        mut function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
+    ) -> Self {
+        let handler = move |received: &Received, context: &mut Context<'_>| {
+            if !may(context.standing(), received.source) {
+                tracing::debug!(source = %received.source, message = M::NAME, "not in control");
+            } else if let Some(message) = read(received) {
+                function(message, received, context);
             }
         };
         self.by_code.insert(M::CODE, Box::new(handler));
@@ -90,12 +118,17 @@ impl Service for Handlers {
         self.offers.clone()
     }
 
-    fn handle_message(&mut self, _: Instant, message: &Received, out: &mut Outbox) -> Handled {
+    fn handle_message(
+        &mut self,
+        _: Instant,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Handled {
         let handler = code_of(&message.payload).and_then(|code| self.by_code.get_mut(&code));
         let Some(handler) = handler else {
             return Handled::No;
         };
-        handler(message, out);
+        handler(message, context);
         Handled::Yes
     }
 }

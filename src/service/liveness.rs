@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Handled, Outbox, Service, code_of};
+use super::{Context, Handled, Service, code_of};
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
@@ -53,20 +53,25 @@ impl Service for Liveness {
         vec![core::liveness::V1_1, core::liveness::V1_0]
     }
 
-    fn handle_message(&mut self, _: Instant, message: &Received, out: &mut Outbox) -> Handled {
+    fn handle_message(
+        &mut self,
+        _: Instant,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Handled {
         if code_of(&message.payload) != Some(QueryHeartbeatPulse::CODE) {
             return Handled::No;
         }
-        out.reply(message, &ReportHeartbeatPulse {});
+        context.reply(message, &ReportHeartbeatPulse {});
         Handled::Yes
     }
 
-    fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
+    fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {
         let Some(heartbeat) = &mut self.heartbeat else {
             return;
         };
         if heartbeat.next.is_none_or(|next| next <= now) {
-            out.send(heartbeat.to, &ReportHeartbeatPulse {});
+            context.send(heartbeat.to, &ReportHeartbeatPulse {});
             heartbeat.next = Some(now + heartbeat.every);
         }
     }

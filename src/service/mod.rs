@@ -11,6 +11,7 @@
 //! | [`Discovery`] | says who we are, finds out who the others are, keeps the [`Directory`] |
 //! | [`Handlers`] | whatever an application offers, one function per message |
 
+mod context;
 mod directory;
 mod discovery;
 mod handlers;
@@ -18,6 +19,7 @@ mod inquiries;
 mod liveness;
 mod outbox;
 mod stack;
+mod standing;
 mod transport;
 
 use std::time::Instant;
@@ -25,6 +27,7 @@ use std::time::Instant;
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 
+pub use context::Context;
 pub use directory::{Component, Directory, Identification, Kind, Level, Node, Offer, Subsystem};
 pub use discovery::{Change, Discovery, Loss, Profile, Scope, Timing};
 pub use handlers::Handlers;
@@ -32,6 +35,7 @@ pub use inquiries::{Inquiry, NoAnswer, Patience};
 pub use liveness::Liveness;
 pub use outbox::Outbox;
 pub use stack::{Event, Stack};
+pub use standing::{Controller, Standing, State};
 pub use transport::Transport;
 
 /// One service of a component.
@@ -41,11 +45,23 @@ pub trait Service: Send {
 
     /// A message for this component has arrived. The first service that says
     /// [`Handled::Yes`] gets it; the others do not see it.
-    fn handle_message(&mut self, now: Instant, message: &Received, out: &mut Outbox) -> Handled;
+    fn handle_message(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Handled;
 
     /// The time of [`poll_timeout`](Self::poll_timeout) has come.
-    fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
-        let _ = (now, out);
+    fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {
+        let _ = (now, context);
+    }
+
+    /// The component's [`Standing`] was `before` until now, and is the context's from now on:
+    /// control was taken or lost, or the state changed. A service that moves something stops here
+    /// unless the component still [may act](Standing::may_act).
+    fn handle_standing(&mut self, now: Instant, before: &Standing, context: &mut Context<'_>) {
+        let _ = (now, before, context);
     }
 
     /// When this service wants to be woken.

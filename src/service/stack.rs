@@ -1,12 +1,15 @@
 //! All services of one component behind one door.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::time::Instant;
 
 use bytes::Bytes;
 
 use super::inquiries::Inquiries;
-use super::{Change, Directory, Discovery, Handled, Inquiry, NoAnswer, Outbox, Patience, Service};
+use super::{
+    Change, Context, Directory, Discovery, Handled, Inquiry, NoAnswer, Outbox, Patience, Service,
+    Standing,
+};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::{Outgoing, Received};
@@ -15,6 +18,8 @@ use crate::endpoint::{Outgoing, Received};
 pub struct Stack {
     discovery: Discovery,
     services: Vec<Box<dyn Service>>,
+    standing: Standing,
+    changed: BTreeSet<u16>,
     inquiries: Inquiries,
     out: Outbox,
     events: VecDeque<Event>,
@@ -41,6 +46,8 @@ impl Stack {
         Self {
             discovery,
             services,
+            standing: Standing::default(),
+            changed: BTreeSet::new(),
             inquiries: Inquiries::default(),
             out,
             events: VecDeque::new(),
@@ -73,7 +80,8 @@ impl Stack {
             if handled == Handled::Yes {
                 break;
             }
-            handled = service.handle_message(now, message, &mut self.out);
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            handled = service.handle_message(now, message, &mut context);
         }
         self.collect();
         match answered {
@@ -170,7 +178,8 @@ impl Stack {
     fn wake(&mut self, now: Instant) {
         self.discovery.handle_timeout(now, &mut self.out);
         for service in &mut self.services {
-            service.handle_timeout(now, &mut self.out);
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            service.handle_timeout(now, &mut context);
         }
         self.inquiries.handle_timeout(now, &mut self.out);
         self.collect();

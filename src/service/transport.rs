@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::{Handled, Outbox, Service};
+use super::{Context, Handled, Service};
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 use crate::messages::core;
@@ -16,7 +16,7 @@ impl Service for Transport {
         vec![core::transport::V1_1, core::transport::V1_0]
     }
 
-    fn handle_message(&mut self, _: Instant, _: &Received, _: &mut Outbox) -> Handled {
+    fn handle_message(&mut self, _: Instant, _: &Received, _: &mut Context<'_>) -> Handled {
         Handled::No
     }
 }

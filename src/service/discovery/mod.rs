@@ -42,7 +42,7 @@ mod search;
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use super::{Directory, Handled, Level, Offer, Outbox, Service, code_of};
+use super::{Directory, Handled, Level, Offer, Outbox, code_of};
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
@@ -148,12 +148,18 @@ impl Discovery {
     }
 }
 
-impl Service for Discovery {
-    fn offers(&self) -> Vec<ServiceId> {
+/// What a [`Stack`](super::Stack) does with it.
+impl Discovery {
+    pub(super) fn offers(&self) -> Vec<ServiceId> {
         vec![core::discovery::V1_1, core::discovery::V1_0]
     }
 
-    fn handle_message(&mut self, now: Instant, message: &Received, out: &mut Outbox) -> Handled {
+    pub(super) fn handle_message(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        out: &mut Outbox,
+    ) -> Handled {
         match code_of(&message.payload) {
             Some(QueryIdentification::CODE) => self.answer_identification(now, message, out),
             Some(QueryConfiguration::CODE) => self.answer_configuration(now, message, out),
@@ -169,14 +175,14 @@ impl Service for Discovery {
         Handled::Yes
     }
 
-    fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
+    pub(super) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
         self.call(now, out);
         self.drop_the_silent(now, out);
         self.refresh(now);
         self.search.ask_due(now, out);
     }
 
-    fn poll_timeout(&self) -> Option<Instant> {
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
         self.search.poll_timeout()
     }
 }

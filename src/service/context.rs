@@ -1,0 +1,65 @@
+//! What a service is given beside a message or the time: who may command, where its answers go,
+//! and how it says that something has changed.
+
+use std::collections::BTreeSet;
+
+use bytes::Bytes;
+
+use super::{Outbox, Standing};
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::endpoint::Received;
+
+/// One service's view of its component while it handles something.
+#[derive(Debug)]
+pub struct Context<'a> {
+    out: &'a mut Outbox,
+    standing: &'a Standing,
+    changed: &'a mut BTreeSet<u16>,
+}
+
+impl<'a> Context<'a> {
+    pub(super) const fn new(
+        out: &'a mut Outbox,
+        standing: &'a Standing,
+        changed: &'a mut BTreeSet<u16>,
+    ) -> Self {
+        Self {
+            out,
+            standing,
+            changed,
+        }
+    }
+
+    /// The component that the service belongs to.
+    #[must_use]
+    pub const fn id(&self) -> JausId {
+        self.out.source()
+    }
+
+    /// The state of the component, and who controls it.
+    #[must_use]
+    pub const fn standing(&self) -> &Standing {
+        self.standing
+    }
+
+    /// Sends a message to one component.
+    pub fn send<M: Message>(&mut self, destination: JausId, message: &M) {
+        self.out.send(destination, message);
+    }
+
+    /// Sends octets that begin with a message code to one component.
+    pub fn send_octets(&mut self, destination: JausId, payload: Bytes) {
+        self.out.send_octets(destination, payload);
+    }
+
+    /// Answers a message: to its sender alone, however many it went to, with its priority.
+    pub fn reply<M: Message>(&mut self, to: &Received, message: &M) {
+        self.out.reply(to, message);
+    }
+
+    /// Says that the answer to the query `Q` is another now: whoever subscribed to it hears of it.
+    pub fn changed<Q: Message>(&mut self) {
+        self.changed.insert(Q::CODE);
+    }
+}

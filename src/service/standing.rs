@@ -1,0 +1,128 @@
+//! What a component is fit for now, and who may command it.
+
+use std::fmt;
+
+use crate::address::JausId;
+
+/// The state of a component, as Management reports it in Report Status (4002h).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[repr(u8)]
+pub enum State {
+    /// Getting ready; cannot be controlled yet.
+    Initialize = 0,
+    /// Acts on the commands of the client in control.
+    #[default]
+    Ready = 1,
+    /// Can be controlled, and does not act.
+    Standby = 2,
+    /// Going away.
+    Shutdown = 3,
+    /// Something is broken; only a reset or a shutdown helps.
+    Failure = 4,
+    /// Stopped by a client's emergency, until each client that set one has cleared it.
+    Emergency = 5,
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Initialize => "initialize",
+            Self::Ready => "ready",
+            Self::Standby => "standby",
+            Self::Shutdown => "shutdown",
+            Self::Failure => "failure",
+            Self::Emergency => "emergency",
+        })
+    }
+}
+
+/// Who controls a component.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Controller {
+    /// The client.
+    pub id: JausId,
+    /// Its authority code, 0 to 255; the greater one wins.
+    pub authority: u8,
+}
+
+/// The state of a component and its controller: what every service that takes commands must know.
+///
+/// A component without Management is always [`State::Ready`]; one without Access Control obeys
+/// anyone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Standing {
+    /// What the component is fit for.
+    pub state: State,
+    /// Whether commands need control at all: whether the component offers Access Control.
+    pub exclusive: bool,
+    /// The client in control, if any.
+    pub controller: Option<Controller>,
+}
+
+impl Standing {
+    /// Whether `client` may configure the component: it is in control, or nobody need be.
+    #[must_use]
+    pub fn obeys(&self, client: JausId) -> bool {
+        match self.controller {
+            Some(controller) => controller.id == client,
+            None => !self.exclusive,
+        }
+    }
+
+    /// Whether `client` may make the component act: it [may command](Self::obeys), and the component
+    /// is ready.
+    #[must_use]
+    pub fn acts_for(&self, client: JausId) -> bool {
+        self.state == State::Ready && self.obeys(client)
+    }
+
+    /// Whether the component may act at all: it is ready, and somebody is there to answer for it.
+    #[must_use]
+    pub const fn may_act(&self) -> bool {
+        matches!(self.state, State::Ready) && (self.controller.is_some() || !self.exclusive)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CLIENT: JausId = JausId::new(42, 1, 1);
+    const STRANGER: JausId = JausId::new(42, 2, 1);
+
+    fn controlled(state: State) -> Standing {
+        let controller = Controller {
+            id: CLIENT,
+            authority: 127,
+        };
+        Standing {
+            state,
+            exclusive: true,
+            controller: Some(controller),
+        }
+    }
+
+    #[test]
+    fn only_the_client_in_control_is_obeyed() {
+        let standing = controlled(State::Standby);
+        assert!(standing.obeys(CLIENT) && !standing.obeys(STRANGER));
+        let nobody = Standing {
+            exclusive: true,
+            ..Standing::default()
+        };
+        assert!(!nobody.obeys(CLIENT) && !nobody.may_act());
+    }
+
+    #[test]
+    fn a_component_acts_only_when_ready() {
+        assert!(controlled(State::Ready).acts_for(CLIENT));
+        for state in [State::Initialize, State::Standby, State::Emergency] {
+            assert!(!controlled(state).acts_for(CLIENT) && !controlled(state).may_act());
+        }
+    }
+
+    #[test]
+    fn without_access_control_anyone_is_obeyed() {
+        assert!(Standing::default().acts_for(STRANGER));
+    }
+}
