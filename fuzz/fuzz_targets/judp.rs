@@ -1,8 +1,10 @@
 //! Datagrams: reading and writing them, and an endpoint that is fed with them.
 //!
 //! The first octet chooses. 0: the rest is one datagram, whose messages must come back from writing
-//! them. Otherwise the rest is a story for an endpoint: each step is an octet that says what happens
-//! and octets that say with what. Its tables and queues are small, so that their bounds are met.
+//! them. Otherwise the rest is a story for an endpoint, and the octet's bits choose what it does
+//! beyond the usual (forwarding, packing, rate limits, fragments): each step is an octet that says
+//! what happens and octets that say with what. Its tables and queues are small, so that their bounds
+//! are met.
 #![no_main]
 
 use std::net::{Ipv4Addr, SocketAddr};
@@ -11,7 +13,9 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path};
+use jaus::endpoint::{
+    Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Pacing, Packing, Path, Rate, Rates,
+};
 use jaus::wire::{Broadcast, Flags, Frame, Kind, Priority, Version, judp};
 use libfuzzer_sys::fuzz_target;
 
@@ -19,11 +23,12 @@ use libfuzzer_sys::fuzz_target;
 static START: LazyLock<Instant> = LazyLock::new(Instant::now);
 
 const QUEUE_LIMIT: usize = 16;
+const REASSEMBLY_LIMIT: usize = 2048;
 
 fuzz_target!(|octets: &[u8]| {
     match octets.split_first() {
         Some((0, datagram)) => frames_come_back(datagram),
-        Some((_, story)) => play(story),
+        Some((&choices, story)) => play(choices, story),
         None => {}
     }
 });
@@ -117,8 +122,29 @@ impl<'a> Story<'a> {
     }
 }
 
-fn config() -> Config {
+fn config(choices: u8) -> Config {
+    let chosen = |bit: u8| choices & (1 << bit) != 0;
+    let limit = |bit| chosen(bit).then_some(Rate::new(50, 5));
     Config {
+        forwarding: chosen(0),
+        packing: if chosen(1) {
+            Packing::Within(Duration::from_millis(5))
+        } else {
+            Packing::Off
+        },
+        pacing: (!chosen(2)).then_some(Pacing {
+            burst: 4096,
+            rate: 100_000,
+        }),
+        rates: Rates {
+            new_ids: Rate::new(64, 8),
+            messages_per_address: limit(3),
+            messages_per_id: limit(4),
+        },
+        max_message: if chosen(5) { 100 } else { 4096 },
+        max_reassembly_per_sender: 1024,
+        max_reassembly: REASSEMBLY_LIMIT,
+
         max_components: 4,
         max_peers: 4,
         max_recent: 16,
@@ -129,10 +155,10 @@ fn config() -> Config {
     }
 }
 
-fn play(story: &[u8]) {
+fn play(choices: u8, story: &[u8]) {
     let mut story = Story(story);
     let mut now = *START;
-    let mut endpoint = Endpoint::new(config());
+    let mut endpoint = Endpoint::new(config(choices));
     let mine = JausId::new(1, 1, 1);
     endpoint.attach(mine).expect("the first component");
     endpoint.add_link(LinkId(0), LinkProfile::judp([]));
@@ -163,6 +189,7 @@ fn play(story: &[u8]) {
         }
         assert!(endpoint.components().count() <= 4);
         assert!(endpoint.peers().count() <= 4);
+        assert!(endpoint.unfinished() <= REASSEMBLY_LIMIT);
     }
     drain(&mut endpoint);
     settle(&mut endpoint, now);

@@ -38,6 +38,8 @@ mod slab;
 mod socket_table;
 pub mod tcp;
 pub mod udp;
+#[cfg(unix)]
+mod watch;
 
 pub use error::Error;
 pub use group::{

@@ -1,20 +1,15 @@
-//! Both halves of a Unix stream, which wait only for what they need.
-//!
-//! Whoever waits for a Unix socket to become writable is woken each time that the other side reads
-//! something, although there was room all along. With sockets that always wait for both (as
-//! tokio's do), each message wakes its sender once more, for nothing: that is half of all wake-ups
-//! of a round trip. So the socket is watched for reading alone, and a copy of it for writing only
-//! while it is full.
+//! Both halves of a Unix stream, which wait [only for what they need](crate::link::watch).
 
 use std::io::{self, ErrorKind, IoSlice, Read, Write};
 use std::net::Shutdown;
-use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 
 use tokio::io::Interest;
 use tokio::io::unix::AsyncFd;
+
+use crate::link::watch::watch;
 
 /// The half that is read.
 #[derive(Debug)]
@@ -33,17 +28,6 @@ pub(super) fn halves(stream: tokio::net::UnixStream) -> io::Result<(UnixReadHalf
     let read = watch(stream.clone(), Interest::READABLE)?;
     let full = None;
     Ok((UnixReadHalf(read), UnixWriteHalf { stream, full }))
-}
-
-/// Has the runtime watch a socket.
-#[allow(
-    deprecated,
-    reason = "the successor must be promised that the descriptor stays open as long as it is \
-              watched, by an unsafe call; an owned standard socket, which is what is watched here, \
-              keeps that promise by itself"
-)]
-fn watch<S: AsRawFd>(socket: S, interest: Interest) -> io::Result<AsyncFd<S>> {
-    AsyncFd::with_interest(socket, interest)
 }
 
 impl UnixReadHalf {

@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 use std::io::{self, IoSlice, IoSliceMut};
-use std::net::SocketAddr;
+use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::AsRawFd;
 
 use bytes::Bytes;
@@ -16,9 +16,8 @@ use nix::sys::socket::{
     ControlMessage, ControlMessageOwned, MsgFlags, MultiHeaders, RecvMsg, SockaddrStorage,
     recvmmsg, sendmsg, setsockopt, sockopt,
 };
-use tokio::io::Interest;
-use tokio::net::UdpSocket;
 
+use super::socket::Socket;
 use crate::link::Slab;
 use crate::link::slab::LONGEST;
 
@@ -71,11 +70,11 @@ pub(super) fn limit_after(error: &io::Error, segment: usize) -> Option<usize> {
 /// # Errors
 /// `WouldBlock` if nothing has arrived.
 pub(super) fn receive(
-    socket: &UdpSocket,
+    socket: &Socket,
     slab: &mut Slab,
     arrived: &mut VecDeque<(SocketAddr, Bytes)>,
 ) -> io::Result<()> {
-    let result = socket.try_io(Interest::READABLE, || {
+    let result = socket.try_read(|socket| {
         if fetch(socket, slab, arrived)? < FETCHED {
             // There is no more, and no need to ask once more to know it.
             return Err(io::ErrorKind::WouldBlock.into());

@@ -11,6 +11,7 @@ mod open;
 mod receive;
 mod send;
 mod settings;
+mod socket;
 
 use std::collections::VecDeque;
 use std::io;
@@ -18,7 +19,8 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use bytes::Bytes;
-use tokio::net::UdpSocket;
+
+use socket::Socket;
 
 pub use settings::{Broadcasts, PortTaken, Settings};
 
@@ -65,7 +67,7 @@ pub struct UdpLink {
     interface: Interface,
     local: SocketAddr,
     /// The unicast socket, which sends everything, and then those of `groups`, which only hear.
-    sockets: Vec<UdpSocket>,
+    sockets: Vec<Socket>,
     groups: Vec<SocketAddr>,
     peers: Vec<SocketAddr>,
     outbox: Backlog<send::Train>,
@@ -92,6 +94,7 @@ impl UdpLink {
         settings.validate()?;
         let unicast = open::unicast(interface, settings)?;
         let local = unicast
+            .get()
             .local_addr()
             .map_err(open::io_error("reading the local address"))?;
         let groups = settings.addresses_of_all(interface);
@@ -102,7 +105,7 @@ impl UdpLink {
         let batch = CAN_BATCH && settings.batch;
         #[cfg(all(feature = "udp-batch", target_os = "linux"))]
         if batch {
-            sockets.iter().for_each(batch::prepare);
+            sockets.iter().for_each(|socket| batch::prepare(socket.get()));
         }
         tracing::info!(%interface, %local, ?groups, "link opened");
         Ok(Self {
@@ -168,9 +171,9 @@ impl UdpLink {
         self.peers = peers;
     }
 
-    fn unicast(&self) -> &UdpSocket {
+    fn unicast(&mut self) -> &mut Socket {
         // The first, which `open` put there.
-        &self.sockets[0]
+        &mut self.sockets[0]
     }
 
     /// Warns when the kind of error is a new one, so that a broken network cannot fill a log.
@@ -186,12 +189,12 @@ impl UdpLink {
 
 /// What the socket's file descriptor links to: its number in the kernel.
 #[cfg(unix)]
-fn file(socket: &UdpSocket) -> Option<PathBuf> {
+fn file(socket: &Socket) -> Option<PathBuf> {
     use std::os::fd::AsRawFd;
-    std::fs::read_link(format!("/proc/self/fd/{}", socket.as_raw_fd())).ok()
+    std::fs::read_link(format!("/proc/self/fd/{}", socket.get().as_raw_fd())).ok()
 }
 
 #[cfg(not(unix))]
-fn file(_: &UdpSocket) -> Option<PathBuf> {
+fn file(_: &Socket) -> Option<PathBuf> {
     None
 }

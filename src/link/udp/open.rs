@@ -4,13 +4,13 @@ use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
 use socket2::{Domain, InterfaceIndexOrAddress, Protocol, Socket, Type};
-use tokio::net::UdpSocket;
 
+use super::socket::Socket as Opened;
 use super::{PortTaken, Settings};
 use crate::link::{Error, Holder, Interface};
 
 /// The socket that sends everything, bound to one address for itself alone.
-pub(super) fn unicast(interface: &Interface, settings: &Settings) -> Result<UdpSocket, Error> {
+pub(super) fn unicast(interface: &Interface, settings: &Settings) -> Result<Opened, Error> {
     let wanted = interface.at(settings.port);
     let socket = new_socket(wanted)?;
     if let Err(e) = socket.bind(&wanted.into()) {
@@ -61,7 +61,7 @@ pub(super) fn group(
     interface: &Interface,
     group: SocketAddr,
     settings: &Settings,
-) -> Result<UdpSocket, Error> {
+) -> Result<Opened, Error> {
     let socket = new_socket(group)?;
     socket
         .set_reuse_address(true)
@@ -131,7 +131,7 @@ fn new_socket(address: SocketAddr) -> Result<Socket, Error> {
     Ok(socket)
 }
 
-fn finish(socket: Socket, receive_buffer: usize) -> Result<UdpSocket, Error> {
+fn finish(socket: Socket, receive_buffer: usize) -> Result<Opened, Error> {
     // Linux answers with twice the size in force: the other half is its own bookkeeping.
     let granted = socket
         .set_recv_buffer_size(receive_buffer)
@@ -148,7 +148,7 @@ fn finish(socket: Socket, receive_buffer: usize) -> Result<UdpSocket, Error> {
     }
     socket
         .set_nonblocking(true)
-        .and_then(|()| UdpSocket::from_std(socket.into()))
+        .and_then(|()| Opened::new(socket.into()))
         .map_err(io_error("handing the socket to the runtime"))
 }
 

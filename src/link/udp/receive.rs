@@ -53,7 +53,7 @@ impl UdpLink {
             match self.fetch(socket, slab) {
                 Ok(()) => return Poll::Ready(()),
                 Err(e) if e.kind() == io::ErrorKind::WouldBlock => {
-                    if ready!(self.sockets[socket].poll_recv_ready(cx)).is_err() {
+                    if ready!(self.sockets[socket].poll_read_ready(cx)).is_err() {
                         // The runtime is shutting down.
                         return Poll::Pending;
                     }
@@ -76,7 +76,9 @@ impl UdpLink {
         if self.batch {
             return super::batch::receive(socket, slab, &mut self.arrived);
         }
-        let ((_, peer), datagram) = slab.receive(|free| socket.try_recv_buf_from(free))?;
+        let room = slab.room_for(1);
+        let (octets, peer) = socket.try_recv(room)?;
+        let datagram = Bytes::copy_from_slice(room.get(..octets).unwrap_or_default());
         self.arrived.push_back((peer, datagram));
         Ok(())
     }

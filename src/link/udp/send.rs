@@ -6,9 +6,8 @@ use std::task::{Context, Poll, ready};
 
 use bytes::{Buf, Bytes};
 use socket2::SockRef;
-use tokio::io::Interest;
-use tokio::net::UdpSocket;
 
+use super::socket::Socket;
 use super::{LONGEST_TRAIN, UdpLink};
 use crate::endpoint::{Remote, To, Transmit};
 use crate::wire::Priority;
@@ -71,7 +70,7 @@ impl UdpLink {
             octets: octets.clone(),
             segment: segment.unwrap_or(octets.len()).max(1),
         };
-        if !self.outbox.is_empty() || !self.try_send(&mut train, Way::Straight) {
+        if !self.outbox.is_empty() || !self.try_send(&mut train) {
             let octets = train.octets.len();
             self.counters.send_overflows += self.outbox.push(priority, octets, train);
         }
@@ -80,28 +79,29 @@ impl UdpLink {
     /// Sends what waits for the network; ready when nothing waits.
     pub fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         while let Some(mut train) = self.outbox.first().cloned() {
-            if self.try_send(&mut train, Way::WhenReady) {
+            if self.try_send(&mut train) {
                 self.outbox.pop();
                 continue;
             }
             if let Some(first) = self.outbox.first_mut() {
                 *first = train;
             }
-            if ready!(self.unicast().poll_send_ready(cx)).is_err() {
+            if ready!(self.unicast().poll_room(cx)).is_err() {
                 // The runtime is shutting down.
                 return Poll::Ready(());
             }
         }
+        self.unicast().rest();
         Poll::Ready(())
     }
 
     /// Whether all of the train is dealt with: sent, or refused for good. `false` is "not now",
     /// and then what is left of it is what was not sent.
-    fn try_send(&mut self, train: &mut Train, way: Way) -> bool {
+    fn try_send(&mut self, train: &mut Train) -> bool {
         loop {
             let part = train.part(self.train_limit);
             let datagrams = part.len().div_ceil(train.segment) as u64;
-            match way.send(self.unicast(), train.peer, part, train.segment) {
+            match send(self.unicast(), train.peer, part, train.segment) {
                 Ok(octets) => {
                     self.counters.sent += datagrams;
                     self.counters.sent_octets += octets as u64;
@@ -159,37 +159,15 @@ impl Train {
     }
 }
 
-/// How the socket is used.
-#[derive(Clone, Copy)]
-enum Way {
-    /// Without asking the runtime, which learns that a new socket can send only later.
-    Straight,
-    /// If the runtime says that it is ready, and telling it when it is not.
-    WhenReady,
-}
-
-impl Way {
-    fn send(
-        self,
-        socket: &UdpSocket,
-        peer: SocketAddr,
-        part: &[u8],
-        segment: usize,
-    ) -> io::Result<usize> {
-        #[cfg(not(all(feature = "udp-batch", target_os = "linux")))]
-        let _ = segment;
-        let send = || {
-            #[cfg(all(feature = "udp-batch", target_os = "linux"))]
-            if part.len() > segment {
-                // Longer ones make no trains: see `MOST_OCTETS`.
-                let segment = u16::try_from(segment).unwrap_or(u16::MAX);
-                return super::batch::send(socket, peer, part, segment);
-            }
-            SockRef::from(socket).send_to(part, &peer.into())
-        };
-        match self {
-            Self::Straight => send(),
-            Self::WhenReady => socket.try_io(Interest::WRITABLE, send),
-        }
+/// Sends what leaves with one call.
+fn send(socket: &Socket, peer: SocketAddr, part: &[u8], segment: usize) -> io::Result<usize> {
+    #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+    if part.len() > segment {
+        // Longer ones make no trains: see `MOST_OCTETS`.
+        let segment = u16::try_from(segment).unwrap_or(u16::MAX);
+        return super::batch::send(socket.get(), peer, part, segment);
     }
+    #[cfg(not(all(feature = "udp-batch", target_os = "linux")))]
+    let _ = segment;
+    SockRef::from(socket.get()).send_to(part, &peer.into())
 }
