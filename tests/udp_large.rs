@@ -10,6 +10,7 @@
     reason = "a test with sockets"
 )]
 
+use std::collections::BTreeSet;
 use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
@@ -111,4 +112,35 @@ async fn sixteen_mebibytes_with_acknowledgement_arrive_through_usual_buffers() {
         }
     };
     tokio::time::timeout(LIMIT, told).await.expect("no result");
+}
+
+/// More than a mailbox holds.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_was_acknowledged_is_not_dropped_when_the_receiver_is_slow() {
+    let (_nodes, [sender, mut receiver]) = pair(None).await;
+    const MESSAGES: usize = 40;
+    let payloads: Vec<Bytes> = (0..MESSAGES).map(|number| image(1 << 20, number)).collect();
+    let mut sent = Vec::new();
+    for payload in &payloads {
+        let message = message(&sender, &receiver, payload.clone());
+        let sender = sender.sender();
+        sent.push(tokio::spawn(async move { sender.deliver(message).await }));
+    }
+    // The mailbox is full, and more wants to come, before anything is read.
+    sent.remove(0).await.unwrap().expect("the first has room");
+    let mut received = Vec::new();
+    while received.len() < MESSAGES {
+        received.push(receive(&mut receiver).await);
+        tokio::task::yield_now().await;
+    }
+    for result in sent {
+        result.await.unwrap().expect("all is read in the end");
+    }
+    let all = |payloads: &[Bytes]| {
+        payloads
+            .iter()
+            .map(|payload| payload[0])
+            .collect::<BTreeSet<_>>()
+    };
+    assert_eq!(all(&received), all(&payloads), "each once");
 }

@@ -90,6 +90,9 @@ counters! {
     /// Dropped: a message from an id that was not known, while the table is full of peers in
     /// conversation with us.
     PeersFull = "dropped: no room for another peer",
+    /// Dropped, and not acknowledged: a message for a component that has no room for it, which its
+    /// sender will repeat.
+    ReceiverBusy = "dropped: receiver busy, not acknowledged",
     /// Not sent: an acknowledgement to a stranger who asked for more octets than it sent.
     AcknowledgementsWithheld = "acknowledgements withheld from strangers",
     /// Not forwarded: a broadcast that did not come by the way that leads to its sender.

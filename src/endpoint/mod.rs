@@ -173,6 +173,13 @@ impl Endpoint {
         self.conflicts.remove(&id);
     }
 
+    /// Says that a local component has no room for more, or has it again. Messages for it that want
+    /// an acknowledgement are left alone meanwhile, not even acknowledged, so that their senders
+    /// try again; the others are delivered, for the owner to drop.
+    pub fn set_busy(&mut self, id: JausId, busy: bool) {
+        self.components.set_busy(id, busy);
+    }
+
     /// The attached components, in order of their ids.
     pub fn components(&self) -> impl Iterator<Item = JausId> + '_ {
         self.components.iter()

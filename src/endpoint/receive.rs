@@ -124,7 +124,12 @@ impl Endpoint {
                     self.peers.note_answer(frame.source);
                     return Ok(());
                 }
-                Acknowledgement::Request => self.acknowledge_within_limits(from, frame),
+                Acknowledgement::Request => {
+                    if receivers.iter().any(|id| self.components.is_busy(id)) {
+                        return Err(Counter::ReceiverBusy);
+                    }
+                    self.acknowledge_within_limits(from, frame);
+                }
                 Acknowledgement::None => {}
             }
         }

@@ -4,7 +4,7 @@
 //! the endpoint in its own task, up to the socket, and is told at once what is wrong; nothing is
 //! queued in between. Receiving and waiting is the [driver](super::driver)'s.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant};
@@ -81,6 +81,8 @@ pub(super) struct Core {
     /// Gone when the node has stopped, which ends the listeners' streams.
     events: Option<broadcast::Sender<Event>>,
     slab: Slab,
+    /// Components that do not read in time: nothing is acknowledged in their name until they do.
+    busy: BTreeSet<JausId>,
     /// Messages sent since the last [`pump`](Self::pump).
     gathered: usize,
     driver: Option<Waker>,
@@ -101,6 +103,7 @@ impl Core {
             limits,
             events: Some(broadcast::Sender::new(EVENTS)),
             slab: Slab::new(),
+            busy: BTreeSet::new(),
             gathered: 0,
             driver: None,
             follow_at,
@@ -273,10 +276,26 @@ impl Core {
         transmitted
     }
 
-    fn deliver(&self, message: Received) {
-        if let Some(mailbox) = self.mailboxes.get(&message.to) {
-            mailbox.push(message);
+    fn deliver(&mut self, message: Received) {
+        let to = message.to;
+        let Some(mailbox) = self.mailboxes.get(&to) else {
+            return;
+        };
+        if !mailbox.push(message) && self.busy.insert(to) {
+            self.endpoint.set_busy(to, true);
         }
+    }
+
+    /// Finds out who has read what waited for it.
+    fn look_after_the_busy(&mut self) {
+        let (endpoint, mailboxes) = (&mut self.endpoint, &self.mailboxes);
+        self.busy.retain(|&id| {
+            let busy = mailboxes.get(&id).is_some_and(|m| !m.is_half_empty());
+            if !busy {
+                endpoint.set_busy(id, false);
+            }
+            busy
+        });
     }
 
     fn announce(&self, news: Event) {
@@ -288,6 +307,7 @@ impl Core {
 
     /// Takes in what has arrived; whether a link had more than its share.
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
+        self.look_after_the_busy();
         let mut more = false;
         for (id, link) in self.links.iter_mut() {
             more |= link.receive(cx, now, id, &mut self.slab, &mut self.endpoint);

@@ -66,6 +66,25 @@ fn an_offer_of_header_compression_is_acknowledged_without_it() {
 }
 
 #[test]
+fn a_request_to_a_busy_component_is_left_alone_until_it_has_room() {
+    let mut rig = Rig::new();
+    rig.endpoint.set_busy(US, true);
+    rig.hear(&request());
+    assert!(rig.sent().is_empty() && rig.received().is_empty());
+    assert_eq!(rig.count(Counter::ReceiverBusy), 1);
+    let without = Frame {
+        flags: Flags::default(),
+        sequence: 8,
+        ..request()
+    };
+    rig.hear(&without);
+    assert_eq!(rig.received().len(), 1, "nobody would repeat this one");
+    rig.endpoint.set_busy(US, false);
+    rig.hear(&request());
+    assert_eq!((rig.sent().len(), rig.received().len()), (1, 1));
+}
+
+#[test]
 fn a_request_to_many_is_not_acknowledged() {
     let mut rig = Rig::new();
     rig.hear(&Frame {

@@ -105,7 +105,9 @@ impl UdpLink {
         let batch = CAN_BATCH && settings.batch;
         #[cfg(all(feature = "udp-batch", target_os = "linux"))]
         if batch {
-            sockets.iter().for_each(|socket| batch::prepare(socket.get()));
+            sockets
+                .iter()
+                .for_each(|socket| batch::prepare(socket.get()));
         }
         tracing::info!(%interface, %local, ?groups, "link opened");
         Ok(Self {

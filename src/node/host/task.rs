@@ -175,15 +175,17 @@ fn take_up(line: &Line, attached: Attached) -> Connection {
 
 fn handle(line: &Line, reply: Reply) -> Result<(), RecordError> {
     match reply {
-        Reply::Deliver(delivery) => line.mailbox.push(Received {
-            source: delivery.source,
-            destination: delivery.destination,
-            priority: delivery.priority,
-            broadcast: delivery.broadcast,
-            payload: delivery.payload,
-            path: delivery.path,
-            to: line.id(),
-        }),
+        Reply::Deliver(delivery) => {
+            line.mailbox.push(Received {
+                source: delivery.source,
+                destination: delivery.destination,
+                priority: delivery.priority,
+                broadcast: delivery.broadcast,
+                payload: delivery.payload,
+                path: delivery.path,
+                to: line.id(),
+            });
+        }
         Reply::Welcome(_) | Reply::Refused(_) => return Err(RecordError::Stranger),
         outcome => line.handle_outcome(outcome),
     }
