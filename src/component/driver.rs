@@ -8,6 +8,7 @@ use std::time::Instant;
 use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot, watch};
 
+use super::clients::{Clients, Goodbye, Hold};
 use super::watch::Outlet;
 use crate::address::JausId;
 use crate::endpoint::Received;
@@ -23,6 +24,8 @@ pub(super) enum Command {
         report: u16,
         reply: oneshot::Sender<Answer>,
     },
+    /// To have something that lasts.
+    Hold(Hold),
     /// To offer one more service.
     Offer(Box<dyn Service>),
     /// To offer one less.
@@ -58,6 +61,8 @@ pub(super) struct Driver {
     publisher: Publisher,
     patience: Patience,
     waiting: HashMap<Inquiry, oneshot::Sender<Answer>>,
+    clients: Clients,
+    goodbyes: mpsc::UnboundedReceiver<Goodbye>,
 }
 
 impl Driver {
@@ -68,6 +73,7 @@ impl Driver {
         publisher: Publisher,
         patience: Patience,
     ) -> Self {
+        let (bid, goodbyes) = mpsc::unbounded_channel();
         Self {
             stack,
             port,
@@ -75,6 +81,8 @@ impl Driver {
             publisher,
             patience,
             waiting: HashMap::new(),
+            clients: Clients::new(bid),
+            goodbyes,
         }
     }
 
@@ -91,8 +99,11 @@ impl Driver {
                 },
                 command = self.inbox.recv() => match command {
                     Some(command) => self.obey(command),
-                    None => return,
+                    None => return self.take_leave(),
                 },
+                Some(goodbye) = self.goodbyes.recv() => {
+                    self.clients.part(&mut self.stack, goodbye);
+                }
                 () = sleep_until(wake) => self.stack.handle_timeout(Instant::now()),
             }
             self.settle();
@@ -120,11 +131,18 @@ impl Driver {
                     }
                 }
             }
+            Command::Hold(hold) => self.hold(hold),
             Command::Offer(service) => self.stack.offer(Instant::now(), service),
             Command::Withdraw(urn) => {
-                self.stack.withdraw(urn);
+                self.stack.withdraw(Instant::now(), urn);
             }
         }
+    }
+
+    /// Gives back what others keep for this component.
+    fn take_leave(&mut self) {
+        self.stack.take_leave(Instant::now());
+        self.settle();
     }
 
     /// Carries out whatever the services want.
@@ -149,6 +167,8 @@ impl Driver {
                         let _ = reply.send(answer);
                     }
                 }
+                Event::Subscription(id, news) => self.clients.tell_subscriber(id, news),
+                Event::Control(id, news) => self.clients.tell_controller(id, news),
                 Event::Message(message) => self.publisher.messages.send(message),
             }
         }
@@ -159,14 +179,19 @@ impl Driver {
         Arc::new(self.stack.directory().clone())
     }
 
-    /// Sends everything; tells the first error.
+    fn hold(&mut self, hold: Hold) {
+        let Self {
+            stack,
+            port,
+            clients,
+            patience,
+            ..
+        } = self;
+        clients.obey(stack, hold, *patience, |stack| transmit(stack, port));
+    }
+
     fn transmit(&mut self) -> Result<(), node::SendError> {
-        let mut result = Ok(());
-        while let Some(message) = self.stack.poll_transmit() {
-            let sent = self.port.send(message).map(|_| ());
-            result = result.and(sent);
-        }
-        result
+        transmit(&mut self.stack, &self.port)
     }
 
     /// Gives up the questions whose askers have gone away.
@@ -178,7 +203,18 @@ impl Driver {
             }
             !reply.is_closed()
         });
+        self.clients.forget_the_impatient(stack);
     }
+}
+
+/// Sends everything; tells the first error.
+fn transmit(stack: &mut Stack, port: &Port) -> Result<(), node::SendError> {
+    let mut result = Ok(());
+    while let Some(message) = stack.poll_transmit() {
+        let sent = port.send(message).map(|_| ());
+        result = result.and(sent);
+    }
+    result
 }
 
 async fn sleep_until(wake: Option<Instant>) {

@@ -5,14 +5,18 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::{mpsc, oneshot, watch};
 
+use super::clients::{Hold, NotControlled, NotSubscribed};
 use super::driver::{Answer, Command};
 use super::watch::Outlet;
-use super::{Builder, DeliverError, FindError, Messages, QueryError, SendError, Watch};
+use super::{
+    Builder, Control, ControlError, DeliverError, FindError, Messages, QueryError, SendError,
+    SubscribeError, Subscription, Watch,
+};
 use crate::address::JausId;
-use crate::codec::Message;
+use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::node;
-use crate::service::{Change, Directory, Kind, Service};
+use crate::service::{Change, Directory, Kind, Offer, Service, Topic, When};
 
 /// A component that lives on a node. Cheap to clone; it stops when the last clone is dropped.
 #[derive(Debug, Clone)]
@@ -41,6 +45,8 @@ impl Shared {
 impl Component {
     /// How long [`find`](Self::find) looks before it gives up.
     pub const FIND_LIMIT: Duration = Duration::from_secs(10);
+    /// How many services of other versions a [`FindError`] names.
+    const MOST_INSTEAD: usize = 8;
 
     /// A new component: what the subsystem is, and what it is called.
     pub fn builder(kind: Kind, name: impl Into<String>) -> Builder {
@@ -141,6 +147,77 @@ impl Component {
         }
     }
 
+    /// Has a component answer a query again and again, and waits until it confirms that.
+    ///
+    /// The subscription then lasts until it is dropped, whatever becomes of the peer; see
+    /// [`Subscription`]. A peer that answers queries but does not offer the service Events
+    /// cannot be subscribed to.
+    ///
+    /// # Errors
+    /// [`SubscribeError`] says what the peer has against it, or how long it was silent.
+    pub async fn subscribe<R: Message, Q: Message>(
+        &self,
+        peer: JausId,
+        query: &Q,
+        when: When,
+    ) -> Result<Subscription<R>, SubscribeError> {
+        let query_name = Q::NAME;
+        let impossible = |source| SubscribeError::Impossible {
+            peer,
+            query: query_name,
+            source,
+        };
+        let topic = Topic {
+            peer,
+            query: query.encode().map_err(|error| impossible(error.into()))?,
+            report: R::CODE,
+            when,
+        };
+        let subscribed = self.hold(|reply| Hold::Subscribe { topic, reply }).await;
+        match subscribed.ok_or(SubscribeError::Stopped)? {
+            Ok((ticket, feed)) => Ok(Subscription::new(ticket, self.clone(), peer, feed)),
+            Err(NotSubscribed::Impossible(source)) => Err(impossible(source)),
+            Err(NotSubscribed::Ended(source)) => Err(SubscribeError::Ended {
+                peer,
+                query: Q::NAME,
+                source,
+            }),
+            Err(NotSubscribed::NotSent(error)) => Err(SubscribeError::NotSent {
+                peer,
+                query: Q::NAME,
+                source: error.into(),
+            }),
+        }
+    }
+
+    /// Takes control of a component, and waits until it grants that. An `authority` is from 0 to
+    /// 255; the greater one wins.
+    ///
+    /// # Errors
+    /// [`ControlError`] says why control was not granted, or how long the peer was silent.
+    pub async fn control(&self, peer: JausId, authority: u8) -> Result<Control, ControlError> {
+        let controlled = self
+            .hold(|reply| Hold::Control {
+                peer,
+                authority,
+                reply,
+            })
+            .await;
+        match controlled.ok_or(ControlError::Stopped)? {
+            Ok((ticket, condition)) => Ok(Control::new(ticket, self.clone(), peer, condition)),
+            Err(NotControlled::Refused(why)) => Err(ControlError::Refused { peer, why }),
+            Err(NotControlled::NotSent(error)) => Err(SendError::from(error).into()),
+        }
+    }
+
+    /// Has the component's task carry something out; `None` when it has stopped.
+    async fn hold<T>(&self, hold: impl FnOnce(oneshot::Sender<T>) -> Hold) -> Option<T> {
+        let (reply, answer) = oneshot::channel();
+        let command = Command::Hold(hold(reply));
+        self.shared.commands.send(command).await.ok()?;
+        answer.await.ok()
+    }
+
     /// Waits until another component is known that offers a service, in whatever version, for at
     /// most [`FIND_LIMIT`](Self::FIND_LIMIT). Which version it is stands in the
     /// [`directory`](Self::directory).
@@ -156,28 +233,62 @@ impl Component {
     /// # Errors
     /// [`FindError`] says how long it was looked for.
     pub async fn find_within(&self, urn: &str, limit: Duration) -> Result<JausId, FindError> {
+        self.search(urn, None, limit).await
+    }
+
+    /// Waits until another component is known that offers a service in a version that a client
+    /// made for `wanted` can use: the same major version, and no older minor one.
+    ///
+    /// # Errors
+    /// [`FindError`] says how long it was looked for, and who offers other versions.
+    pub async fn find_version(
+        &self,
+        wanted: ServiceId,
+        limit: Duration,
+    ) -> Result<JausId, FindError> {
+        self.search(wanted.urn, Some(wanted), limit).await
+    }
+
+    async fn search(
+        &self,
+        urn: &str,
+        wanted: Option<ServiceId>,
+        limit: Duration,
+    ) -> Result<JausId, FindError> {
         let start = Instant::now();
         let own = self.id();
+        let serves = |offer: &Offer| match wanted {
+            Some(wanted) => offer.serves(wanted),
+            None => offer.urn == urn,
+        };
         let found = |directory: &Directory| {
-            directory
-                .offering(urn)
-                .map(|component| component.id)
-                .find(|id| *id != own)
+            let mut others = directory.components().filter(|it| it.id != own);
+            let found = others.find(|it| it.offered().any(serves));
+            found.map(|component| component.id)
         };
         let mut directories = self.shared.directories.clone();
         let known = directories.wait_for(|directory| found(directory).is_some());
         match tokio::time::timeout(limit, known).await {
             Ok(Ok(directory)) => found(&directory).ok_or(FindError::Stopped),
             Ok(Err(_)) => Err(FindError::Stopped),
-            Err(_) => {
-                let others = self.directory().len().saturating_sub(1);
-                let service = urn.to_owned();
-                Err(FindError::NotFound {
-                    service,
-                    waited: start.elapsed(),
-                    others,
-                })
-            }
+            Err(_) => Err(self.not_found(urn, wanted, start.elapsed())),
+        }
+    }
+
+    fn not_found(&self, urn: &str, wanted: Option<ServiceId>, waited: Duration) -> FindError {
+        let directory = self.directory();
+        let others = directory.components().filter(|it| it.id != self.id());
+        let offers = others.flat_map(|it| it.offered().map(move |offer| (it.id, offer)));
+        FindError::NotFound {
+            service: wanted
+                .map_or_else(|| urn.to_owned(), |wanted| Offer::from(wanted).to_string()),
+            waited,
+            others: directory.len().saturating_sub(1),
+            instead: offers
+                .filter(|(_, offer)| offer.urn == urn)
+                .map(|(id, offer)| (id, offer.clone()))
+                .take(Self::MOST_INSTEAD)
+                .collect(),
         }
     }
 

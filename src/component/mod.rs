@@ -38,16 +38,25 @@
 )]
 
 mod builder;
+mod clients;
+mod control;
 mod driver;
 mod error;
+mod feed;
 mod handle;
+mod subscription;
 mod watch;
 
 pub use crate::service::{
-    Change, Directory, Handlers, Identification, Kind, Level, Liveness, Loss, Offer, Patience,
-    Scope, Service, Timing,
+    CannotSubscribe, Change, ControlLost, ControlRefused, Directory, Handlers, Identification,
+    Kind, Level, Liveness, Loss, Offer, Outage, Patience, Rejection, Scope, Service,
+    SubscriptionEnd, Timing, When,
 };
 pub use builder::{AttachError, Builder};
-pub use error::{DeliverError, FindError, QueryError, SendError};
+pub use control::Control;
+pub use error::{
+    ControlError, DeliverError, FindError, ManageError, QueryError, SendError, SubscribeError,
+};
 pub use handle::Component;
+pub use subscription::{Subscription, Update};
 pub use watch::{Messages, Watch};

@@ -11,6 +11,7 @@
 //! | [`Discovery`] | says who we are, finds out who the others are, keeps the [`Directory`] |
 //! | [`Handlers`] | whatever an application offers, one function per message |
 
+mod client;
 mod context;
 mod directory;
 mod discovery;
@@ -27,6 +28,10 @@ use std::time::Instant;
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 
+pub use client::{
+    CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Outage, Rejection,
+    SubscriptionEnd, SubscriptionId, SubscriptionNews, Topic, When,
+};
 pub use context::Context;
 pub use directory::{Component, Directory, Identification, Kind, Level, Node, Offer, Subsystem};
 pub use discovery::{Change, Discovery, Loss, Profile, Scope, Timing};

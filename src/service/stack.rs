@@ -5,10 +5,12 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
+use super::client::{Controls, Subscriptions};
 use super::inquiries::Inquiries;
 use super::{
-    Change, Context, Directory, Discovery, Handled, Inquiry, NoAnswer, Outbox, Patience, Service,
-    Standing,
+    CannotSubscribe, Change, Context, ControlId, ControlNews, ControlRefused, Directory, Discovery,
+    Handled, Inquiry, NoAnswer, Outbox, Patience, Service, Standing, SubscriptionId,
+    SubscriptionNews, Topic,
 };
 use crate::address::JausId;
 use crate::codec::Message;
@@ -21,6 +23,8 @@ pub struct Stack {
     standing: Standing,
     changed: BTreeSet<u16>,
     inquiries: Inquiries,
+    subscriptions: Subscriptions,
+    controls: Controls,
     out: Outbox,
     events: VecDeque<Event>,
 }
@@ -32,6 +36,10 @@ pub enum Event {
     Change(Change),
     /// A question has been answered, or nobody will.
     Answer(Inquiry, Result<Bytes, NoAnswer>),
+    /// Something has become of a subscription.
+    Subscription(SubscriptionId, SubscriptionNews),
+    /// Something has become of the control over a peer.
+    Control(ControlId, ControlNews),
     /// A message that no service wanted.
     Message(Received),
 }
@@ -49,6 +57,8 @@ impl Stack {
             standing: Standing::default(),
             changed: BTreeSet::new(),
             inquiries: Inquiries::default(),
+            subscriptions: Subscriptions::default(),
+            controls: Controls::default(),
             out,
             events: VecDeque::new(),
         }
@@ -76,6 +86,9 @@ impl Stack {
         self.discovery.hear(now, message.source);
         let answered = self.inquiries.handle_message(now, message, &mut self.out);
         let mut handled = self.discovery.handle_message(now, message, &mut self.out);
+        if handled == Handled::No {
+            handled = self.handle_as_client(now, message);
+        }
         for service in &mut self.services {
             if handled == Handled::Yes {
                 break;
@@ -83,7 +96,7 @@ impl Stack {
             let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
             handled = service.handle_message(now, message, &mut context);
         }
-        self.collect();
+        self.collect(now);
         match answered {
             Some(inquiry) => {
                 self.events
@@ -93,6 +106,19 @@ impl Stack {
                 self.events.push_back(Event::Message(message.clone()));
             }
             None => {}
+        }
+    }
+
+    fn handle_as_client(&mut self, now: Instant, message: &Received) -> Handled {
+        let Self {
+            subscriptions,
+            controls,
+            out,
+            ..
+        } = self;
+        match subscriptions.handle_message(now, message, out) {
+            Handled::Yes => Handled::Yes,
+            Handled::No => controls.handle_message(now, message, out),
         }
     }
 
@@ -130,26 +156,75 @@ impl Stack {
         self.inquiries.cancel(now, inquiry, &mut self.out);
     }
 
+    /// Subscribes to a peer's reports. [`Event::Subscription`] tells what becomes of it, first of
+    /// all whether the peer confirms; `patience` is for that.
+    ///
+    /// # Errors
+    /// If there is nothing that could be asked for.
+    pub fn subscribe(
+        &mut self,
+        now: Instant,
+        topic: &Topic,
+        patience: Patience,
+    ) -> Result<SubscriptionId, CannotSubscribe> {
+        self.subscriptions
+            .subscribe(now, topic, patience, &mut self.out)
+    }
+
+    /// Ends a subscription.
+    pub fn unsubscribe(&mut self, now: Instant, subscription: SubscriptionId) {
+        self.subscriptions
+            .unsubscribe(now, subscription, &mut self.out);
+    }
+
+    /// Asks for control of a peer and keeps it. [`Event::Control`] tells whether it was granted,
+    /// and when it is lost.
+    ///
+    /// # Errors
+    /// If it cannot even be asked for.
+    pub fn request_control(
+        &mut self,
+        now: Instant,
+        peer: JausId,
+        authority: u8,
+        patience: Patience,
+    ) -> Result<ControlId, ControlRefused> {
+        self.controls
+            .request(now, peer, authority, patience, &mut self.out)
+    }
+
+    /// Gives control back, or what was asked for up.
+    pub fn release_control(&mut self, now: Instant, control: ControlId) {
+        self.controls.release(now, control, &mut self.out);
+    }
+
+    /// Ends all subscriptions and gives back all control, with one word each: the component stops
+    /// before there could be an answer.
+    pub fn take_leave(&mut self, now: Instant) {
+        self.subscriptions.farewell(now, &mut self.out);
+        self.controls.farewell(now, &mut self.out);
+    }
+
     /// Adds a service while the component runs, and tells the peers.
     pub fn offer(&mut self, now: Instant, service: Box<dyn Service>) {
         self.services.push(service);
-        self.publish_offers();
+        self.publish_offers(now);
         self.wake(now);
     }
 
     /// Takes a service back, whatever its version, and tells the peers. Says whether it was there.
-    pub fn withdraw(&mut self, urn: &str) -> bool {
+    pub fn withdraw(&mut self, now: Instant, urn: &str) -> bool {
         let before = self.services.len();
         self.services
             .retain(|service| service.offers().iter().all(|id| id.urn != urn));
-        self.publish_offers();
+        self.publish_offers(now);
         self.services.len() < before
     }
 
-    fn publish_offers(&mut self) {
+    fn publish_offers(&mut self, now: Instant) {
         let offers = self.services.iter().flat_map(|service| service.offers());
         self.discovery.set_offers(offers, &mut self.out);
-        self.collect();
+        self.collect(now);
     }
 
     /// The next message to send.
@@ -172,6 +247,8 @@ impl Stack {
         services
             .chain(self.discovery.poll_timeout())
             .chain(self.inquiries.poll_timeout())
+            .chain(self.subscriptions.poll_timeout())
+            .chain(self.controls.poll_timeout())
             .min()
     }
 
@@ -182,15 +259,25 @@ impl Stack {
             service.handle_timeout(now, &mut context);
         }
         self.inquiries.handle_timeout(now, &mut self.out);
-        self.collect();
+        self.subscriptions.handle_timeout(now, &mut self.out);
+        self.controls.handle_timeout(now, &mut self.out);
+        self.collect(now);
     }
 
-    fn collect(&mut self) {
+    fn collect(&mut self, now: Instant) {
         while let Some(change) = self.discovery.poll_change() {
+            self.subscriptions.handle_change(now, &change);
             self.events.push_back(Event::Change(change));
         }
         while let Some((inquiry, failure)) = self.inquiries.poll_failure() {
             self.events.push_back(Event::Answer(inquiry, Err(failure)));
+        }
+        while let Some((subscription, news)) = self.subscriptions.poll_news() {
+            self.events
+                .push_back(Event::Subscription(subscription, news));
+        }
+        while let Some((control, news)) = self.controls.poll_news() {
+            self.events.push_back(Event::Control(control, news));
         }
     }
 }

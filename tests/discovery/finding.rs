@@ -222,7 +222,8 @@ fn a_service_that_is_offered_or_withdrawn_later_is_noticed_at_once() {
         .stack(vehicle)
         .offer(now, Box::new(Handlers::new(CAMERA)));
     assert!(offered(&mut world));
-    assert!(world.stack(vehicle).withdraw(CAMERA.urn));
+    let now = world.now;
+    assert!(world.stack(vehicle).withdraw(now, CAMERA.urn));
     assert!(!offered(&mut world));
 }
 

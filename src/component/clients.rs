@@ -1,0 +1,233 @@
+//! The part of a component's task that serves subscriptions and control: it passes on what becomes
+//! of them to whoever holds them.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use tokio::sync::{mpsc, oneshot, watch};
+
+use super::control::Condition;
+use super::feed::Feed;
+use crate::address::JausId;
+use crate::node;
+use crate::service::{
+    CannotSubscribe, ControlId, ControlNews, ControlRefused, Patience, Stack, SubscriptionEnd,
+    SubscriptionId, SubscriptionNews, Topic,
+};
+
+/// A wish for something that lasts.
+pub(super) enum Hold {
+    /// Reports, again and again.
+    Subscribe {
+        topic: Topic,
+        reply: oneshot::Sender<Subscribed>,
+    },
+    /// Control over a peer.
+    Control {
+        peer: JausId,
+        authority: u8,
+        reply: oneshot::Sender<Controlled>,
+    },
+}
+
+/// Something that is not wanted any more.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Goodbye {
+    Subscription(SubscriptionId),
+    Control(ControlId),
+}
+
+/// Says goodbye when it is dropped, wherever that happens.
+#[derive(Debug)]
+pub(super) struct Ticket {
+    goodbye: Goodbye,
+    /// As long as the bound on what can be held, because each ticket has one word to say.
+    goodbyes: mpsc::UnboundedSender<Goodbye>,
+}
+
+impl Drop for Ticket {
+    fn drop(&mut self) {
+        // An error means that the component has stopped, and took leave then.
+        let _ = self.goodbyes.send(self.goodbye);
+    }
+}
+
+/// What has become of a wish for a subscription.
+pub(super) type Subscribed = Result<(Ticket, Arc<Feed>), NotSubscribed>;
+
+/// Why there is none.
+pub(super) enum NotSubscribed {
+    Impossible(CannotSubscribe),
+    Ended(SubscriptionEnd),
+    NotSent(node::SendError),
+}
+
+/// What has become of a wish for control.
+pub(super) type Controlled = Result<(Ticket, watch::Receiver<Condition>), NotControlled>;
+
+/// Why there is none.
+pub(super) enum NotControlled {
+    Refused(ControlRefused),
+    NotSent(node::SendError),
+}
+
+/// Everything that somebody holds or waits for.
+pub(super) struct Clients {
+    goodbyes: mpsc::UnboundedSender<Goodbye>,
+    subscribing: HashMap<SubscriptionId, oneshot::Sender<Subscribed>>,
+    feeds: HashMap<SubscriptionId, Arc<Feed>>,
+    asking: HashMap<ControlId, oneshot::Sender<Controlled>>,
+    controls: HashMap<ControlId, watch::Sender<Condition>>,
+}
+
+impl Clients {
+    /// With the way on which goodbyes come back to [`part`](Self::part).
+    pub(super) fn new(goodbyes: mpsc::UnboundedSender<Goodbye>) -> Self {
+        Self {
+            goodbyes,
+            subscribing: HashMap::new(),
+            feeds: HashMap::new(),
+            asking: HashMap::new(),
+            controls: HashMap::new(),
+        }
+    }
+
+    fn ticket(&self, goodbye: Goodbye) -> Ticket {
+        Ticket {
+            goodbye,
+            goodbyes: self.goodbyes.clone(),
+        }
+    }
+
+    /// Begins what is wanted; `transmit` sends what the stack then has to say.
+    pub(super) fn obey(
+        &mut self,
+        stack: &mut Stack,
+        hold: Hold,
+        patience: Patience,
+        transmit: impl FnOnce(&mut Stack) -> Result<(), node::SendError>,
+    ) {
+        match hold {
+            Hold::Subscribe { topic, reply } => {
+                let id = match stack.subscribe(Instant::now(), &topic, patience) {
+                    Ok(id) => id,
+                    // Here and below: whoever asked may have gone away.
+                    Err(error) => {
+                        let _ = reply.send(Err(NotSubscribed::Impossible(error)));
+                        return;
+                    }
+                };
+                match transmit(stack) {
+                    Ok(()) => {
+                        self.subscribing.insert(id, reply);
+                    }
+                    Err(error) => {
+                        stack.unsubscribe(Instant::now(), id);
+                        let _ = reply.send(Err(NotSubscribed::NotSent(error)));
+                    }
+                }
+            }
+            Hold::Control {
+                peer,
+                authority,
+                reply,
+            } => {
+                let id = match stack.request_control(Instant::now(), peer, authority, patience) {
+                    Ok(id) => id,
+                    Err(why) => {
+                        let _ = reply.send(Err(NotControlled::Refused(why)));
+                        return;
+                    }
+                };
+                match transmit(stack) {
+                    Ok(()) => {
+                        self.asking.insert(id, reply);
+                    }
+                    Err(error) => {
+                        stack.release_control(Instant::now(), id);
+                        let _ = reply.send(Err(NotControlled::NotSent(error)));
+                    }
+                }
+            }
+        }
+    }
+
+    pub(super) fn part(&mut self, stack: &mut Stack, goodbye: Goodbye) {
+        match goodbye {
+            Goodbye::Subscription(id) => {
+                self.feeds.remove(&id);
+                stack.unsubscribe(Instant::now(), id);
+            }
+            Goodbye::Control(id) => stack.release_control(Instant::now(), id),
+        }
+    }
+
+    pub(super) fn tell_subscriber(&mut self, id: SubscriptionId, news: SubscriptionNews) {
+        if let Some(reply) = self.subscribing.remove(&id) {
+            if let SubscriptionNews::Ended(end) = news {
+                let _ = reply.send(Err(NotSubscribed::Ended(end)));
+                return;
+            }
+            let feed = Arc::new(Feed::new());
+            self.feeds.insert(id, feed.clone());
+            // An unclaimed ticket says goodbye.
+            let _ = reply.send(Ok((self.ticket(Goodbye::Subscription(id)), feed)));
+        }
+        if let Some(feed) = self.feeds.get(&id) {
+            feed.tell(news);
+        }
+    }
+
+    pub(super) fn tell_controller(&mut self, id: ControlId, news: ControlNews) {
+        match news {
+            ControlNews::Granted => {
+                let Some(reply) = self.asking.remove(&id) else {
+                    return;
+                };
+                let (condition, told) = watch::channel(Condition::Held);
+                self.controls.insert(id, condition);
+                let _ = reply.send(Ok((self.ticket(Goodbye::Control(id)), told)));
+            }
+            ControlNews::Refused(why) => {
+                if let Some(reply) = self.asking.remove(&id) {
+                    let _ = reply.send(Err(NotControlled::Refused(why)));
+                }
+            }
+            ControlNews::Lost(why) => {
+                if let Some(condition) = self.controls.get(&id) {
+                    condition.send_replace(Condition::Lost(why));
+                }
+            }
+            ControlNews::Released => {
+                if let Some(condition) = self.controls.remove(&id) {
+                    condition.send_replace(Condition::Released);
+                }
+            }
+        }
+    }
+
+    /// Gives up what nobody waits for any more.
+    pub(super) fn forget_the_impatient(&mut self, stack: &mut Stack) {
+        self.subscribing.retain(|&id, reply| {
+            if reply.is_closed() {
+                stack.unsubscribe(Instant::now(), id);
+            }
+            !reply.is_closed()
+        });
+        self.asking.retain(|&id, reply| {
+            if reply.is_closed() {
+                stack.release_control(Instant::now(), id);
+            }
+            !reply.is_closed()
+        });
+    }
+}
+
+impl Drop for Clients {
+    fn drop(&mut self) {
+        for feed in self.feeds.values() {
+            feed.stop();
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! What a component's task tells the holder of a subscription or of control: a bounded queue and
+//! the state of things, shared by the two.
+
+use std::collections::VecDeque;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use bytes::Bytes;
+use tokio::sync::Notify;
+
+use crate::service::{Outage, SubscriptionEnd, SubscriptionNews};
+
+/// The queue between a subscription and its reader.
+#[derive(Debug)]
+pub(super) struct Feed {
+    state: Mutex<State>,
+    news: Notify,
+}
+
+/// What waits for the reader.
+#[derive(Debug)]
+pub(super) enum Item {
+    Report(Bytes),
+    Down { since: Instant, why: Outage },
+    Up,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    queue: VecDeque<Item>,
+    condition: Condition,
+    end: Option<Option<SubscriptionEnd>>,
+}
+
+/// How a subscription is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Condition {
+    pub(super) up: bool,
+    pub(super) hz: Option<f64>,
+    /// Reports that the network or the peer lost.
+    pub(super) lost: u64,
+    /// Reports that were thrown away because the reader was slow.
+    pub(super) missed: u64,
+    /// Reports that could not be read.
+    pub(super) unreadable: u64,
+}
+
+impl Feed {
+    /// What may wait for a slow reader; then the oldest report goes.
+    const CAPACITY: usize = 256;
+
+    pub(super) fn new() -> Self {
+        Self {
+            state: Mutex::new(State::default()),
+            news: Notify::new(),
+        }
+    }
+
+    /// The component's side.
+    pub(super) fn tell(&self, news: SubscriptionNews) {
+        let mut state = self.lock();
+        match news {
+            SubscriptionNews::Up { hz } => state.rise(hz),
+            SubscriptionNews::Report { report, lost } => {
+                state.condition.lost += u64::from(lost);
+                state.push(Item::Report(report));
+            }
+            SubscriptionNews::Down { since, why } => {
+                state.condition.up = false;
+                state.push(Item::Down { since, why });
+            }
+            SubscriptionNews::Ended(end) => state.end = Some(Some(end)),
+        }
+        drop(state);
+        self.news.notify_one();
+    }
+
+    /// The component has stopped; the reader gets what is left, and then the end.
+    pub(super) fn stop(&self) {
+        let mut state = self.lock();
+        state.condition.up = false;
+        state.end.get_or_insert(None);
+        drop(state);
+        self.news.notify_one();
+    }
+
+    /// The reader's side: the next item, or `None` at the end.
+    pub(super) async fn next(&self) -> Option<Item> {
+        loop {
+            {
+                let mut state = self.lock();
+                if let Some(item) = state.queue.pop_front() {
+                    return Some(item);
+                }
+                if state.end.is_some() {
+                    return None;
+                }
+            }
+            self.news.notified().await;
+        }
+    }
+
+    pub(super) fn condition(&self) -> Condition {
+        self.lock().condition
+    }
+
+    /// Why nothing comes any more, if the peer is to blame.
+    pub(super) fn end(&self) -> Option<SubscriptionEnd> {
+        self.lock().end.clone().flatten()
+    }
+
+    pub(super) fn count_unreadable(&self) {
+        self.lock().condition.unreadable += 1;
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn rise(&mut self, hz: Option<f64>) {
+        self.condition.hz = hz;
+        if !self.condition.up {
+            self.condition.up = true;
+            self.push(Item::Up);
+        }
+    }
+
+    fn push(&mut self, item: Item) {
+        if self.queue.len() >= Feed::CAPACITY {
+            self.make_room();
+        }
+        self.queue.push_back(item);
+    }
+
+    /// Reports go before news of ups and downs, the oldest first.
+    fn make_room(&mut self) {
+        let report = |item: &Item| matches!(item, Item::Report(_));
+        match self.queue.iter().position(report) {
+            Some(oldest) => {
+                self.queue.remove(oldest);
+                self.condition.missed += 1;
+            }
+            None => {
+                self.queue.pop_front();
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report(number: u8) -> SubscriptionNews {
+        SubscriptionNews::Report {
+            report: Bytes::copy_from_slice(&[number]),
+            lost: 0,
+        }
+    }
+
+    #[tokio::test]
+    async fn a_slow_reader_loses_the_oldest_reports_and_is_told_how_many() {
+        let feed = Feed::new();
+        feed.tell(SubscriptionNews::Up { hz: None });
+        for number in 0..=255 {
+            feed.tell(report(number));
+        }
+        assert_eq!(feed.condition().missed, 1);
+        assert!(matches!(feed.next().await, Some(Item::Up)));
+        let Some(Item::Report(first)) = feed.next().await else {
+            panic!("a report is due");
+        };
+        assert_eq!(first[..], [1], "report 0 made room");
+    }
+
+    #[tokio::test]
+    async fn what_waits_is_read_before_the_end() {
+        let feed = Feed::new();
+        feed.tell(report(7));
+        feed.stop();
+        assert!(matches!(feed.next().await, Some(Item::Report(_))));
+        assert!(feed.next().await.is_none() && feed.next().await.is_none());
+    }
+}

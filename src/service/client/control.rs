@@ -1,0 +1,390 @@
+//! Control over other components: asked for, renewed before it ends, known to be lost when it is,
+//! and given back.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant};
+
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::messages::core::{
+    ConfirmControl, QueryTimeout, RejectControl, ReleaseControl, ReportTimeout, RequestControl,
+};
+use crate::service::{Handled, NoAnswer, Outbox, Patience, code_of, read};
+
+/// Names one request for control of a component.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ControlId(u64);
+
+/// What becomes of a request for control.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ControlNews {
+    /// The peer has granted it.
+    Granted,
+    /// The peer has not granted it, and it is over.
+    Refused(ControlRefused),
+    /// It was granted and is lost, for good: nobody asks again by itself.
+    Lost(ControlLost),
+    /// It was given back: the peer has said so, or has been told often enough.
+    Released,
+}
+
+/// Why control was not granted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ControlRefused {
+    /// Confirm Control with NOT_AVAILABLE.
+    #[error("it cannot be controlled now, for instance because of an emergency")]
+    NotAvailable,
+    /// Confirm Control with INSUFFICIENT_AUTHORITY.
+    #[error("the authority {0} is too low for it, or no greater than that of who controls it")]
+    InsufficientAuthority(u8),
+    /// Confirm Control with a code that has no meaning.
+    #[error("it answered ConfirmControl with the code {0}, which has no meaning")]
+    Code(u8),
+    /// The peer has said nothing.
+    #[error(
+        "it did not answer RequestControl with ConfirmControl: asked {} times in {:.1} s",
+        .0.tries, .0.waited.as_secs_f64()
+    )]
+    NoAnswer(NoAnswer),
+    /// The application controls this peer already.
+    #[error("this component controls it already, or is asking for it")]
+    Already,
+    /// The id has a wildcard or a zero.
+    #[error("it is not one component")]
+    NotOneComponent,
+}
+
+/// Why control was lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ControlLost {
+    /// Reject Control with CONTROL_RELEASED: somebody with a greater authority has it, or the peer
+    /// has reset or timed it out.
+    #[error("the peer took it back, for another client or because it was not renewed in time")]
+    TakenBack,
+    /// The peer has become unavailable, for instance by an emergency.
+    #[error("the peer cannot be controlled any more, for instance because of an emergency")]
+    NotAvailable,
+    /// Another client with a greater authority has it: the renewal was refused.
+    #[error("another client with a greater authority has it")]
+    Outranked,
+    /// The peer has not confirmed it for longer than it lasts.
+    #[error("the peer has not confirmed it since {:.1} s", .0.as_secs_f64())]
+    Silent(Duration),
+}
+
+/// What one component controls.
+#[derive(Debug, Default)]
+pub(in crate::service) struct Controls {
+    last: u64,
+    /// By peer, because Confirm Control says nothing else about what it confirms.
+    all: BTreeMap<JausId, Control>,
+    news: VecDeque<(ControlId, ControlNews)>,
+}
+
+#[derive(Debug)]
+struct Control {
+    id: ControlId,
+    authority: u8,
+    patience: Patience,
+    state: State,
+    /// How long control lasts, once the peer has told; zero is for ever.
+    lifetime: Option<Duration>,
+    /// How often it was asked for that.
+    lifetime_asked: u32,
+    /// Requests since the last answer, and when the first of them was sent.
+    asked: u32,
+    first_asked: Instant,
+    /// When the peer had to begin to count the lifetime, at the latest known.
+    confirmed: Instant,
+    next: Instant,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Asking,
+    Held,
+    /// The application has not let go yet.
+    Lost(ControlLost),
+    Releasing,
+}
+
+impl Controls {
+    pub(in crate::service) fn request(
+        &mut self,
+        now: Instant,
+        peer: JausId,
+        authority: u8,
+        patience: Patience,
+        out: &mut Outbox,
+    ) -> Result<ControlId, ControlRefused> {
+        if !peer.is_unicast() {
+            return Err(ControlRefused::NotOneComponent);
+        }
+        let active = |it: &Control| matches!(it.state, State::Asking | State::Held);
+        if self.all.get(&peer).is_some_and(active) {
+            return Err(ControlRefused::Already);
+        }
+        self.last += 1;
+        let id = ControlId(self.last);
+        let mut control = Control {
+            id,
+            authority,
+            patience,
+            state: State::Asking,
+            lifetime: None,
+            lifetime_asked: 0,
+            asked: 0,
+            first_asked: now,
+            confirmed: now,
+            next: now,
+        };
+        control.ask(now, peer, out);
+        self.all.insert(peer, control);
+        Ok(id)
+    }
+
+    /// Gives control back, or stops asking for it.
+    pub(in crate::service) fn release(&mut self, now: Instant, id: ControlId, out: &mut Outbox) {
+        let found = self.all.iter_mut().find(|(_, it)| it.id == id);
+        let Some((&peer, control)) = found else {
+            return;
+        };
+        // Else the peer may hold its end for as long as nobody tells it.
+        if let State::Lost(ControlLost::TakenBack | ControlLost::Outranked) = control.state {
+            self.all.remove(&peer);
+            self.news.push_back((id, ControlNews::Released));
+            return;
+        }
+        if control.state == State::Releasing {
+            return;
+        }
+        control.state = State::Releasing;
+        control.asked = 0;
+        control.give_back(now, peer, out);
+    }
+
+    /// Gives everything back with one word, because there will be no time for more.
+    pub(in crate::service) fn farewell(&mut self, now: Instant, out: &mut Outbox) {
+        let held: Vec<_> = self.all.values().map(|it| it.id).collect();
+        for id in held {
+            self.release(now, id, out);
+        }
+    }
+
+    pub(in crate::service) fn handle_message(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        out: &mut Outbox,
+    ) -> Handled {
+        let peer = message.source;
+        let Some(control) = self.all.get_mut(&peer) else {
+            return Handled::No;
+        };
+        let id = control.id;
+        let news = match code_of(&message.payload) {
+            Some(ConfirmControl::CODE) => read::<ConfirmControl>(message)
+                .and_then(|it| control.handle_confirm(now, peer, it.response_code.0, out)),
+            Some(RejectControl::CODE) => read::<RejectControl>(message)
+                .and_then(|it| control.handle_reject(it.response_code.0)),
+            Some(ReportTimeout::CODE) => {
+                if let Some(report) = read::<ReportTimeout>(message) {
+                    control.handle_lifetime(now, report.timeout.0);
+                }
+                None
+            }
+            _ => return Handled::No,
+        };
+        if news.is_some_and(ControlNews::is_the_end) {
+            self.all.remove(&peer);
+        }
+        self.news.extend(news.map(|news| (id, news)));
+        Handled::Yes
+    }
+
+    pub(in crate::service) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
+        let news = &mut self.news;
+        self.all.retain(|&peer, control| {
+            let told = control.handle_timeout(now, peer, out);
+            news.extend(told.map(|told| (control.id, told)));
+            !told.is_some_and(ControlNews::is_the_end)
+        });
+    }
+
+    pub(in crate::service) fn poll_timeout(&self) -> Option<Instant> {
+        self.all.values().filter_map(Control::poll_timeout).min()
+    }
+
+    pub(in crate::service) fn poll_news(&mut self) -> Option<(ControlId, ControlNews)> {
+        self.news.pop_front()
+    }
+}
+
+impl ControlNews {
+    const fn is_the_end(self) -> bool {
+        matches!(self, Self::Refused(_) | Self::Released)
+    }
+}
+
+impl Control {
+    /// The longest time between two renewals. JAUS++ renews as often.
+    const RENEWAL: Duration = Duration::from_millis(1250);
+    /// Between renewals while it is not known how long control lasts.
+    const HASTE: Duration = Duration::from_millis(200);
+    /// How often the peer is asked how long control lasts.
+    const LIFETIME_TRIES: u32 = 4;
+    /// Control that is not confirmed for so long is lost, however long it lasts; and so long it
+    /// lasts if the peer does not say. It is JAUS++'s time-out.
+    const LIFETIME: Duration = Duration::from_secs(5);
+
+    /// For how long a confirmation is good.
+    fn lifetime(&self) -> Duration {
+        match self.lifetime {
+            Some(told) if !told.is_zero() => told.min(Self::LIFETIME),
+            _ => Self::LIFETIME,
+        }
+    }
+
+    /// The time between two renewals: a few may be lost before control is.
+    fn renewal(&self) -> Duration {
+        let most = match self.wonders() {
+            true => Self::HASTE,
+            false => Self::RENEWAL,
+        };
+        (self.lifetime() / 4).min(most)
+    }
+
+    /// Whether it is still to be found out how long control lasts.
+    const fn wonders(&self) -> bool {
+        self.lifetime.is_none() && self.lifetime_asked < Self::LIFETIME_TRIES
+    }
+
+    fn ask(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
+        if self.wonders() {
+            self.lifetime_asked += 1;
+            out.send(peer, &QueryTimeout {});
+        }
+        let authority_code = self.authority;
+        out.send(peer, &RequestControl { authority_code });
+        if self.asked == 0 {
+            self.first_asked = now;
+        }
+        self.asked = self.asked.saturating_add(1);
+        self.next = now
+            + match self.state {
+                State::Held => self.renewal(),
+                _ => self.patience.interval,
+            };
+    }
+
+    fn give_back(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
+        out.send(peer, &ReleaseControl {});
+        self.asked = self.asked.saturating_add(1);
+        self.next = now + self.patience.interval;
+    }
+
+    fn handle_confirm(
+        &mut self,
+        now: Instant,
+        peer: JausId,
+        code: u8,
+        out: &mut Outbox,
+    ) -> Option<ControlNews> {
+        match (self.state, code) {
+            (State::Asking | State::Held, 0) => {
+                // Which request it answers is not said: it may be the first, and the others lost.
+                self.confirmed = self.first_asked;
+                self.asked = 0;
+                let granted = self.state == State::Asking;
+                self.state = State::Held;
+                self.next = now + self.renewal();
+                granted.then_some(ControlNews::Granted)
+            }
+            (State::Asking, code) => Some(ControlNews::Refused(match code {
+                1 => ControlRefused::NotAvailable,
+                2 => ControlRefused::InsufficientAuthority(self.authority),
+                code => ControlRefused::Code(code),
+            })),
+            (State::Held, code) => self.lose(match code {
+                2 => ControlLost::Outranked,
+                _ => ControlLost::NotAvailable,
+            }),
+            // A renewal was on its way when control was lost, and has brought it back behind the
+            // application's back.
+            (State::Lost(_), 0) => {
+                out.send(peer, &ReleaseControl {});
+                None
+            }
+            (State::Lost(_) | State::Releasing, _) => None,
+        }
+    }
+
+    fn handle_reject(&mut self, code: u8) -> Option<ControlNews> {
+        match (self.state, code) {
+            (State::Held, 0) => self.lose(ControlLost::TakenBack),
+            (State::Held, _) => self.lose(ControlLost::NotAvailable),
+            (State::Releasing, _) => Some(ControlNews::Released),
+            // The end of a control before this one.
+            (State::Asking | State::Lost(_), _) => None,
+        }
+    }
+
+    fn lose(&mut self, why: ControlLost) -> Option<ControlNews> {
+        self.state = State::Lost(why);
+        Some(ControlNews::Lost(why))
+    }
+
+    fn handle_lifetime(&mut self, now: Instant, seconds: u8) {
+        self.lifetime = Some(Duration::from_secs(seconds.into()));
+        if self.state == State::Held {
+            self.next = self.next.min(now + self.renewal());
+        }
+    }
+
+    fn handle_timeout(
+        &mut self,
+        now: Instant,
+        peer: JausId,
+        out: &mut Outbox,
+    ) -> Option<ControlNews> {
+        if self.poll_timeout().is_none_or(|due| due > now) {
+            return None;
+        }
+        let exhausted = self.asked >= self.patience.tries.max(1);
+        match self.state {
+            State::Asking if exhausted => {
+                let no_answer = NoAnswer {
+                    peer,
+                    tries: self.asked,
+                    waited: now.saturating_duration_since(self.first_asked),
+                };
+                Some(ControlNews::Refused(ControlRefused::NoAnswer(no_answer)))
+            }
+            State::Held if now >= self.confirmed + self.lifetime() => {
+                let since = now.saturating_duration_since(self.confirmed);
+                self.lose(ControlLost::Silent(since))
+            }
+            State::Asking | State::Held => {
+                self.ask(now, peer, out);
+                None
+            }
+            State::Releasing if exhausted => Some(ControlNews::Released),
+            State::Releasing => {
+                self.give_back(now, peer, out);
+                None
+            }
+            State::Lost(_) => None,
+        }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        match self.state {
+            State::Asking | State::Releasing => Some(self.next),
+            State::Held => Some(self.next.min(self.confirmed + self.lifetime())),
+            State::Lost(_) => None,
+        }
+    }
+}

@@ -1,0 +1,387 @@
+//! One subscription: the event of a peer that brings a report again and again. It is created,
+//! renewed, found to be down and created again, until the application has had enough of it.
+
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::Rejection;
+use super::subscriptions::SubscriptionEnd;
+use crate::address::JausId;
+use crate::messages::core::{ConfirmEventRequest, Event};
+use crate::service::{NoAnswer, Outbox, Patience, code_of};
+
+/// When a subscribed report is to come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum When {
+    /// Again and again, whether or not anything has changed.
+    Periodic {
+        /// The wanted rate in hertz, above 0 and up to 1092.
+        hz: f64,
+        /// The least rate in hertz that is of use; a peer that cannot keep it is refused.
+        least_hz: f64,
+    },
+    /// Whenever it has changed.
+    OnChange,
+}
+
+impl When {
+    /// At a rate in hertz, or whatever lower rate the peer can keep.
+    #[must_use]
+    pub const fn hz(hz: f64) -> Self {
+        Self::Periodic { hz, least_hz: 0.0 }
+    }
+
+    /// Refuses a peer that cannot keep `least_hz`.
+    #[must_use]
+    pub const fn at_least(self, least_hz: f64) -> Self {
+        match self {
+            Self::Periodic { hz, .. } => Self::Periodic { hz, least_hz },
+            Self::OnChange => self,
+        }
+    }
+}
+
+/// What becomes of a subscription.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SubscriptionNews {
+    /// The peer has confirmed the event: for the first time, after it was down, or at another rate.
+    Up {
+        /// The confirmed rate in hertz; `None` for reports on change.
+        hz: Option<f64>,
+    },
+    /// A report has come.
+    Report {
+        /// The report from its message code on.
+        report: Bytes,
+        /// How many reports before this one have been lost on the way.
+        lost: u8,
+    },
+    /// Nothing comes at present; the event is being created again.
+    Down {
+        /// When the last sign of the event came.
+        since: Instant,
+        /// What is the matter.
+        why: Outage,
+    },
+    /// It is over, and nothing will come any more.
+    Ended(SubscriptionEnd),
+}
+
+/// Why a subscription is down.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Outage {
+    /// No report has come for four periods, nor for half a second.
+    Silent,
+    /// The peer does not confirm that the event still exists.
+    Unconfirmed,
+    /// Discovery has lost the peer.
+    PeerLost,
+    /// The peer does not know the event any more, and refuses to create it again.
+    Refused(Rejection),
+}
+
+impl fmt::Display for Outage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Silent => f.write_str("the reports have stopped"),
+            Self::Unconfirmed => f.write_str("the peer does not confirm the event any more"),
+            Self::PeerLost => f.write_str("the peer is gone"),
+            Self::Refused(reason) => write!(f, "the peer refuses the event: {reason}"),
+        }
+    }
+}
+
+/// Where a subscription stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// Never confirmed yet.
+    New,
+    Up,
+    Down,
+}
+
+/// The state machine of one subscription.
+#[derive(Debug)]
+pub(super) struct Subscription {
+    pub(super) peer: JausId,
+    /// The code of the report that is waited for.
+    report: u16,
+    when: When,
+    patience: Patience,
+    /// The Create Event, always the same, so that a peer can tell a repetition.
+    create: Bytes,
+    pub(super) request: u8,
+    query: u16,
+    state: State,
+    /// The number that the peer gave to the event.
+    pub(super) event: Option<u8>,
+    hz: Option<f64>,
+    first_asked: Instant,
+    /// Requests without an answer so far.
+    asked: u32,
+    next_ask: Instant,
+    /// When the last sign of the event came.
+    heard: Instant,
+    /// The last report's number, since the last confirmation.
+    sequence: Option<u8>,
+    /// An event that came before its confirmation.
+    early: Option<Event>,
+}
+
+/// What a new [`Subscription`] is made of.
+pub(super) struct Order {
+    pub(super) peer: JausId,
+    pub(super) report: u16,
+    pub(super) when: When,
+    pub(super) patience: Patience,
+    pub(super) create: Bytes,
+    pub(super) request: u8,
+    pub(super) query: u16,
+}
+
+impl Subscription {
+    /// How often an event is created again while all is well. Events of version 1.1 end after a
+    /// time that is told in whole minutes, so that the shortest one bears two lost renewals; and a
+    /// peer that restarted without anybody noticing has the event again.
+    pub(super) const REFRESH: Duration = Duration::from_secs(20);
+    /// A periodic event is down when so many periods have brought nothing …
+    const SILENT_PERIODS: f64 = 4.0;
+    /// … but not sooner than this after its last report.
+    const LEAST_SILENCE: Duration = Duration::from_millis(500);
+    /// The longest pause between two attempts to bring an event back.
+    const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+
+    pub(super) fn new(now: Instant, order: Order, out: &mut Outbox) -> Self {
+        let mut new = Self {
+            peer: order.peer,
+            report: order.report,
+            when: order.when,
+            patience: order.patience,
+            create: order.create,
+            request: order.request,
+            query: order.query,
+            state: State::New,
+            event: None,
+            hz: None,
+            first_asked: now,
+            asked: 0,
+            next_ask: now,
+            heard: now,
+            sequence: None,
+            early: None,
+        };
+        new.ask(now, out);
+        new
+    }
+
+    /// Whether this subscription waits for a confirmation that an event with such a report may be
+    /// ahead of.
+    pub(super) fn expects(&self, event: &Event) -> bool {
+        self.asked > 0 && code_of(&event.report_message) == Some(self.report)
+    }
+
+    /// Whether an event is this subscription's. Its number alone does not say so: JAUS++ counts
+    /// them anew for each query.
+    pub(super) fn owns(&self, event: &Event) -> bool {
+        self.event == Some(event.event_id) && code_of(&event.report_message) == Some(self.report)
+    }
+
+    /// Whether this subscription's event and one that `other` was just told cannot both be there.
+    pub(super) fn is_displaced_by(&self, other: &Self) -> bool {
+        self.peer == other.peer
+            && self.query == other.query
+            && self.request != other.request
+            && self.event.is_some()
+            && self.event == other.event
+    }
+
+    /// The peer has given this event's number to another one, or may have cancelled it with that.
+    pub(super) fn doubt(&mut self, now: Instant) {
+        self.event = None;
+        self.next_ask = now;
+    }
+
+    pub(super) fn handle_confirm(
+        &mut self,
+        now: Instant,
+        confirm: &ConfirmEventRequest,
+        news: &mut Vec<SubscriptionNews>,
+    ) {
+        let confirmed = match self.when {
+            When::Periodic { hz, .. } => {
+                let confirmed = confirm.confirmed_periodic_rate_hz();
+                Some(if confirmed > 0.0 { confirmed } else { hz })
+            }
+            When::OnChange => None,
+        };
+        let is_news = self.state != State::Up || self.hz != confirmed;
+        self.state = State::Up;
+        self.event = Some(confirm.event_id);
+        self.hz = confirmed;
+        self.asked = 0;
+        self.next_ask = now + Self::REFRESH;
+        self.heard = now;
+        self.sequence = None;
+        if let Some(end) = self.too_slow() {
+            news.push(SubscriptionNews::Ended(end));
+            return;
+        }
+        if is_news {
+            news.push(SubscriptionNews::Up { hz: confirmed });
+        }
+        if let Some(early) = self
+            .early
+            .take_if(|early| early.event_id == confirm.event_id)
+        {
+            self.handle_event(now, early, news);
+        }
+    }
+
+    fn too_slow(&self) -> Option<SubscriptionEnd> {
+        let (When::Periodic { least_hz, .. }, Some(hz)) = (self.when, self.hz) else {
+            return None;
+        };
+        // The wire carries rates in steps of 1092/65535 Hz.
+        let slow = hz < least_hz - 1092.0 / 65535.0;
+        slow.then_some(SubscriptionEnd::TooSlow { hz, least_hz })
+    }
+
+    pub(super) fn handle_reject(
+        &mut self,
+        now: Instant,
+        reason: Rejection,
+        news: &mut Vec<SubscriptionNews>,
+    ) {
+        match self.state {
+            State::New => news.push(SubscriptionNews::Ended(SubscriptionEnd::Rejected(reason))),
+            State::Up => self.fall(now, Outage::Refused(reason), news),
+            State::Down => {
+                self.asked = 0;
+                self.next_ask = now + Self::LONGEST_PAUSE;
+            }
+        }
+    }
+
+    pub(super) fn handle_event(
+        &mut self,
+        now: Instant,
+        event: Event,
+        news: &mut Vec<SubscriptionNews>,
+    ) {
+        let ahead = self
+            .sequence
+            .map(|last| event.sequence_number.wrapping_sub(last));
+        self.heard = now;
+        if ahead.is_some_and(|ahead| ahead == 0 || ahead > u8::MAX / 2) {
+            // It was sent twice, or overtaken by a newer one.
+            return;
+        }
+        self.sequence = Some(event.sequence_number);
+        if self.state == State::Down {
+            // It was only the network.
+            self.state = State::Up;
+            self.next_ask = now;
+            news.push(SubscriptionNews::Up { hz: self.hz });
+        }
+        news.push(SubscriptionNews::Report {
+            report: event.report_message,
+            lost: ahead.map_or(0, |ahead| ahead - 1),
+        });
+    }
+
+    /// Keeps an event whose confirmation may be still to come.
+    pub(super) fn keep(&mut self, event: Event) {
+        self.early = Some(event);
+    }
+
+    pub(super) fn handle_lost_peer(&mut self, now: Instant, news: &mut Vec<SubscriptionNews>) {
+        if self.state == State::Up {
+            self.fall(now, Outage::PeerLost, news);
+        }
+    }
+
+    pub(super) fn handle_found_peer(&mut self, now: Instant) {
+        if self.state == State::Down {
+            self.asked = 0;
+            self.next_ask = now;
+        }
+    }
+
+    pub(super) fn handle_timeout(
+        &mut self,
+        now: Instant,
+        news: &mut Vec<SubscriptionNews>,
+        out: &mut Outbox,
+    ) {
+        if self.silent_at().is_some_and(|silent| silent <= now) {
+            self.fall(now, Outage::Silent, news);
+        }
+        if self.next_ask > now {
+            return;
+        }
+        let exhausted = self.asked >= self.patience.tries.max(1);
+        match self.state {
+            State::New if exhausted => {
+                let no_answer = NoAnswer {
+                    peer: self.peer,
+                    tries: self.asked,
+                    waited: now.saturating_duration_since(self.first_asked),
+                };
+                news.push(SubscriptionNews::Ended(SubscriptionEnd::NoAnswer(
+                    no_answer,
+                )));
+                return;
+            }
+            // Periodic reports that come are confirmation enough.
+            State::Up if exhausted && self.hz.is_none() => {
+                self.fall(now, Outage::Unconfirmed, news);
+            }
+            _ => {}
+        }
+        self.ask(now, out);
+    }
+
+    pub(super) fn poll_timeout(&self) -> Instant {
+        self.silent_at()
+            .map_or(self.next_ask, |silent| silent.min(self.next_ask))
+    }
+
+    /// When a periodic event has been silent for too long.
+    fn silent_at(&self) -> Option<Instant> {
+        let hz = self.hz.filter(|_| self.state == State::Up)?;
+        let periods = Duration::try_from_secs_f64(Self::SILENT_PERIODS / hz).ok()?;
+        self.heard.checked_add(periods.max(Self::LEAST_SILENCE))
+    }
+
+    fn fall(&mut self, now: Instant, why: Outage, news: &mut Vec<SubscriptionNews>) {
+        let refused = matches!(why, Outage::Refused(_));
+        self.state = State::Down;
+        self.asked = 0;
+        self.next_ask = if refused {
+            now + Self::LONGEST_PAUSE
+        } else {
+            now
+        };
+        let since = self.heard;
+        news.push(SubscriptionNews::Down { since, why });
+    }
+
+    /// Asks for the event; a peer that has it already takes it for a renewal.
+    fn ask(&mut self, now: Instant, out: &mut Outbox) {
+        out.send_octets(self.peer, self.create.clone());
+        let pause = match self.state {
+            State::New => self.patience.interval,
+            // Ever longer, so that whoever does not answer is not pestered.
+            State::Up | State::Down => self
+                .patience
+                .interval
+                .saturating_mul(1 << self.asked.min(8))
+                .min(Self::LONGEST_PAUSE),
+        };
+        self.asked = self.asked.saturating_add(1);
+        self.next_ask = now + pause;
+    }
+}

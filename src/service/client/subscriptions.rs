@@ -1,0 +1,434 @@
+//! All subscriptions of one component: who gets which message of Events, and what becomes of
+//! events that nobody wants any more.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::subscription::{Order, Subscription};
+use super::{Rejection, SubscriptionNews, When};
+use crate::address::JausId;
+use crate::codec::{EncodeError, Message};
+use crate::endpoint::Received;
+use crate::messages::core::create_event::EventType;
+use crate::messages::core::{
+    CancelEvent, ConfirmEventRequest, CreateEvent, Event, RejectEventRequest,
+};
+use crate::service::{Change, Handled, NoAnswer, Outbox, Patience, code_of, read};
+
+/// Names one subscription of a component.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SubscriptionId(u64);
+
+/// What is subscribed to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Topic {
+    /// Whose reports.
+    pub peer: JausId,
+    /// The query from its message code on, whose answer the report is.
+    pub query: Bytes,
+    /// The message code of the report.
+    pub report: u16,
+    /// How often.
+    pub when: When,
+}
+
+/// Why a subscription cannot even be tried.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CannotSubscribe {
+    /// Only one component can be subscribed to at a time.
+    #[error("{0} is not one component, and an event is one component's")]
+    NotOneComponent(JausId),
+    /// The wire carries rates up to 1092 Hz in steps of 1/60 Hz.
+    #[error("{hz} Hz cannot be asked for: a rate is from 1/60 to 1092 Hz")]
+    Rate {
+        /// The wanted rate in hertz.
+        hz: f64,
+    },
+    /// The wire cannot carry the query.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// There is no room.
+    #[error("there are {0} subscriptions already, and no more are possible: drop some")]
+    TooMany(usize),
+}
+
+/// Why a subscription is over, or never came to be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SubscriptionEnd {
+    /// The peer refused the event.
+    #[error("it was refused: {0}")]
+    Rejected(Rejection),
+    /// The peer neither confirmed nor refused it.
+    #[error(
+        "{} answered CreateEvent with neither ConfirmEventRequest nor RejectEventRequest: asked {} times in {:.1} s",
+        .0.peer, .0.tries, .0.waited.as_secs_f64()
+    )]
+    NoAnswer(NoAnswer),
+    /// The peer is slower than is of use.
+    #[error("only {hz:.2} Hz were confirmed, and at least {least_hz:.2} Hz are wanted")]
+    TooSlow {
+        /// The confirmed rate in hertz.
+        hz: f64,
+        /// The least wanted rate in hertz.
+        least_hz: f64,
+    },
+}
+
+/// The subscriptions of one component.
+///
+/// Once the application has subscribed to anything, every Event message is this table's business:
+/// one that belongs to no subscription is cancelled. Before that, they are left alone.
+#[derive(Debug, Default)]
+pub(in crate::service) struct Subscriptions {
+    last: u64,
+    last_request: u8,
+    alive: BTreeMap<SubscriptionId, Subscription>,
+    leaving: VecDeque<Leaving>,
+    news: VecDeque<(SubscriptionId, SubscriptionNews)>,
+    /// When the next event that belongs to nobody may be cancelled.
+    next_stray: Option<Instant>,
+}
+
+/// An event that is being cancelled.
+#[derive(Debug)]
+struct Leaving {
+    peer: JausId,
+    event: u8,
+    request: u8,
+    tries: u32,
+    next: Instant,
+}
+
+impl Subscriptions {
+    /// Subscriptions of one component.
+    const MOST: usize = 1024;
+    /// Subscriptions to one peer, which are told apart by one octet.
+    const MOST_PER_PEER: usize = 200;
+    /// Events that can be in the course of cancellation; strays are cancelled when they come.
+    const MOST_LEAVING: usize = 256;
+    /// How often a Cancel Event is sent, and with what pause.
+    const CANCEL_TRIES: u32 = 4;
+    const CANCEL_PAUSE: Duration = Duration::from_millis(500);
+    /// The least time between two cancellations of events that belong to nobody.
+    const STRAY_PAUSE: Duration = Duration::from_millis(100);
+
+    pub(in crate::service) fn subscribe(
+        &mut self,
+        now: Instant,
+        topic: &Topic,
+        patience: Patience,
+        out: &mut Outbox,
+    ) -> Result<SubscriptionId, CannotSubscribe> {
+        let peer = topic.peer;
+        if !peer.is_unicast() {
+            return Err(CannotSubscribe::NotOneComponent(peer));
+        }
+        let request = self.free_request(peer)?;
+        let order = Order {
+            peer,
+            report: topic.report,
+            when: topic.when,
+            patience,
+            create: create_event(topic, request)?.encode()?,
+            request,
+            query: code_of(&topic.query).unwrap_or_default(),
+        };
+        self.last += 1;
+        let id = SubscriptionId(self.last);
+        self.alive.insert(id, Subscription::new(now, order, out));
+        Ok(id)
+    }
+
+    /// A number that no request to this peer has at present.
+    fn free_request(&mut self, peer: JausId) -> Result<u8, CannotSubscribe> {
+        let to_peer = self.alive.values().filter(|it| it.peer == peer);
+        let most = Self::MOST_PER_PEER.min(Self::MOST);
+        if self.alive.len() >= Self::MOST || to_peer.clone().count() >= most {
+            return Err(CannotSubscribe::TooMany(to_peer.count()));
+        }
+        let used = |request| {
+            let leaving = self.leaving.iter().filter(|it| it.peer == peer);
+            let mut requests = to_peer.clone().map(|it| it.request);
+            requests.any(|it| it == request) || leaving.clone().any(|it| it.request == request)
+        };
+        let candidates = (1..=u8::MAX).map(|step| self.last_request.wrapping_add(step));
+        let free = candidates.into_iter().find(|&request| !used(request));
+        // Cancellations are few, and repeating the number of one does no harm.
+        self.last_request = free.unwrap_or_else(|| self.last_request.wrapping_add(1));
+        Ok(self.last_request)
+    }
+
+    /// Ends a subscription, and has the peer end its event.
+    pub(in crate::service) fn unsubscribe(
+        &mut self,
+        now: Instant,
+        id: SubscriptionId,
+        out: &mut Outbox,
+    ) {
+        let Some(ended) = self.alive.remove(&id) else {
+            return;
+        };
+        // An event whose number nobody told yet is cancelled when it comes.
+        if let Some(event) = ended.event {
+            self.leave(now, ended.peer, event, out);
+        }
+    }
+
+    /// Ends all subscriptions with one word to each peer, because there will be no time for more.
+    pub(in crate::service) fn farewell(&mut self, now: Instant, out: &mut Outbox) {
+        while let Some((&id, _)) = self.alive.first_key_value() {
+            self.unsubscribe(now, id, out);
+        }
+    }
+
+    fn leave(&mut self, now: Instant, peer: JausId, event: u8, out: &mut Outbox) {
+        let known = |it: &Leaving| it.peer == peer && it.event == event;
+        if self.leaving.iter().any(known) {
+            return;
+        }
+        let request = self.last_request.wrapping_add(1);
+        self.last_request = request;
+        if self.leaving.len() >= Self::MOST_LEAVING {
+            self.leaving.pop_front();
+        }
+        let mut leaving = Leaving {
+            peer,
+            event,
+            request,
+            tries: 0,
+            next: now,
+        };
+        leaving.cancel(now, out);
+        self.leaving.push_back(leaving);
+    }
+
+    pub(in crate::service) fn handle_message(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        out: &mut Outbox,
+    ) -> Handled {
+        if self.last == 0 {
+            return Handled::No;
+        }
+        match code_of(&message.payload) {
+            Some(Event::CODE) => {
+                if let Some(event) = read(message) {
+                    self.handle_event(now, message.source, event, out);
+                }
+                Handled::Yes
+            }
+            Some(ConfirmEventRequest::CODE) => {
+                let confirm = read(message);
+                confirm.map_or(Handled::No, |confirm| {
+                    self.handle_confirm(now, message.source, &confirm, out)
+                })
+            }
+            Some(RejectEventRequest::CODE) => {
+                let rejection = Rejection::read(&message.payload);
+                rejection.map_or(Handled::No, |(request, reason)| {
+                    self.handle_reject(now, message.source, request, reason, out)
+                })
+            }
+            _ => Handled::No,
+        }
+    }
+
+    fn handle_event(&mut self, now: Instant, source: JausId, event: Event, out: &mut Outbox) {
+        let mut all = self.alive.iter_mut().filter(|(_, it)| it.peer == source);
+        if let Some((&id, owner)) = all.find(|(_, it)| it.owns(&event)) {
+            let mut news = Vec::new();
+            owner.handle_event(now, event, &mut news);
+            self.tell(id, news);
+            return;
+        }
+        let mut all = self.alive.values_mut().filter(|it| it.peer == source);
+        if let Some(waiting) = all.find(|it| it.expects(&event)) {
+            waiting.keep(event);
+            return;
+        }
+        let number_is_used = self
+            .alive
+            .values()
+            .any(|it| it.peer == source && it.event == Some(event.event_id));
+        let leaving = |it: &Leaving| it.peer == source && it.event == event.event_id;
+        let may = self.next_stray.is_none_or(|next| next <= now);
+        // Cancelling a number that two events share might hit the wrong one.
+        if may && !number_is_used && !self.leaving.iter().any(leaving) {
+            self.next_stray = Some(now + Self::STRAY_PAUSE);
+            tracing::debug!(%source, event = event.event_id, "event that nobody subscribed to");
+            self.leave(now, source, event.event_id, out);
+        }
+    }
+
+    fn handle_confirm(
+        &mut self,
+        now: Instant,
+        source: JausId,
+        confirm: &ConfirmEventRequest,
+        out: &mut Outbox,
+    ) -> Handled {
+        if self.has_left(now, source, confirm.request_id) {
+            return Handled::Yes;
+        }
+        let mut news = Vec::new();
+        let mut all = self.alive.iter_mut().filter(|(_, it)| it.peer == source);
+        let Some((&id, confirmed)) = all.find(|(_, it)| it.request == confirm.request_id) else {
+            return Handled::No;
+        };
+        confirmed.handle_confirm(now, confirm, &mut news);
+        self.doubt_the_displaced(now, id);
+        self.settle(now, id, news, out);
+        Handled::Yes
+    }
+
+    /// A peer that gives a number twice has restarted, and forgotten the event that had it first.
+    fn doubt_the_displaced(&mut self, now: Instant, id: SubscriptionId) {
+        let Some(confirmed) = self.alive.remove(&id) else {
+            return;
+        };
+        let others = self.alive.values_mut();
+        for displaced in others.filter(|it| it.is_displaced_by(&confirmed)) {
+            displaced.doubt(now);
+        }
+        self.alive.insert(id, confirmed);
+    }
+
+    fn handle_reject(
+        &mut self,
+        now: Instant,
+        source: JausId,
+        request: u8,
+        reason: Rejection,
+        out: &mut Outbox,
+    ) -> Handled {
+        // An event that is not there needs no cancelling.
+        if self.has_left(now, source, request) {
+            return Handled::Yes;
+        }
+        let mut all = self.alive.iter_mut().filter(|(_, it)| it.peer == source);
+        let Some((&id, refused)) = all.find(|(_, it)| it.request == request) else {
+            return Handled::No;
+        };
+        let mut news = Vec::new();
+        refused.handle_reject(now, reason, &mut news);
+        self.settle(now, id, news, out);
+        Handled::Yes
+    }
+
+    /// Takes an answered cancellation off the list; says whether there was one. Where numbers are
+    /// not unique, it may have hit another subscription, which is asked for again.
+    fn has_left(&mut self, now: Instant, source: JausId, request: u8) -> bool {
+        let found = self
+            .leaving
+            .iter()
+            .position(|it| it.peer == source && it.request == request);
+        let Some(left) = found.and_then(|found| self.leaving.remove(found)) else {
+            return false;
+        };
+        let same = |it: &&mut Subscription| it.peer == source && it.event == Some(left.event);
+        self.alive
+            .values_mut()
+            .filter(same)
+            .for_each(|it| it.doubt(now));
+        true
+    }
+
+    pub(in crate::service) fn handle_change(&mut self, now: Instant, change: &Change) {
+        let (Change::Found(peer) | Change::Lost(peer, _)) = *change else {
+            return;
+        };
+        let mut all_news = Vec::new();
+        for (&id, it) in self.alive.iter_mut().filter(|(_, it)| it.peer == peer) {
+            let mut news = Vec::new();
+            match change {
+                Change::Lost(..) => it.handle_lost_peer(now, &mut news),
+                _ => it.handle_found_peer(now),
+            }
+            all_news.push((id, news));
+        }
+        for (id, news) in all_news {
+            self.tell(id, news);
+        }
+    }
+
+    pub(in crate::service) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
+        let due =
+            |(&id, it): (&SubscriptionId, &Subscription)| (it.poll_timeout() <= now).then_some(id);
+        let due: Vec<_> = self.alive.iter().filter_map(due).collect();
+        for id in due {
+            let mut news = Vec::new();
+            if let Some(it) = self.alive.get_mut(&id) {
+                it.handle_timeout(now, &mut news, out);
+            }
+            self.settle(now, id, news, out);
+        }
+        for leaving in self.leaving.iter_mut().filter(|it| it.next <= now) {
+            leaving.cancel(now, out);
+        }
+        self.leaving.retain(|it| it.tries <= Self::CANCEL_TRIES);
+    }
+
+    pub(in crate::service) fn poll_timeout(&self) -> Option<Instant> {
+        let alive = self.alive.values().map(Subscription::poll_timeout);
+        alive.chain(self.leaving.iter().map(|it| it.next)).min()
+    }
+
+    pub(in crate::service) fn poll_news(&mut self) -> Option<(SubscriptionId, SubscriptionNews)> {
+        self.news.pop_front()
+    }
+
+    /// Tells the news, and takes leave of a subscription that is over.
+    fn settle(
+        &mut self,
+        now: Instant,
+        id: SubscriptionId,
+        news: Vec<SubscriptionNews>,
+        out: &mut Outbox,
+    ) {
+        if matches!(news.last(), Some(SubscriptionNews::Ended(_))) {
+            self.unsubscribe(now, id, out);
+        }
+        self.tell(id, news);
+    }
+
+    fn tell(&mut self, id: SubscriptionId, news: Vec<SubscriptionNews>) {
+        self.news.extend(news.into_iter().map(|news| (id, news)));
+    }
+}
+
+impl Leaving {
+    fn cancel(&mut self, now: Instant, out: &mut Outbox) {
+        self.tries += 1;
+        self.next = now + Subscriptions::CANCEL_PAUSE;
+        if self.tries <= Subscriptions::CANCEL_TRIES {
+            let cancel = CancelEvent {
+                request_id: self.request,
+                event_id: self.event,
+            };
+            out.send(self.peer, &cancel);
+        }
+    }
+}
+
+fn create_event(topic: &Topic, request: u8) -> Result<CreateEvent, CannotSubscribe> {
+    let mut create = CreateEvent {
+        request_id: request,
+        event_type: EventType::EVERY_CHANGE,
+        query_message: topic.query.clone(),
+        ..CreateEvent::default()
+    };
+    if let When::Periodic { hz, .. } = topic.when {
+        create.event_type = EventType::PERIODIC_SC;
+        let set = create.set_requested_periodic_rate_hz(hz);
+        // What is rounded to 0 would be no rate.
+        if set.is_err() || create.requested_periodic_rate == Default::default() {
+            return Err(CannotSubscribe::Rate { hz });
+        }
+    }
+    Ok(create)
+}

@@ -1,0 +1,252 @@
+//! Control: asked for, renewed, lost, given back.
+
+use std::time::Duration;
+
+use super::{Bench, CLIENT, OTHER, PEER};
+use crate::messages::core::{
+    ConfirmControl, QueryTimeout, RejectControl, ReleaseControl, ReportTimeout, RequestControl,
+};
+use crate::service::{ControlId, ControlLost, ControlNews, ControlRefused, Event, Patience};
+
+fn confirm(code: u8) -> ConfirmControl {
+    ConfirmControl {
+        response_code: code.into(),
+    }
+}
+
+fn reject(code: u8) -> RejectControl {
+    RejectControl {
+        response_code: code.into(),
+    }
+}
+
+fn request(bench: &mut Bench) -> ControlId {
+    let asked = bench
+        .stack
+        .request_control(bench.now, PEER, 127, Patience::default());
+    bench.collect();
+    asked.expect("nothing is in the way")
+}
+
+/// A bench on which control is held, of a peer that gives it for so many seconds.
+fn held(seconds: u8) -> (Bench, ControlId) {
+    let mut bench = Bench::new();
+    let id = request(&mut bench);
+    bench.hear(PEER, &confirm(0));
+    let timeout = seconds.into();
+    bench.hear(PEER, &ReportTimeout { timeout });
+    assert_eq!(news(&mut bench), [ControlNews::Granted]);
+    bench.sent.clear();
+    (bench, id)
+}
+
+fn news(bench: &mut Bench) -> Vec<ControlNews> {
+    let events = bench.events().into_iter();
+    events
+        .filter_map(|event| match event {
+            Event::Control(_, news) => Some(news),
+            _ => None,
+        })
+        .collect()
+}
+
+/// Answers renewals for a while; says how many there were.
+fn renew_for(bench: &mut Bench, duration: Duration) -> usize {
+    let end = bench.now + duration;
+    let mut renewals = 0;
+    while bench.now < end {
+        bench.run_ms(10);
+        for _ in bench.sent::<RequestControl>() {
+            renewals += 1;
+            bench.hear(PEER, &confirm(0));
+        }
+    }
+    renewals
+}
+
+#[test]
+fn control_is_asked_for_with_the_authority_and_again_if_nobody_answers() {
+    let mut bench = Bench::new();
+    request(&mut bench);
+    bench.run_ms(600);
+    let asked = bench.sent::<RequestControl>();
+    assert!(asked.len() == 2 && asked.iter().all(|it| it.authority_code == 127));
+    bench.hear(PEER, &confirm(0));
+    assert_eq!(news(&mut bench), [ControlNews::Granted]);
+}
+
+#[test]
+fn who_says_nothing_is_given_up() {
+    let mut bench = Bench::new();
+    request(&mut bench);
+    bench.run_ms(1500);
+    let [ControlNews::Refused(ControlRefused::NoAnswer(failure))] = news(&mut bench)[..] else {
+        panic!("it is to be given up");
+    };
+    assert_eq!(failure.tries, 3);
+    assert_eq!(failure.waited, Duration::from_millis(1500));
+    bench.run_ms(60_000);
+    bench.sent.clear();
+    request(&mut bench);
+    assert_eq!(
+        bench.sent::<RequestControl>().len(),
+        1,
+        "it can be tried again"
+    );
+}
+
+#[test]
+fn a_refusal_says_why() {
+    let whys = [
+        (1, ControlRefused::NotAvailable),
+        (2, ControlRefused::InsufficientAuthority(127)),
+        (9, ControlRefused::Code(9)),
+    ];
+    for (code, why) in whys {
+        let mut bench = Bench::new();
+        request(&mut bench);
+        bench.hear(PEER, &confirm(code));
+        assert_eq!(news(&mut bench), [ControlNews::Refused(why)]);
+    }
+}
+
+#[test]
+fn an_answer_of_somebody_else_is_none() {
+    let mut bench = Bench::new();
+    request(&mut bench);
+    bench.hear(OTHER, &confirm(0));
+    assert_eq!(news(&mut bench), []);
+}
+
+#[test]
+fn control_is_renewed_at_least_four_times_in_its_lifetime() {
+    for (seconds, renewals) in [(1, 240..=300), (5, 48..=60), (0, 48..=60), (255, 48..=60)] {
+        let (mut bench, _) = held(seconds);
+        let renewed = renew_for(&mut bench, Duration::from_secs(60));
+        assert!(
+            renewals.contains(&renewed),
+            "{seconds} s: {renewed} renewals"
+        );
+        assert_eq!(news(&mut bench), []);
+    }
+}
+
+#[test]
+fn a_peer_that_does_not_say_how_long_control_lasts_is_not_asked_for_ever() {
+    let mut bench = Bench::new();
+    request(&mut bench);
+    bench.hear(PEER, &confirm(0));
+    let mut questions = 0;
+    for _ in 0..1000 {
+        bench.run_ms(10);
+        let sent = bench.sent.clone();
+        questions += bench.sent::<QueryTimeout>().len();
+        bench.sent = sent;
+        for _ in bench.sent::<RequestControl>() {
+            bench.hear(PEER, &confirm(0));
+        }
+    }
+    assert_eq!(questions, 4);
+    assert_eq!(news(&mut bench), [ControlNews::Granted]);
+}
+
+#[test]
+fn a_silent_peer_has_taken_control_along_before_its_own_time_is_up() {
+    let (mut bench, _) = held(2);
+    renew_for(&mut bench, Duration::from_secs(10));
+    let last_heard = bench.now;
+    bench.run_ms(2100);
+    let [ControlNews::Lost(ControlLost::Silent(since))] = news(&mut bench)[..] else {
+        panic!("it is lost");
+    };
+    assert_eq!(since, Duration::from_secs(2));
+    assert!(bench.now - last_heard < Duration::from_millis(2200));
+    bench.sent.clear();
+    bench.run_ms(60_000);
+    assert_eq!(bench.sent::<RequestControl>(), [], "nobody asks by itself");
+}
+
+#[test]
+fn control_that_is_taken_is_lost_and_not_asked_for_again() {
+    let (mut bench, _) = held(5);
+    bench.hear(PEER, &reject(0));
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::TakenBack)]
+    );
+    bench.run_ms(60_000);
+    assert_eq!(bench.sent::<RequestControl>(), []);
+}
+
+#[test]
+fn an_emergency_takes_control() {
+    let (mut bench, _) = held(5);
+    bench.hear(PEER, &reject(1));
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::NotAvailable)]
+    );
+}
+
+#[test]
+fn a_lost_reject_is_noticed_with_the_next_renewal() {
+    let (mut bench, _) = held(5);
+    bench.run_ms(1250);
+    assert_eq!(bench.sent::<RequestControl>().len(), 1);
+    bench.hear(PEER, &confirm(2));
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::Outranked)]
+    );
+}
+
+#[test]
+fn control_that_comes_back_behind_the_applications_back_is_released() {
+    let (mut bench, _) = held(5);
+    bench.hear(PEER, &reject(0));
+    bench.hear(PEER, &confirm(0));
+    assert_eq!(bench.sent::<ReleaseControl>().len(), 1);
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::TakenBack)]
+    );
+}
+
+#[test]
+fn a_release_is_repeated_until_it_is_confirmed() {
+    let (mut bench, id) = held(5);
+    bench.stack.release_control(bench.now, id);
+    bench.stack.release_control(bench.now, id);
+    bench.run_ms(600);
+    assert_eq!(bench.sent::<ReleaseControl>().len(), 2);
+    bench.hear(PEER, &reject(0));
+    assert_eq!(news(&mut bench), [ControlNews::Released]);
+    bench.run_ms(60_000);
+    assert_eq!(bench.sent, [], "{CLIENT} has nothing more to say");
+}
+
+#[test]
+fn a_release_that_nobody_confirms_is_done_with_too() {
+    let (mut bench, id) = held(5);
+    bench.stack.release_control(bench.now, id);
+    bench.run_ms(60_000);
+    assert_eq!(bench.sent::<ReleaseControl>().len(), 3);
+    assert_eq!(news(&mut bench), [ControlNews::Released]);
+}
+
+#[test]
+fn a_peer_is_controlled_once_at_a_time() {
+    let (mut bench, id) = held(5);
+    let again = |bench: &mut Bench| {
+        bench
+            .stack
+            .request_control(bench.now, PEER, 9, Patience::default())
+    };
+    assert_eq!(again(&mut bench), Err(ControlRefused::Already));
+    bench.stack.release_control(bench.now, id);
+    assert!(again(&mut bench).is_ok());
+    bench.hear(PEER, &reject(0));
+    assert_eq!(news(&mut bench), [], "the end of the control before");
+    bench.hear(PEER, &confirm(0));
+    assert_eq!(news(&mut bench), [ControlNews::Granted]);
+}

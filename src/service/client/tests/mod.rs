@@ -1,0 +1,104 @@
+//! The client's half against a peer that does what the test says, in virtual time.
+
+mod control;
+mod subscriptions;
+
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::service::{Discovery, Event, Kind, Profile, Scope, Stack, Timing};
+use crate::wire::{Broadcast, Priority};
+
+const CLIENT: JausId = JausId::new(42, 1, 1);
+const PEER: JausId = JausId::new(101, 1, 33);
+const OTHER: JausId = JausId::new(102, 1, 33);
+
+/// A client's stack, and the clock that it lives by.
+struct Bench {
+    now: Instant,
+    stack: Stack,
+    sent: Vec<(JausId, Bytes)>,
+    events: Vec<Event>,
+}
+
+impl Bench {
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "virtual time begins at some instant"
+    )]
+    fn new() -> Self {
+        let profile = Profile::new(Kind::OperatorControlUnit, "Operator");
+        let discovery = Discovery::new(CLIENT, profile, Scope::Nobody, Timing::default(), 1);
+        let mut bench = Self {
+            now: Instant::now(),
+            stack: Stack::new(discovery, Vec::new()),
+            sent: Vec::new(),
+            events: Vec::new(),
+        };
+        bench.stack.start(bench.now);
+        bench.collect();
+        bench
+    }
+
+    /// Lets time pass, with every wake-up at its time.
+    fn run(&mut self, duration: Duration) {
+        let end = self.now + duration;
+        while let Some(wake) = self.stack.poll_timeout().filter(|wake| *wake <= end) {
+            assert!(wake > self.now || self.sent.len() < 100_000, "it spins");
+            self.now = wake.max(self.now);
+            self.stack.handle_timeout(self.now);
+            self.collect();
+        }
+        self.now = end;
+    }
+
+    fn run_ms(&mut self, milliseconds: u64) {
+        self.run(Duration::from_millis(milliseconds));
+    }
+
+    /// A message from a peer.
+    fn hear<M: Message>(&mut self, source: JausId, message: &M) {
+        self.hear_octets(source, message.encode().expect("a message"));
+    }
+
+    fn hear_octets(&mut self, source: JausId, payload: Bytes) {
+        let message = Received {
+            source,
+            destination: CLIENT,
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            payload,
+            path: None,
+            to: CLIENT,
+        };
+        self.stack.handle_message(self.now, &message);
+        self.collect();
+    }
+
+    fn collect(&mut self) {
+        while let Some(message) = self.stack.poll_transmit() {
+            self.sent.push((message.destination, message.payload));
+        }
+        while let Some(event) = self.stack.poll_event() {
+            self.events.push(event);
+        }
+    }
+
+    /// The messages of one type that the peer was sent since the last call; all others are
+    /// thrown away.
+    fn sent<M: Message>(&mut self) -> Vec<M> {
+        let sent = std::mem::take(&mut self.sent);
+        let to_peer = sent.into_iter().filter(|(to, _)| *to == PEER);
+        to_peer
+            .filter_map(|(_, payload)| M::decode(&payload).ok())
+            .collect()
+    }
+
+    fn events(&mut self) -> Vec<Event> {
+        std::mem::take(&mut self.events)
+    }
+}

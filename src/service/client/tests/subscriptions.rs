@@ -1,0 +1,439 @@
+//! Subscriptions: created, renewed, down and up again, cancelled.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+
+use super::{Bench, OTHER, PEER};
+use crate::codec::Message;
+use crate::messages::core::create_event::EventType;
+use crate::messages::core::{
+    CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryControl, QueryStatus,
+    RejectEventRequest, ReportControl, ReportStatus,
+};
+use crate::service::{
+    CannotSubscribe, Event as StackEvent, Outage, Patience, SubscriptionEnd, SubscriptionId,
+    SubscriptionNews, Topic, When,
+};
+
+fn status(when: When) -> Topic {
+    Topic {
+        peer: PEER,
+        query: QueryStatus {}.encode().expect("a query"),
+        report: ReportStatus::CODE,
+        when,
+    }
+}
+
+fn control(when: When) -> Topic {
+    Topic {
+        peer: PEER,
+        query: QueryControl {}.encode().expect("a query"),
+        report: ReportControl::CODE,
+        when,
+    }
+}
+
+fn subscribe(bench: &mut Bench, topic: &Topic) -> SubscriptionId {
+    let subscribed = bench.stack.subscribe(bench.now, topic, Patience::default());
+    bench.collect();
+    subscribed.expect("nothing is in the way")
+}
+
+/// Confirms a request as the event `event_id` at a rate.
+fn confirm(bench: &mut Bench, request_id: u8, event_id: u8, hz: f64) {
+    let mut confirm = ConfirmEventRequest {
+        request_id,
+        event_id,
+        ..ConfirmEventRequest::default()
+    };
+    confirm.set_confirmed_periodic_rate_hz(hz).expect("a rate");
+    bench.hear(PEER, &confirm);
+}
+
+/// Confirms all that was asked for since the last call; says how much that was.
+fn confirm_all(bench: &mut Bench, event_id: u8, hz: f64) -> usize {
+    let asked = bench.sent::<CreateEvent>();
+    for create in &asked {
+        confirm(bench, create.request_id, event_id, hz);
+    }
+    asked.len()
+}
+
+fn event_of(event_id: u8, sequence_number: u8, report_message: Bytes) -> Event {
+    Event {
+        event_id,
+        sequence_number,
+        report_message,
+    }
+}
+
+fn fire(bench: &mut Bench, event: u8, sequence: u8) {
+    let report = ReportStatus::default().encode().expect("a report");
+    bench.hear(PEER, &event_of(event, sequence, report));
+}
+
+/// What was told since the last call, in short.
+#[derive(Debug, PartialEq)]
+enum Told {
+    Up(Option<u32>),
+    Report { lost: u8 },
+    Down(Outage),
+    Ended(SubscriptionEnd),
+}
+
+fn told(bench: &mut Bench) -> Vec<Told> {
+    let events = bench.events().into_iter();
+    events
+        .filter_map(|event| match event {
+            StackEvent::Subscription(_, news) => Some(match news {
+                SubscriptionNews::Up { hz } => Told::Up(hz.map(|hz| hz.round() as u32)),
+                SubscriptionNews::Report { lost, .. } => Told::Report { lost },
+                SubscriptionNews::Down { why, .. } => Told::Down(why),
+                SubscriptionNews::Ended(end) => Told::Ended(end),
+            }),
+            _ => None,
+        })
+        .collect()
+}
+
+/// A bench with a confirmed subscription, the event 7.
+fn up(when: When) -> (Bench, SubscriptionId) {
+    let mut bench = Bench::new();
+    let id = subscribe(&mut bench, &status(when));
+    let hz = match when {
+        When::Periodic { hz, .. } => hz,
+        When::OnChange => 0.0,
+    };
+    assert_eq!(confirm_all(&mut bench, 7, hz), 1);
+    assert!(matches!(told(&mut bench)[..], [Told::Up(_)]));
+    (bench, id)
+}
+
+#[test]
+fn an_event_is_created_as_it_was_asked_for() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::hz(10.0)));
+    subscribe(&mut bench, &status(When::OnChange));
+    let [periodic, on_change] = &bench.sent::<CreateEvent>()[..] else {
+        panic!("two events are to be created");
+    };
+    assert_eq!(periodic.event_type, EventType::PERIODIC_SC);
+    assert!((periodic.requested_periodic_rate_hz() - 10.0).abs() < 0.01);
+    assert_eq!(periodic.query_message[..], [0x02, 0x20]);
+    assert_eq!(on_change.event_type, EventType::EVERY_CHANGE);
+    assert_eq!(on_change.requested_periodic_rate_hz(), 0.0);
+    assert_ne!(periodic.request_id, on_change.request_id);
+}
+
+#[test]
+fn the_confirmed_rate_is_told() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::hz(50.0)));
+    confirm_all(&mut bench, 7, 25.0);
+    assert_eq!(told(&mut bench), [Told::Up(Some(25))]);
+}
+
+#[test]
+fn a_lost_confirmation_is_asked_for_with_the_same_request() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::hz(1.0)));
+    bench.run_ms(600);
+    let asked = bench.sent::<CreateEvent>();
+    assert_eq!(asked.len(), 2);
+    assert_eq!(asked[0], asked[1]);
+    confirm(&mut bench, asked[1].request_id, 7, 1.0);
+    assert_eq!(told(&mut bench), [Told::Up(Some(1))]);
+}
+
+#[test]
+fn a_report_that_is_ahead_of_its_confirmation_is_not_lost() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::OnChange));
+    fire(&mut bench, 7, 0);
+    assert_eq!(told(&mut bench), []);
+    assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
+    assert_eq!(told(&mut bench), [Told::Up(None), Told::Report { lost: 0 }]);
+}
+
+#[test]
+fn who_neither_confirms_nor_rejects_is_given_up() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::hz(1.0)));
+    bench.run_ms(1500);
+    let [Told::Ended(SubscriptionEnd::NoAnswer(failure))] = told(&mut bench)[..] else {
+        panic!("it is to be given up");
+    };
+    assert_eq!((failure.peer, failure.tries), (PEER, 3));
+    bench.sent.clear();
+    bench.run_ms(60_000);
+    assert_eq!(bench.sent, []);
+}
+
+#[test]
+fn a_rejection_ends_it_with_the_reason() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::hz(1.0)));
+    let request_id = bench.sent::<CreateEvent>()[0].request_id;
+    let reject = RejectEventRequest {
+        request_id,
+        response_code: Some(5.into()),
+        error_message: None,
+    };
+    bench.hear(PEER, &reject);
+    let [Told::Ended(end)] = &told(&mut bench)[..] else {
+        panic!("it is rejected");
+    };
+    assert_eq!(
+        end.to_string(),
+        "it was refused: it has no events for this message (code 5)"
+    );
+}
+
+#[test]
+fn a_rate_below_what_is_of_use_is_refused_and_cancelled() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::hz(50.0).at_least(20.0)));
+    confirm_all(&mut bench, 7, 10.0);
+    assert!(matches!(
+        told(&mut bench)[..],
+        [Told::Ended(SubscriptionEnd::TooSlow { .. })]
+    ));
+    assert_eq!(bench.sent::<CancelEvent>()[0].event_id, 7);
+}
+
+#[test]
+fn gaps_in_the_numbers_are_lost_reports_and_repetitions_are_no_reports() {
+    let (mut bench, _) = up(When::hz(100.0));
+    for sequence in [254, 254, 255, 2, 1, 3] {
+        fire(&mut bench, 7, sequence);
+    }
+    let report = |lost| Told::Report { lost };
+    assert_eq!(
+        told(&mut bench),
+        [report(0), report(0), report(2), report(0)]
+    );
+}
+
+#[test]
+fn a_periodic_event_that_stops_is_down_until_it_is_confirmed_again() {
+    let (mut bench, _) = up(When::hz(2.0));
+    fire(&mut bench, 7, 0);
+    bench.run_ms(1900);
+    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
+    bench.run_ms(200);
+    assert_eq!(told(&mut bench), [Told::Down(Outage::Silent)]);
+    bench.run_ms(60_000);
+    let attempts = bench.sent::<CreateEvent>();
+    assert!((10..20).contains(&attempts.len()), "{}", attempts.len());
+    // It comes back with another number.
+    confirm(&mut bench, attempts[0].request_id, 1, 2.0);
+    fire(&mut bench, 1, 0);
+    assert_eq!(
+        told(&mut bench),
+        [Told::Up(Some(2)), Told::Report { lost: 0 }]
+    );
+}
+
+#[test]
+fn a_stream_that_goes_on_by_itself_is_up_again() {
+    let (mut bench, _) = up(When::hz(10.0));
+    fire(&mut bench, 7, 0);
+    bench.run_ms(600);
+    fire(&mut bench, 7, 6);
+    assert_eq!(
+        told(&mut bench),
+        [
+            Told::Report { lost: 0 },
+            Told::Down(Outage::Silent),
+            Told::Up(Some(10)),
+            Told::Report { lost: 5 }
+        ]
+    );
+}
+
+#[test]
+fn an_event_is_renewed_three_times_in_the_shortest_lifetime() {
+    let (mut bench, _) = up(When::OnChange);
+    let mut renewals = 0;
+    for _ in 0..600 {
+        bench.run_ms(100);
+        renewals += confirm_all(&mut bench, 7, 0.0);
+    }
+    assert!((2..=3).contains(&renewals), "{renewals}");
+    assert_eq!(told(&mut bench), []);
+}
+
+#[test]
+fn reports_on_change_are_down_when_nobody_confirms_them() {
+    let (mut bench, _) = up(When::OnChange);
+    bench.run_ms(30_000);
+    assert_eq!(told(&mut bench), [Told::Down(Outage::Unconfirmed)]);
+    bench.run_ms(600_000);
+    assert!(confirm_all(&mut bench, 3, 0.0) > 100);
+    assert_eq!(told(&mut bench), [Told::Up(None)]);
+}
+
+#[test]
+fn a_peer_that_restarted_and_does_not_offer_the_report_yet_is_asked_again() {
+    let (mut bench, _) = up(When::OnChange);
+    bench.run_ms(20_000);
+    let request_id = bench.sent::<CreateEvent>()[0].request_id;
+    let reject = RejectEventRequest {
+        request_id,
+        ..RejectEventRequest::default()
+    };
+    bench.hear(PEER, &reject);
+    assert!(matches!(
+        told(&mut bench)[..],
+        [Told::Down(Outage::Refused(_))]
+    ));
+    bench.run_ms(5200);
+    assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
+    assert_eq!(told(&mut bench), [Told::Up(None)]);
+}
+
+#[test]
+fn a_number_that_is_given_twice_means_that_the_first_owner_must_ask_again() {
+    let (mut bench, _) = up(When::OnChange);
+    subscribe(&mut bench, &status(When::hz(1.0)));
+    assert_eq!(confirm_all(&mut bench, 7, 1.0), 1);
+    bench.run_ms(0);
+    let asked = bench.sent::<CreateEvent>();
+    assert_eq!(asked.len(), 1);
+    assert_eq!(asked[0].event_type, EventType::EVERY_CHANGE);
+}
+
+#[test]
+fn events_with_the_same_number_are_told_apart_by_their_reports() {
+    let (mut bench, first) = up(When::OnChange);
+    let second = subscribe(&mut bench, &control(When::OnChange));
+    confirm_all(&mut bench, 7, 0.0);
+    bench.events();
+    let report = ReportControl::default().encode().expect("a report");
+    bench.hear(PEER, &event_of(7, 0, report));
+    fire(&mut bench, 7, 0);
+    let owners: Vec<_> = bench
+        .events()
+        .into_iter()
+        .filter_map(|event| match event {
+            StackEvent::Subscription(id, SubscriptionNews::Report { .. }) => Some(id),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(owners, [second, first]);
+}
+
+#[test]
+fn an_event_that_nobody_wants_is_cancelled_but_not_for_every_copy() {
+    let (mut bench, _) = up(When::OnChange);
+    for sequence in 0..100 {
+        fire(&mut bench, 9, sequence);
+        bench.run_ms(1);
+    }
+    let cancelled = bench.sent::<CancelEvent>();
+    assert_eq!(cancelled.len(), 1);
+    assert_eq!(cancelled[0].event_id, 9);
+    confirm(&mut bench, cancelled[0].request_id, 9, 0.0);
+    assert_eq!(told(&mut bench), []);
+    bench.run_ms(10_000);
+    assert_eq!(bench.sent::<CancelEvent>(), []);
+}
+
+#[test]
+fn strangers_that_pour_events_get_ten_answers_a_second_at_most() {
+    let (mut bench, _) = up(When::OnChange);
+    let report = ReportStatus::default().encode().expect("a report");
+    for number in 0..10_000_u32 {
+        let event = event_of(number as u8, 0, report.clone());
+        bench.hear(OTHER, &event);
+        bench.run(Duration::from_micros(100));
+    }
+    assert!(bench.sent.len() <= 30, "{}", bench.sent.len());
+}
+
+#[test]
+fn without_a_subscription_events_are_the_applications() {
+    let mut bench = Bench::new();
+    fire(&mut bench, 7, 0);
+    assert!(matches!(bench.events()[..], [StackEvent::Message(_)]));
+    assert_eq!(bench.sent, []);
+}
+
+#[test]
+fn what_is_dropped_is_cancelled_until_that_is_confirmed() {
+    let (mut bench, id) = up(When::hz(1.0));
+    bench.stack.unsubscribe(bench.now, id);
+    fire(&mut bench, 7, 0);
+    bench.run_ms(600);
+    let cancelled = bench.sent::<CancelEvent>();
+    assert_eq!(cancelled.len(), 2);
+    assert_eq!(cancelled[0], cancelled[1]);
+    confirm(&mut bench, cancelled[0].request_id, 7, 0.0);
+    bench.run_ms(60_000);
+    assert_eq!(bench.sent, []);
+    assert_eq!(told(&mut bench), []);
+}
+
+#[test]
+fn a_cancellation_that_may_have_hit_another_event_has_that_one_renewed() {
+    let (mut bench, id) = up(When::OnChange);
+    subscribe(&mut bench, &control(When::OnChange));
+    confirm_all(&mut bench, 7, 0.0);
+    bench.stack.unsubscribe(bench.now, id);
+    bench.collect();
+    let request = bench.sent::<CancelEvent>()[0].request_id;
+    confirm(&mut bench, request, 7, 0.0);
+    bench.run_ms(0);
+    assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
+}
+
+#[test]
+fn what_cannot_be_asked_for_is_refused_at_once() {
+    let mut bench = Bench::new();
+    let mut topic = status(When::hz(1.0));
+    let mut refusal = |topic: &Topic| {
+        bench
+            .stack
+            .subscribe(bench.now, topic, Patience::default())
+            .expect_err("it is to be refused")
+    };
+    for hz in [0.0, 0.001, -1.0, 1093.0, f64::NAN, f64::INFINITY] {
+        topic.when = When::hz(hz);
+        assert!(matches!(refusal(&topic), CannotSubscribe::Rate { .. }));
+    }
+    topic.peer = topic.peer.whole_subsystem();
+    assert!(matches!(
+        refusal(&topic),
+        CannotSubscribe::NotOneComponent(_)
+    ));
+}
+
+#[test]
+fn there_is_room_for_two_hundred_subscriptions_to_one_peer() {
+    let mut bench = Bench::new();
+    for _ in 0..200 {
+        subscribe(&mut bench, &status(When::OnChange));
+    }
+    let mut requests: Vec<_> = bench
+        .sent::<CreateEvent>()
+        .iter()
+        .map(|create| create.request_id)
+        .collect();
+    requests.sort_unstable();
+    requests.dedup();
+    assert_eq!(requests.len(), 200);
+    let topic = status(When::OnChange);
+    let one_more = bench
+        .stack
+        .subscribe(bench.now, &topic, Patience::default());
+    assert_eq!(one_more, Err(CannotSubscribe::TooMany(200)));
+}
+
+#[test]
+fn taking_leave_cancels_everything_with_one_word() {
+    let (mut bench, _) = up(When::hz(1.0));
+    bench.stack.take_leave(bench.now);
+    bench.collect();
+    assert_eq!(bench.sent::<CancelEvent>().len(), 1);
+}
