@@ -12,6 +12,7 @@ mod discover;
 mod doctor;
 mod encode;
 mod failure;
+mod judge;
 mod monitor;
 mod network;
 mod node;
@@ -56,6 +57,7 @@ enum Command {
     Discover(discover::Discover),
     Doctor(doctor::Doctor),
     Ping(ping::Ping),
+    Judge(judge::Judge),
     Query(query::Query),
     Record(record::Record),
     Replay(replay::Replay),
@@ -72,6 +74,7 @@ impl Command {
             Self::Discover(discover) => discover.run(),
             Self::Doctor(doctor) => doctor.run(),
             Self::Ping(ping) => ping.run(),
+            Self::Judge(judge) => judge.run(),
             Self::Query(query) => query.run(),
             Self::Record(record) => record.run(),
             Self::Replay(replay) => replay.run(),

@@ -178,8 +178,13 @@ impl Network {
     /// For a command that runs for a moment beside other nodes: a passing id, whatever the file
     /// says, and any free port unless a flag names one.
     fn for_a_moment(&self) -> Result<(JausId, Config), Failure> {
+        self.for_a_moment_as(passing_id())
+    }
+
+    /// The same for a command that has a usual id.
+    fn for_a_moment_as(&self, usual: JausId) -> Result<(JausId, Config), Failure> {
         let (_, node) = self.settings()?;
-        let id = self.id.map_or_else(passing_id, |OwnId(id)| id);
+        let id = self.id.map_or(usual, |OwnId(id)| id);
         let node = self.with_flags(node.or_any_free_port(), id)?;
         Ok((id, node))
     }
@@ -187,12 +192,21 @@ impl Network {
     /// The same for a command that looks at the numbers of its node, so that it needs one of its
     /// own.
     pub(crate) fn for_own_node(&self, command: &str) -> Result<(JausId, Config), Failure> {
+        self.for_own_node_as(passing_id(), command)
+    }
+
+    /// The same for a command that has a usual id.
+    pub(crate) fn for_own_node_as(
+        &self,
+        usual: JausId,
+        command: &str,
+    ) -> Result<(JausId, Config), Failure> {
         if self.attach.is_some() {
             return Err(Failure::new(format!(
                 "`{command}` runs a node of its own: leave --attach out"
             )));
         }
-        self.for_a_moment()
+        self.for_a_moment_as(usual)
     }
 
     /// A component for a command that runs for a moment, on the host's node or on one of its own.

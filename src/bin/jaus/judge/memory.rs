@@ -1,0 +1,54 @@
+//! What a run remembers from one exchange to the next.
+
+use jaus::address::JausId;
+
+use super::step::{Speaker, Stream};
+
+/// What earlier answers told, for later questions and checks.
+#[derive(Debug)]
+pub(super) struct Memory {
+    /// Who is judged.
+    pub(super) subject: JausId,
+    /// The judge's own ids, in the order of [`Speaker::ALL`].
+    pub(super) panel: [JausId; 5],
+    /// The event stream of the steps on events.
+    pub(super) event: Option<u8>,
+    /// All event streams that were confirmed and not cancelled, the oldest first.
+    pub(super) streams: Vec<Stream>,
+    /// The position that was reported before a command that must be ignored.
+    pub(super) position: Option<[f64; 2]>,
+    /// The time stamp of the last report that had one, in milliseconds of the day.
+    pub(super) time: Option<u32>,
+    /// How many waypoints of the drive have been reached, in their order.
+    pub(super) reached: usize,
+}
+
+impl Memory {
+    pub(super) fn new(subject: JausId, panel: [JausId; 5]) -> Self {
+        Self {
+            subject,
+            panel,
+            event: None,
+            streams: Vec::new(),
+            position: None,
+            time: None,
+            reached: 0,
+        }
+    }
+
+    /// The id of one of the judge's components.
+    pub(super) const fn id(&self, speaker: Speaker) -> JausId {
+        self.panel[speaker as usize]
+    }
+
+    /// The event stream that an earlier step created.
+    pub(super) fn event(&self) -> Result<u8, String> {
+        self.event
+            .ok_or_else(|| "there is no event: its creation (step B4) was not confirmed".to_owned())
+    }
+
+    /// Takes an event stream down as cancelled.
+    pub(super) fn forget_stream(&mut self, id: u8) {
+        self.streams.retain(|stream| stream.id != id);
+    }
+}

@@ -1,0 +1,204 @@
+//! The report that people read while the run goes on, and its end.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::view::{Content, Dictionary, to_hex};
+
+use super::step::Form;
+use super::subject::Subject;
+use super::verdict::{Proceeding, Said, StepResult, Tally, Verdict};
+
+/// Octets of a message that are shown at most, as text; lists of services can be long.
+const LONGEST: usize = 400;
+
+/// Writes in words and, on a terminal, in colours.
+pub(super) struct Report<'d> {
+    dictionary: &'d Dictionary,
+    colours: bool,
+}
+
+/// The colours, as terminals want them told.
+const GREEN: &str = "32";
+const RED: &str = "31";
+const GREY: &str = "90";
+
+impl<'d> Report<'d> {
+    pub(super) const fn new(dictionary: &'d Dictionary, colours: bool) -> Self {
+        Self {
+            dictionary,
+            colours,
+        }
+    }
+
+    /// Who is judged.
+    pub(super) fn subject(&self, subject: &Subject) -> Vec<String> {
+        let name = subject.name.as_ref();
+        let name = name.map_or(String::new(), |name| format!(" \"{name}\""));
+        let Some(services) = &subject.services else {
+            let id = subject.id;
+            return vec![format!(
+                "{id}{name} does not list its services: no step is skipped"
+            )];
+        };
+        let mut lines = vec![format!("{}{name} offers", subject.id)];
+        let service =
+            |(urn, (major, minor)): (&String, &(u8, u8))| format!("    {urn} {major}.{minor}");
+        lines.extend(services.iter().map(service));
+        lines
+    }
+
+    /// What stands above the steps of a form.
+    pub(super) fn form(&self, form: Form) -> String {
+        match form {
+            Form::Multicast => "by multicast, to all components of the node".to_owned(),
+            Form::Unicast => "by unicast, to the component".to_owned(),
+        }
+    }
+
+    /// One step: a line, and what was said if it went wrong or if all is wanted.
+    pub(super) fn step(&self, result: &StepResult, everything: bool) -> Vec<String> {
+        let verdict = match result.verdict {
+            Verdict::Passed => self.coloured(GREEN, "passed "),
+            Verdict::Failed(_) => self.coloured(RED, "FAILED "),
+            Verdict::Skipped(_) => self.coloured(GREY, "skipped"),
+        };
+        let latencies = result.proceedings.iter().filter_map(|one| one.latency);
+        let slowest = latencies
+            .max()
+            .map(|latency| format!("  {}", millis(latency)));
+        let because = match &result.verdict {
+            Verdict::Skipped(reason) => format!("  ({reason})"),
+            _ => String::new(),
+        };
+        let (name, title) = (result.name, result.title);
+        let slowest = slowest.unwrap_or_default();
+        let mut lines = vec![format!("  {verdict}  {name:<3}  {title}{because}{slowest}")];
+        let failed = matches!(result.verdict, Verdict::Failed(_));
+        if failed || everything {
+            let said = result.proceedings.iter();
+            lines.extend(said.flat_map(|proceeding| self.proceeding(proceeding)));
+        }
+        if let Verdict::Failed(reason) = &result.verdict {
+            lines.push(format!(
+                "{INDENT}{}    {reason}",
+                self.coloured(RED, "reason")
+            ));
+        }
+        lines
+    }
+
+    fn proceeding(&self, proceeding: &Proceeding) -> Vec<String> {
+        let mut lines = Vec::new();
+        if let Some(said) = &proceeding.sent {
+            lines.push(format!("{INDENT}sent      {}", self.said(said)));
+        }
+        for expected in &proceeding.expected {
+            lines.push(format!("{INDENT}expected  {expected}"));
+        }
+        for said in &proceeding.came {
+            lines.push(format!("{INDENT}came      {}", self.said(said)));
+        }
+        if let Some(latency) = proceeding.latency {
+            lines.push(format!("{INDENT}in        {}", millis(latency)));
+        }
+        if let Some(measured) = &proceeding.measured {
+            lines.push(format!("{INDENT}measured  {measured}"));
+        }
+        if proceeding.came.is_empty()
+            && proceeding.measured.is_none()
+            && proceeding.sent.is_some()
+            && !proceeding.expected.is_empty()
+        {
+            lines.push(format!("{INDENT}came      nothing"));
+        }
+        lines
+    }
+
+    fn said(&self, said: &Said) -> String {
+        let Said { from, to, octets } = said;
+        format!("{from} -> {to}  {}", in_words(self.dictionary, octets))
+    }
+
+    /// How it went, and what that means.
+    pub(super) fn end(&self, subject: &Subject, tally: &Tally, took: Duration) -> Vec<String> {
+        let Tally {
+            passed,
+            failed,
+            skipped,
+            ..
+        } = tally;
+        let steps = tally.steps();
+        let took = took.as_secs_f64();
+        let mut lines = vec![String::new()];
+        lines.push(format!(
+            "{steps} steps in {took:.0} s: {passed} passed, {failed} failed, {skipped} skipped"
+        ));
+        if let Some((median, most)) = tally.latency() {
+            let (median, most) = (millis(median), millis(most));
+            lines.push(format!("answers took {median} (median) to {most} (most)"));
+        }
+        lines.push(conclusion(subject, tally));
+        lines
+    }
+
+    fn coloured(&self, colour: &str, text: &str) -> String {
+        if self.colours {
+            format!("\x1b[{colour}m{text}\x1b[0m")
+        } else {
+            text.to_owned()
+        }
+    }
+}
+
+const INDENT: &str = "           ";
+
+/// What a run means, in one sentence that promises no more than was tested.
+pub(super) fn conclusion(subject: &Subject, tally: &Tally) -> String {
+    let id = subject.id;
+    let steps = |number| {
+        if number == 1 {
+            "1 step".to_owned()
+        } else {
+            format!("{number} steps")
+        }
+    };
+    if tally.failed > 0 {
+        let failed = steps(tally.failed);
+        return format!("{id} does not conform to the judge's script as tested: {failed} failed");
+    }
+    if tally.passed == 0 {
+        return format!("nothing can be said about {id}: no step applies to what it offers");
+    }
+    let skipped = match tally.skipped {
+        0 => String::new(),
+        number => format!("; {} did not apply to what it offers", steps(number)),
+    };
+    let passed = steps(tally.passed);
+    format!("{id} conforms to the judge's script as tested: {passed} passed{skipped}")
+}
+
+/// A message as its name and its fields.
+pub(super) fn in_words(dictionary: &Dictionary, octets: &Bytes) -> String {
+    let line = dictionary.line(octets);
+    let name = line.message.unwrap_or("unknown message");
+    let content = match &line.content {
+        Content::Body(body) => serde_json::to_string(body).unwrap_or_default(),
+        Content::Unreadable { error, .. } => format!("{}, unreadable: {error}", to_hex(octets)),
+        _ => to_hex(octets),
+    };
+    let mut shown = String::from(name);
+    if content != "{}" && content != "null" {
+        shown.push(' ');
+        shown.extend(content.chars().take(LONGEST));
+    }
+    if content.chars().count() > LONGEST {
+        shown.push('…');
+    }
+    shown
+}
+
+/// Milliseconds, to a hundredth.
+fn millis(time: Duration) -> String {
+    format!("{:.2} ms", time.as_secs_f64() * 1e3)
+}

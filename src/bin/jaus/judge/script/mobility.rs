@@ -1,0 +1,252 @@
+//! Part B, steps 27 to 35: waypoints, velocity and pose.
+
+use bytes::Bytes;
+use jaus::codec::FormattedBlob;
+use jaus::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
+use jaus::messages::core::{
+    ConfirmElementRequest, QueryElementCount, QueryElementList, ReleaseControl, ReportElementCount,
+    ReportElementList, SetElement,
+};
+use jaus::messages::mobility::{
+    QueryActiveElement, QueryLocalWaypoint, QueryTravelSpeed, QueryVelocityState,
+    ReportActiveElement, ReportLocalPose, ReportLocalWaypoint, ReportTravelSpeed,
+    ReportVelocityState, SetLocalPose, SetLocalWaypoint,
+};
+
+use super::super::memory::Memory;
+use super::super::step::{Check, Exchange, Part, Speaker::Main, Step, equal, near, present, step};
+use super::challenge::{accepted, query_pose, released, request_control};
+use super::drive::{is_waypoint, list_is};
+use super::{ACCESS_CONTROL, LOCAL_POSE_SENSOR, LOCAL_WAYPOINT_DRIVER};
+use super::{LOCAL_WAYPOINT_LIST_DRIVER, VELOCITY_STATE_SENSOR};
+
+/// The judging tool's waypoint element: a Set Local Waypoint with X and Y, as it was captured.
+const ELEMENT: [u8; 11] = [
+    0x0D, 0x04, 0x00, 0xFF, 0xFF, 0xFF, 0x0F, 0xFF, 0xFF, 0xFF, 0x0F,
+];
+/// The request id of that element.
+const REQUEST: u8 = 0x2C;
+/// Where the pose is set to, on both axes, in metres.
+const FAR_AWAY: f64 = -1000.0;
+/// How far a pose may be from what was set, in metres: one step of its fields, and a little for a
+/// subject that computes in single precision.
+const POSE_SLACK: f64 = 0.01;
+/// How far a pose of a subject that stands still may wander, in metres.
+const WANDERING: f64 = 1.0;
+
+pub(super) fn steps() -> Vec<Step> {
+    let mut steps = waypoints();
+    steps.extend(sensors());
+    steps
+}
+
+/// Steps 27 to 32.
+fn waypoints() -> Vec<Step> {
+    let driver = |number, title| step(Part::B, number, title).needs(&[LOCAL_WAYPOINT_DRIVER]);
+    let list_driver =
+        |number, title| step(Part::B, number, title).needs(&[LOCAL_WAYPOINT_LIST_DRIVER]);
+    vec![
+        driver(27, "Query Travel Speed before anything is set").ask(
+            Main,
+            QueryTravelSpeed,
+            "a speed",
+            |_: &ReportTravelSpeed, _| Ok(()),
+        ),
+        step(Part::B, 28, "Set Local Waypoint")
+            .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_DRIVER])
+            .ask(Main, request_control(), "control accepted", accepted)
+            .act(set_waypoint().into())
+            .ask(
+                Main,
+                QueryLocalWaypoint { presence_vector: 0 },
+                "X = Y = 1 m",
+                |report: &ReportLocalWaypoint, _| is_waypoint(report, [1.0, 1.0]),
+            ),
+        step(Part::B, 29, "Release Control, and Query Travel Speed")
+            .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_DRIVER])
+            .rests_on(&[28])
+            .ask(Main, ReleaseControl, "control released", released)
+            .ask(
+                Main,
+                QueryTravelSpeed,
+                "a speed",
+                |_: &ReportTravelSpeed, _| Ok(()),
+            ),
+        step(Part::B, 30, "Set Element")
+            .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_LIST_DRIVER])
+            .ask(Main, request_control(), "control accepted", accepted)
+            .ask(
+                Main,
+                set_element(),
+                "request 44",
+                |report: &ConfirmElementRequest, _| {
+                    equal("the request id", report.request_id, REQUEST)
+                },
+            ),
+        list_driver(31, "What is in the list")
+            .rests_on(&[30])
+            .ask(
+                Main,
+                QueryElementCount,
+                "1 element",
+                |report: &ReportElementCount, _| {
+                    equal("the element count", report.element_count, 1)
+                },
+            )
+            .ask(
+                Main,
+                QueryElementList,
+                "element 1",
+                |report: &ReportElementList, _| {
+                    let uids = report
+                        .element_list
+                        .iter()
+                        .map(|element| element.element_uid);
+                    list_is(&uids.collect::<Vec<_>>(), &[1])
+                },
+            )
+            .ask(
+                Main,
+                QueryActiveElement,
+                "an element",
+                |_: &ReportActiveElement, _| Ok(()),
+            )
+            .ask(
+                Main,
+                QueryLocalWaypoint { presence_vector: 0 },
+                "a waypoint",
+                |_: &ReportLocalWaypoint, _| Ok(()),
+            ),
+        step(Part::B, 32, "Release Control")
+            .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_LIST_DRIVER])
+            .rests_on(&[30])
+            .ask(Main, ReleaseControl, "control released", released),
+    ]
+}
+
+/// Steps 33 to 35.
+fn sensors() -> Vec<Step> {
+    let pose =
+        |number, title| step(Part::B, number, title).needs(&[ACCESS_CONTROL, LOCAL_POSE_SENSOR]);
+    vec![
+        step(Part::B, 33, "Velocity state: everything, and nothing")
+            .needs(&[VELOCITY_STATE_SENSOR])
+            .ask(
+                Main,
+                query_velocity(u16::MAX),
+                "every field that there is",
+                |report: &ReportVelocityState, _| {
+                    if *report == ReportVelocityState::default() {
+                        return Err("the report is empty".to_owned());
+                    }
+                    Ok(())
+                },
+            )
+            .ask(
+                Main,
+                query_velocity(0),
+                "no fields",
+                |report: &ReportVelocityState, _| {
+                    is_empty(*report == ReportVelocityState::default())
+                },
+            ),
+        pose(34, "Set Local Pose without control is ignored")
+            .ask(
+                Main,
+                query_pose(u16::MAX),
+                "a position",
+                |report, memory| {
+                    memory.position = Some(position(report)?);
+                    Ok(())
+                },
+            )
+            .act(set_far_away().into())
+            .ask(
+                Main,
+                query_pose(u16::MAX),
+                "the same position",
+                |report, memory| {
+                    let [x, y] = memory.position.unwrap_or_default();
+                    let [now_x, now_y] = position(report)?;
+                    near("X", now_x, x, WANDERING)?;
+                    near("Y", now_y, y, WANDERING)
+                },
+            ),
+        pose(35, "Set Local Pose with control")
+            .ask(Main, request_control(), "control accepted", accepted)
+            .ask(Main, query_pose(u16::MAX), "a position", |report, _| {
+                position(report).map(drop)
+            })
+            .act(set_far_away().into())
+            .ask(
+                Main,
+                query_pose(u16::MAX),
+                "X = Y = -1000 m",
+                |report, _| {
+                    let [x, y] = position(report)?;
+                    near("X", x, FAR_AWAY, POSE_SLACK)?;
+                    near("Y", y, FAR_AWAY, POSE_SLACK)
+                },
+            )
+            .ask(
+                Main,
+                query_pose(0),
+                "no fields",
+                |report: &ReportLocalPose, _| is_empty(*report == ReportLocalPose::default()),
+            )
+            .ask(Main, ReleaseControl, "control released", released),
+    ]
+}
+
+const fn query_velocity(presence_vector: u16) -> QueryVelocityState {
+    QueryVelocityState { presence_vector }
+}
+
+fn set_waypoint() -> Exchange {
+    Exchange::with(Main, |_| {
+        let mut message = SetLocalWaypoint::default();
+        let set = message.set_x_m(1.0).and_then(|()| message.set_y_m(1.0));
+        set.map_err(|error| error.to_string())?;
+        Ok(message)
+    })
+}
+
+fn set_element() -> SetElement {
+    let element = ElementRec {
+        element_uid: 1,
+        element_data: FormattedBlob::new(
+            ElementDataFormat::JAUS_MESSAGE,
+            Bytes::from_static(&ELEMENT),
+        ),
+        ..ElementRec::default()
+    };
+    SetElement {
+        request_id_rec: RequestIdRec {
+            request_id: REQUEST,
+        },
+        element_list: vec![element],
+    }
+}
+
+fn set_far_away() -> Exchange {
+    Exchange::with(Main, |_: &Memory| {
+        let mut message = SetLocalPose::default();
+        let set = message
+            .set_x_m(FAR_AWAY)
+            .and_then(|()| message.set_y_m(FAR_AWAY));
+        set.map_err(|error| error.to_string())?;
+        Ok(message)
+    })
+}
+
+fn position(report: &ReportLocalPose) -> Result<[f64; 2], String> {
+    Ok([present("X", report.x_m())?, present("Y", report.y_m())?])
+}
+
+fn is_empty(empty: bool) -> Check {
+    if empty {
+        Ok(())
+    } else {
+        Err("there are fields that were not asked for".to_owned())
+    }
+}

@@ -1,0 +1,95 @@
+//! The script: every step of the two rule books, in order.
+//!
+//! The requests and their order are those of the public rules of the 2010 challenge (part A) and
+//! those seen from the judging tool of the 2015 one (part B), whose octets the tests replay. The
+//! answers that are required are those of the standard's definitions.
+
+mod asking;
+mod challenge;
+mod control;
+mod drive;
+mod events;
+mod mobility;
+
+use jaus::messages::{core, mobility as jss};
+
+use super::step::{Name, Step};
+
+/// The services that steps need.
+const DISCOVERY: &str = core::discovery::URN;
+const EVENTS: &str = core::events::URN;
+const LIVENESS: &str = core::liveness::URN;
+const ACCESS_CONTROL: &str = core::access_control::URN;
+const MANAGEMENT: &str = core::management::URN;
+const VELOCITY_STATE_SENSOR: &str = jss::velocity_state_sensor::URN;
+const LOCAL_POSE_SENSOR: &str = jss::local_pose_sensor::URN;
+const LOCAL_WAYPOINT_DRIVER: &str = jss::local_waypoint_driver::URN;
+const LOCAL_WAYPOINT_LIST_DRIVER: &str = jss::local_waypoint_list_driver::URN;
+
+/// The authority with which the judge takes control where nothing else is said.
+const AUTHORITY: u8 = 220;
+
+/// All steps, in the order in which they are carried out.
+pub(super) fn steps() -> Vec<Step> {
+    let parts = [
+        challenge::steps(),
+        drive::steps(),
+        asking::first(),
+        events::steps(),
+        asking::again(),
+        control::steps(),
+        mobility::steps(),
+        events::observer(),
+    ];
+    parts.into_iter().flatten().collect()
+}
+
+/// The steps to carry out for a selection, with those that they rest on.
+pub(super) fn selected(steps: Vec<Step>, chosen: impl Fn(Name) -> bool) -> Vec<Step> {
+    let mut wanted: Vec<Name> = Vec::new();
+    // Backwards, because a step rests on earlier ones only.
+    for step in steps.iter().rev() {
+        if chosen(step.name) || wanted.contains(&step.name) {
+            let part = step.name.part;
+            wanted.push(step.name);
+            wanted.extend(step.rests_on.iter().map(|&number| Name { part, number }));
+        }
+    }
+    let is_wanted = |step: &Step| wanted.contains(&step.name);
+    steps.into_iter().filter(is_wanted).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::step::Part;
+    use super::*;
+
+    #[test]
+    fn every_step_of_the_rule_books_is_there_once_and_in_order() {
+        let names: Vec<_> = steps().iter().map(|step| step.name).collect();
+        let a = (1..=6).map(|number| (Part::A, number));
+        let b = (1..=36).map(|number| (Part::B, number));
+        let all: Vec<_> = a.chain(b).collect();
+        assert_eq!(
+            names.iter().map(|n| (n.part, n.number)).collect::<Vec<_>>(),
+            all
+        );
+    }
+
+    #[test]
+    fn a_step_rests_on_earlier_ones_only() {
+        for step in steps() {
+            for &number in step.rests_on {
+                assert!(number < step.name.number, "{} on {number}", step.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_selection_brings_along_what_it_rests_on() {
+        let only: Name = "B17".parse().unwrap();
+        let chosen = selected(steps(), |name| name == only);
+        let names: Vec<_> = chosen.iter().map(|step| step.name.to_string()).collect();
+        assert_eq!(names, ["B15", "B17"]);
+    }
+}

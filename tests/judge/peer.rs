@@ -1,0 +1,197 @@
+//! A peer that answers what it is told to answer, right or wrong, and nothing else.
+
+use std::collections::BTreeMap;
+use std::net::{Ipv4Addr, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::codec::{Message, Text};
+use jaus::endpoint::{Outgoing, Received};
+use jaus::link::Group;
+use jaus::messages::core::report_identification::{QueryType, Type};
+use jaus::messages::core::report_services::{
+    ComponentRec, ComponentSeq, NodeRec, NodeSeq, ServiceRec,
+};
+use jaus::messages::core::{
+    QueryHeartbeatPulse, QueryIdentification, QueryServices, ReportHeartbeatPulse,
+    ReportIdentification, ReportServices,
+};
+use jaus::node::{Config, Node};
+
+/// Who the peers of these tests are.
+pub(crate) const PEER: JausId = JausId::new(105, 1, 1);
+
+/// Any UDP port that is free just now.
+pub(crate) fn free_port() -> u16 {
+    let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    socket.local_addr().unwrap().port()
+}
+
+/// Flags for a network of one test's own on the loopback interface; the last is the group.
+pub(crate) fn network() -> Vec<String> {
+    let group = format!("239.255.78.1:{}", free_port());
+    ["--loopback", "--group", &group]
+        .map(str::to_owned)
+        .to_vec()
+}
+
+/// What a peer says to whoever asked; `None` to the asker itself.
+type Answer = (Option<JausId>, Bytes);
+
+/// What a peer is to do.
+#[derive(Default)]
+pub(crate) struct Peer {
+    services: Vec<&'static str>,
+    /// Answers by the code of the request: the first to the first request, and so on; the last
+    /// one is given again and again.
+    answers: BTreeMap<u16, Vec<Vec<Answer>>>,
+    delay: Duration,
+}
+
+/// A peer on the network; gone when dropped.
+pub(crate) struct Running {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Peer {
+    /// A peer that lists these services, and answers only what finds them out.
+    pub(crate) fn offering(services: &[&'static str]) -> Self {
+        let mut peer = Self::default();
+        peer.services.extend(services);
+        peer.services.push(jaus::messages::core::transport::URN);
+        peer.services.push(jaus::messages::core::discovery::URN);
+        peer
+    }
+
+    /// Answers the next request of this kind so.
+    pub(crate) fn answers<Q: Message>(self, answer: &impl Message) -> Self {
+        self.answers_octets(Q::CODE, answer.encode().unwrap())
+    }
+
+    /// Answers the next request with this code so.
+    pub(crate) fn answers_octets(mut self, code: u16, octets: Bytes) -> Self {
+        let answers = self.answers.entry(code).or_default();
+        answers.push(vec![(None, octets)]);
+        self
+    }
+
+    /// Answers the next request of this kind to somebody else.
+    pub(crate) fn answers_to<Q: Message>(mut self, to: JausId, answer: &impl Message) -> Self {
+        let answers = self.answers.entry(Q::CODE).or_default();
+        answers.push(vec![(Some(to), answer.encode().unwrap())]);
+        self
+    }
+
+    /// Takes its time for everything that is not about who it is.
+    pub(crate) fn late(mut self, delay: Duration) -> Self {
+        self.delay = delay;
+        self
+    }
+
+    /// Puts the peer on the loopback interface, into the group that the flags name.
+    pub(crate) fn start(self, flags: &[String]) -> Running {
+        let group: Group = flags.last().unwrap().parse().unwrap();
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = stop.clone();
+        let (ready, is_ready) = std::sync::mpsc::channel();
+        let thread = std::thread::spawn(move || {
+            let runtime = tokio::runtime::Builder::new_current_thread()
+                .enable_all()
+                .build()
+                .unwrap();
+            runtime.block_on(self.run(group, &stopped, ready));
+        });
+        is_ready.recv().unwrap();
+        Running {
+            stop,
+            thread: Some(thread),
+        }
+    }
+
+    async fn run(mut self, group: Group, stop: &AtomicBool, ready: std::sync::mpsc::Sender<()>) {
+        let config = Config::loopback(PEER.subsystem(), PEER.node()).group(group);
+        let node = Node::start(config).unwrap();
+        let mut port = node.attach(PEER.component()).unwrap();
+        ready.send(()).unwrap();
+        while !stop.load(Ordering::Relaxed) {
+            let soon = Duration::from_millis(20);
+            let Ok(Some(request)) = tokio::time::timeout(soon, port.recv()).await else {
+                continue;
+            };
+            for (to, octets) in self.answer(&request).await {
+                let to = to.unwrap_or(request.source);
+                port.send(Outgoing::new(PEER, to, octets)).unwrap();
+            }
+        }
+    }
+
+    async fn answer(&mut self, request: &Received) -> Vec<Answer> {
+        let code = u16::from_le_bytes(*request.payload.first_chunk().unwrap());
+        if let Some(answers) = self.answers.get_mut(&code) {
+            tokio::time::sleep(self.delay).await;
+            let last = answers.len() == 1;
+            return if last {
+                answers[0].clone()
+            } else {
+                answers.remove(0)
+            };
+        }
+        let octets = match code {
+            QueryIdentification::CODE => identification(&request.payload).encode(),
+            QueryServices::CODE => self.services().encode(),
+            QueryHeartbeatPulse::CODE
+                if self.services.contains(&jaus::messages::core::liveness::URN) =>
+            {
+                ReportHeartbeatPulse.encode()
+            }
+            _ => return Vec::new(),
+        };
+        vec![(None, octets.unwrap())]
+    }
+
+    fn services(&self) -> ReportServices {
+        let service = |urn: &&'static str| ServiceRec {
+            uri: Text::from_static(urn),
+            major_version_number: 1,
+            minor_version_number: 1,
+        };
+        let component = ComponentSeq {
+            component_rec: ComponentRec {
+                component_id: PEER.component(),
+                instance_id: 0,
+            },
+            service_list: self.services.iter().map(service).collect(),
+        };
+        ReportServices {
+            node_list: vec![NodeSeq {
+                node_rec: NodeRec {
+                    node_id: PEER.node(),
+                },
+                component_list: vec![component],
+            }],
+        }
+    }
+}
+
+fn identification(query: &Bytes) -> ReportIdentification {
+    let query = QueryIdentification::decode(query).unwrap();
+    ReportIdentification {
+        query_type: QueryType(query.query_type.0),
+        r#type: Type::VEHICLE,
+        identification: Text::from_static("Puppet"),
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
