@@ -25,6 +25,8 @@ pub mod messages;
 #[cfg(feature = "node")]
 pub mod node;
 pub mod service;
+#[cfg(feature = "mobility")]
+pub mod vehicle;
 #[cfg(feature = "view")]
 pub mod view;
 pub mod wire;

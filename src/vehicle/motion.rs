@@ -1,0 +1,140 @@
+//! Where a vehicle is and how it moves, in the units and axes of AS6009.
+
+use std::f64::consts::{PI, TAU};
+
+/// Where a vehicle is in the local frame, and how it is turned.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Pose {
+    /// Metres along the local X axis.
+    pub x: f64,
+    /// Metres along the local Y axis.
+    pub y: f64,
+    /// Metres along the local Z axis, down positive.
+    pub z: f64,
+    /// Radians about the forward axis.
+    pub roll: f64,
+    /// Radians about the axis to the right.
+    pub pitch: f64,
+    /// Radians about the axis that points down; 0 looks along the local X axis.
+    pub yaw: f64,
+}
+
+/// How fast a vehicle moves, along and about its own axes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Velocity {
+    /// Metres per second forward.
+    pub x: f64,
+    /// Metres per second to the right.
+    pub y: f64,
+    /// Metres per second downwards.
+    pub z: f64,
+    /// Radians per second about the forward axis.
+    pub roll: f64,
+    /// Radians per second about the axis to the right.
+    pub pitch: f64,
+    /// Radians per second about the axis that points down: positive turns to the right.
+    pub yaw: f64,
+}
+
+/// How a vehicle's velocity changes, along and about its own axes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Acceleration {
+    /// Metres per second squared forward.
+    pub x: f64,
+    /// Metres per second squared to the right.
+    pub y: f64,
+    /// Metres per second squared downwards.
+    pub z: f64,
+    /// Radians per second squared about the forward axis.
+    pub roll: f64,
+    /// Radians per second squared about the axis to the right.
+    pub pitch: f64,
+    /// Radians per second squared about the axis that points down.
+    pub yaw: f64,
+}
+
+/// All that a platform tells about its motion.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Motion {
+    /// Where it is.
+    pub pose: Pose,
+    /// How fast it moves.
+    pub velocity: Velocity,
+    /// How that changes.
+    pub acceleration: Acceleration,
+}
+
+impl Pose {
+    /// A pose on the ground, looking along the local X axis.
+    #[must_use]
+    pub fn at(x: f64, y: f64) -> Self {
+        Self {
+            x,
+            y,
+            ..Self::default()
+        }
+    }
+
+    /// Metres over ground from here to a point.
+    #[must_use]
+    pub fn distance(&self, x: f64, y: f64) -> f64 {
+        (x - self.x).hypot(y - self.y)
+    }
+
+    /// The heading in which a point lies; 0 if it is here.
+    #[must_use]
+    pub fn bearing(&self, x: f64, y: f64) -> f64 {
+        (y - self.y).atan2(x - self.x)
+    }
+}
+
+impl Velocity {
+    /// Forward at a speed in metres per second, while turning right at so many radians per second.
+    #[must_use]
+    pub fn forward(x: f64, yaw: f64) -> Self {
+        Self {
+            x,
+            yaw,
+            ..Self::default()
+        }
+    }
+
+    /// Whether this is as good as standing still: below 1 mm/s and 1 mrad/s.
+    #[must_use]
+    pub fn is_rest(&self) -> bool {
+        let all = [self.x, self.y, self.z, self.roll, self.pitch, self.yaw];
+        all.iter().all(|value| value.abs() < 0.001)
+    }
+}
+
+/// The same angle between -π (excluded) and π (included).
+#[must_use]
+pub fn wrap(angle: f64) -> f64 {
+    let turned = angle.rem_euclid(TAU);
+    if turned > PI { turned - TAU } else { turned }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_angle_is_wrapped_into_half_a_turn_either_way() {
+        for (angle, expected) in [
+            (0.0, 0.0),
+            (PI, PI),
+            (-PI, PI),
+            (1.5 * PI, -0.5 * PI),
+            (-7.0 * PI / 2.0, PI / 2.0),
+        ] {
+            assert!((wrap(angle) - expected).abs() < 1e-12, "{angle}");
+        }
+    }
+
+    #[test]
+    fn bearings_are_clockwise_from_the_x_axis() {
+        let here = Pose::at(1.0, 1.0);
+        assert!((here.bearing(1.0, 2.0) - PI / 2.0).abs() < 1e-12);
+        assert!((here.distance(4.0, 5.0) - 5.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,371 @@
+//! The motion control: pursues one goal at a time, and stops the platform when there is none.
+
+use std::time::{Duration, Instant};
+
+use super::steering::{along, towards, turn_rate};
+use super::{
+    Curve, Drive, Effort, Frame, GlobalPose, Limits, Motion, Platform, Pose, Velocity, Waypoint,
+    wrap,
+};
+
+/// What a vehicle is to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Goal {
+    /// To use its drives and brakes without feedback.
+    Effort(Effort),
+    /// To move with a velocity along and about its own axes.
+    Velocity(Velocity),
+    /// To keep a speed in metres per second and a heading in radians; without a heading, to go
+    /// straight on.
+    Vector {
+        /// Metres per second.
+        speed: f64,
+        /// Radians clockwise from the local X axis.
+        heading: Option<f64>,
+    },
+    /// To drive to a place.
+    Waypoint {
+        /// The place.
+        to: Waypoint,
+        /// Metres per second at most.
+        speed: f64,
+        /// Whether it goes on from there, so that it need not stop.
+        goes_on: bool,
+    },
+    /// To drive along a curve to its end.
+    Path {
+        /// The curve.
+        curve: Curve,
+        /// Metres per second at most.
+        speed: f64,
+        /// At what distance in metres the end counts as reached.
+        tolerance: f64,
+        /// Whether it goes on from there, so that it need not stop.
+        goes_on: bool,
+    },
+}
+
+/// Names one goal of a [`Pilot`], so that whoever set it can tell it from later ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Ticket(u64);
+
+/// Drives a platform to its goal.
+///
+/// Time comes through [`handle_time`](Self::handle_time), whoever calls it and however often; the
+/// platform is controlled every [`STEP`](Self::STEP) of it.
+pub struct Pilot {
+    platform: Box<dyn Platform>,
+    frame: Frame,
+    limits: Limits,
+    course: Option<Course>,
+    /// What the platform was told last.
+    command: Drive,
+    tickets: u64,
+    time: Option<Instant>,
+}
+
+/// A goal that is pursued.
+#[derive(Debug)]
+struct Course {
+    goal: Goal,
+    ticket: Ticket,
+    has_arrived: bool,
+    /// Whether it is at its waypoint, and only turns.
+    is_turning: bool,
+    /// The points of a curve that lie ahead.
+    ahead: Vec<(f64, f64)>,
+    /// The heading of somebody who goes straight on.
+    straight: f64,
+}
+
+impl Pilot {
+    /// Between two moments of control.
+    pub const STEP: Duration = Duration::from_millis(20);
+    /// The longest time that is made up for at once. What is longer was no driving, but a computer
+    /// that slept.
+    pub const LONGEST_GAP: Duration = Duration::from_secs(2);
+
+    /// A pilot without a goal, on a platform whose local frame lies at a place of the globe.
+    #[must_use]
+    pub fn new(platform: impl Platform + 'static, frame: Frame) -> Self {
+        let limits = platform.limits();
+        Self {
+            platform: Box::new(platform),
+            frame,
+            limits,
+            course: None,
+            command: Drive::Stop,
+            tickets: 0,
+            time: None,
+        }
+    }
+
+    /// It is `now`. May be called as often as one likes.
+    pub fn handle_time(&mut self, now: Instant) {
+        let mut time = self.time.unwrap_or(now);
+        if self.is_idle() {
+            time = time.max(now);
+        }
+        let gap = now.saturating_duration_since(time);
+        if gap > Self::LONGEST_GAP {
+            tracing::warn!(
+                seconds = gap.as_secs_f64(),
+                "the vehicle's time stood still"
+            );
+            time = now.checked_sub(Self::LONGEST_GAP).unwrap_or(now);
+        }
+        while time + Self::STEP <= now {
+            time += Self::STEP;
+            self.control();
+            self.platform.handle_time(time);
+        }
+        self.time = Some(time);
+        if self.is_idle() {
+            self.platform.handle_time(time);
+        }
+    }
+
+    /// Pursues another goal from now on, instead of any earlier one.
+    pub fn pursue(&mut self, goal: Goal) -> Ticket {
+        self.tickets += 1;
+        let ticket = Ticket(self.tickets);
+        let ahead = match &goal {
+            Goal::Path { curve, .. } => curve.points(),
+            _ => Vec::new(),
+        };
+        self.course = Some(Course {
+            goal,
+            ticket,
+            has_arrived: false,
+            is_turning: false,
+            ahead,
+            straight: self.motion().pose.yaw,
+        });
+        ticket
+    }
+
+    /// Gives up whatever goal there is, and stops.
+    pub fn stop(&mut self) {
+        self.course = None;
+        self.drive(Drive::Stop);
+    }
+
+    /// Gives up a goal and stops, unless another one has been set since.
+    pub fn give_up(&mut self, ticket: Ticket) {
+        if self.pursues(ticket) {
+            self.stop();
+        }
+    }
+
+    /// Whether this is the goal that is pursued, or that has been reached.
+    #[must_use]
+    pub fn pursues(&self, ticket: Ticket) -> bool {
+        self.course
+            .as_ref()
+            .is_some_and(|course| course.ticket == ticket)
+    }
+
+    /// Whether this goal is the last one, and has been reached.
+    #[must_use]
+    pub fn has_arrived(&self, ticket: Ticket) -> bool {
+        let course = self.course.as_ref();
+        course.is_some_and(|course| course.ticket == ticket && course.has_arrived)
+    }
+
+    /// Changes the speed with which a goal is pursued, in metres per second.
+    pub fn set_speed(&mut self, ticket: Ticket, wanted: f64) {
+        let course = self
+            .course
+            .as_mut()
+            .filter(|course| course.ticket == ticket);
+        if let Some(
+            Goal::Vector { speed, .. } | Goal::Waypoint { speed, .. } | Goal::Path { speed, .. },
+        ) = course.map(|course| &mut course.goal)
+        {
+            *speed = wanted;
+        }
+    }
+
+    /// Where the platform is and how it moves.
+    #[must_use]
+    pub fn motion(&self) -> Motion {
+        self.platform.motion()
+    }
+
+    /// Where on the globe it is.
+    #[must_use]
+    pub fn global_pose(&self) -> GlobalPose {
+        self.frame.to_global(&self.motion().pose)
+    }
+
+    /// Where the local frame lies.
+    #[must_use]
+    pub const fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// From now on the place where the platform is has this local pose. Its global pose stays.
+    pub fn set_pose(&mut self, pose: Pose) {
+        let pose = Pose {
+            yaw: wrap(pose.yaw),
+            ..pose
+        };
+        self.frame = Frame::joining(&pose, &self.global_pose());
+        self.platform.set_pose(pose);
+    }
+
+    /// From now on the place where the platform is has this global pose. Its local pose stays.
+    pub fn set_global_pose(&mut self, pose: GlobalPose) {
+        self.frame = Frame::joining(&self.motion().pose, &pose);
+    }
+
+    /// The limits that are kept: those of the platform, or narrower ones.
+    #[must_use]
+    pub const fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Narrows the limits; the platform's own hold in any case.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.limits = limits.and(&self.platform.limits());
+    }
+
+    /// Whether it stands still, and wants to.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        self.command == Drive::Stop && self.motion().velocity.is_rest()
+    }
+
+    /// When [`handle_time`](Self::handle_time) must be called.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        if self.is_idle() {
+            return None;
+        }
+        Some(self.time? + Self::STEP)
+    }
+
+    /// Whether it stands still and has nothing to do.
+    fn is_idle(&self) -> bool {
+        let course = self.course.as_ref();
+        self.is_at_rest() && course.is_none_or(|course| course.has_arrived)
+    }
+
+    /// One moment of control.
+    fn control(&mut self) {
+        let pose = self.motion().pose;
+        let limits = self.limits;
+        let command = match &mut self.course {
+            Some(course) => course.command(&pose, &limits),
+            None => Drive::Stop,
+        };
+        self.drive(command);
+    }
+
+    fn drive(&mut self, command: Drive) {
+        self.command = match command {
+            Drive::Velocity(velocity) => Drive::Velocity(self.limits.clamp(velocity)),
+            other => other,
+        };
+        self.platform.drive(self.command);
+    }
+}
+
+impl Course {
+    /// What to do now; notes the arrival.
+    fn command(&mut self, pose: &Pose, limits: &Limits) -> Drive {
+        let velocity = match self.goal {
+            Goal::Effort(effort) => return Drive::Effort(effort),
+            Goal::Velocity(velocity) => velocity,
+            Goal::Vector { speed, heading } => {
+                along(pose.yaw, heading.unwrap_or(self.straight), speed, limits)
+            }
+            Goal::Waypoint { to, speed, goes_on } => {
+                return self.reach(pose, to, speed, goes_on, limits);
+            }
+            Goal::Path {
+                curve,
+                speed,
+                tolerance,
+                goes_on,
+            } => {
+                let end = Waypoint {
+                    tolerance,
+                    ..Waypoint::at(curve.end.0, curve.end.1)
+                };
+                return self.follow(pose, end, speed, goes_on, limits);
+            }
+        };
+        Drive::Velocity(velocity)
+    }
+
+    fn reach(
+        &mut self,
+        pose: &Pose,
+        to: Waypoint,
+        speed: f64,
+        goes_on: bool,
+        limits: &Limits,
+    ) -> Drive {
+        self.has_arrived |= to.is_reached(pose) && (goes_on || to.heading.is_none());
+        match to.heading {
+            Some(heading) if !goes_on && (self.is_turning || to.is_reached(pose)) => {
+                self.turn(pose, heading, limits)
+            }
+            _ if self.has_arrived && !goes_on => Drive::Stop,
+            _ => {
+                let distance = pose.distance(to.x, to.y);
+                let way = if goes_on { f64::INFINITY } else { distance };
+                Drive::Velocity(towards(pose, (to.x, to.y), speed, way, limits))
+            }
+        }
+    }
+
+    /// At the waypoint, turns to the heading that is wanted there.
+    fn turn(&mut self, pose: &Pose, heading: f64, limits: &Limits) -> Drive {
+        // From here on it turns, even should it slip out of the tolerance.
+        self.is_turning = true;
+        let error = wrap(heading - pose.yaw).abs();
+        self.has_arrived |= error <= Waypoint::HEADING_TOLERANCE;
+        if self.has_arrived {
+            return Drive::Stop;
+        }
+        Drive::Velocity(Velocity::forward(0.0, turn_rate(pose.yaw, heading, limits)))
+    }
+
+    fn follow(
+        &mut self,
+        pose: &Pose,
+        end: Waypoint,
+        speed: f64,
+        goes_on: bool,
+        limits: &Limits,
+    ) -> Drive {
+        self.has_arrived |= self.ahead.len() <= 2 && end.is_reached(pose);
+        if self.has_arrived && !goes_on {
+            return Drive::Stop;
+        }
+        let look = Self::LOOK_AHEAD.max(speed * Self::LOOK_AHEAD_TIME);
+        self.pass(pose, look);
+        let target = self.ahead.first().copied().unwrap_or((end.x, end.y));
+        let way = if goes_on {
+            f64::INFINITY
+        } else {
+            pose.distance(end.x, end.y)
+        };
+        Drive::Velocity(towards(pose, target, speed, way, limits))
+    }
+
+    /// How far ahead on a curve it aims, in metres.
+    const LOOK_AHEAD: f64 = 0.4;
+    /// The same in seconds of driving.
+    const LOOK_AHEAD_TIME: f64 = 0.5;
+
+    /// Leaves those points of the curve behind that are closer than it aims.
+    fn pass(&mut self, pose: &Pose, look: f64) {
+        let ahead = |&(x, y): &(f64, f64)| pose.distance(x, y) > look;
+        let passed = self.ahead.iter().position(ahead);
+        let passed = passed.unwrap_or(self.ahead.len().saturating_sub(1));
+        self.ahead.drain(..passed);
+    }
+}

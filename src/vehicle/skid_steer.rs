@@ -1,0 +1,199 @@
+//! A simulated vehicle that steers by turning its left and right wheels at different speeds.
+
+use std::time::{Duration, Instant};
+
+use super::random::Random;
+use super::{Acceleration, Drive, Effort, Limits, Motion, Platform, Pose, Velocity, wrap};
+
+/// How a simulated vehicle behaves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SkidSteerConfig {
+    /// What it can do at most.
+    pub limits: Limits,
+    /// How much its wheels slip: the standard deviation of its velocity, as a share of the
+    /// velocity. 0 means that it moves exactly as it wants to.
+    pub noise: f64,
+    /// Where the noise comes from: the same seed and the same commands give the same course.
+    pub seed: u64,
+}
+
+impl Default for SkidSteerConfig {
+    fn default() -> Self {
+        Self {
+            limits: Limits::default(),
+            noise: 0.0,
+            seed: 1,
+        }
+    }
+}
+
+/// A simulated skid-steer platform on flat ground.
+///
+/// It is integrated in steps of at most [`STEP`](Self::STEP). Its speed and yaw rate follow what
+/// is wanted within the limits; full effort reaches full speed, because drag grows with speed.
+#[derive(Debug, Clone)]
+pub struct SkidSteer {
+    config: SkidSteerConfig,
+    command: Drive,
+    motion: Motion,
+    /// Speed and yaw rate of the wheels; the vehicle's own are these and the slip.
+    wheels: (f64, f64),
+    slip: (f64, f64),
+    random: Random,
+    time: Option<Instant>,
+}
+
+impl SkidSteer {
+    /// The longest step of the integration.
+    pub const STEP: Duration = Duration::from_millis(10);
+    /// The longest time that is made up for at once: several times what it is called after.
+    pub const LONGEST_GAP: Duration = Duration::from_millis(100);
+    /// How fast slip forgets, per second.
+    const SLIP_CHANGE: f64 = 2.0;
+
+    /// A vehicle that stands at the origin of its local frame.
+    #[must_use]
+    pub fn new(config: SkidSteerConfig) -> Self {
+        Self {
+            config,
+            command: Drive::Stop,
+            motion: Motion::default(),
+            wheels: (0.0, 0.0),
+            slip: (0.0, 0.0),
+            random: Random::new(config.seed),
+            time: None,
+        }
+    }
+
+    fn step(&mut self, seconds: f64) {
+        let limits = &self.config.limits;
+        let (speed, turn) = self.wheels;
+        let (speed, turn) = match self.command {
+            Drive::Stop => (
+                approach(speed, 0.0, limits.deceleration * seconds),
+                approach(turn, 0.0, limits.yaw_acceleration * seconds),
+            ),
+            Drive::Velocity(wanted) => {
+                let wanted = limits.clamp(wanted);
+                (
+                    self.towards(speed, wanted.x, seconds),
+                    approach(turn, wanted.yaw, limits.yaw_acceleration * seconds),
+                )
+            }
+            Drive::Effort(effort) => self.push(effort, seconds),
+        };
+        self.wheels = (speed, turn);
+        self.let_slip(seconds);
+        self.integrate(seconds);
+    }
+
+    /// A speed closer to the one that is wanted; slowing down is quicker than getting faster.
+    fn towards(&self, speed: f64, wanted: f64, seconds: f64) -> f64 {
+        let limits = &self.config.limits;
+        let slows = wanted.abs() < speed.abs() || wanted * speed < 0.0;
+        let (goal, rate) = if slows {
+            let goal = if wanted * speed < 0.0 { 0.0 } else { wanted };
+            (goal, limits.deceleration)
+        } else {
+            (wanted, limits.acceleration)
+        };
+        approach(speed, goal, rate * seconds)
+    }
+
+    /// Speed and yaw rate after a moment of effort, drag and brakes.
+    fn push(&self, effort: Effort, seconds: f64) -> (f64, f64) {
+        let limits = &self.config.limits;
+        let (speed, turn) = self.wheels;
+        let top = if speed < 0.0 {
+            limits.reverse
+        } else {
+            limits.speed
+        };
+        let drive = limits.acceleration * (effort.forward.clamp(-1.0, 1.0) - speed / top);
+        let twist =
+            limits.yaw_acceleration * (effort.turn.clamp(-1.0, 1.0) - turn / limits.yaw_rate);
+        let brake = limits.deceleration * effort.brake.clamp(0.0, 1.0);
+        let turn_brake = limits.yaw_acceleration * effort.turn_brake.clamp(0.0, 1.0);
+        let pushed = limits.clamp(Velocity::forward(
+            approach(speed + drive * seconds, 0.0, brake * seconds),
+            approach(turn + twist * seconds, 0.0, turn_brake * seconds),
+        ));
+        // Drag and brakes together hold no better than the tyres.
+        (
+            approach(speed, pushed.x, limits.deceleration * seconds),
+            approach(turn, pushed.yaw, limits.yaw_acceleration * seconds),
+        )
+    }
+
+    /// Slip wanders around 0, without jumps.
+    fn let_slip(&mut self, seconds: f64) {
+        if self.config.noise == 0.0 {
+            return;
+        }
+        let keep = (-Self::SLIP_CHANGE * seconds).exp();
+        let spread = self.config.noise * (1.0 - keep * keep).sqrt();
+        self.slip.0 = self.slip.0 * keep + spread * self.random.normal();
+        self.slip.1 = self.slip.1 * keep + spread * self.random.normal();
+    }
+
+    fn integrate(&mut self, seconds: f64) {
+        let limits = &self.config.limits;
+        let before = self.motion.velocity;
+        let (speed, turn) = self.wheels;
+        let velocity = limits.clamp(Velocity::forward(
+            speed * (1.0 + self.slip.0),
+            turn * (1.0 + self.slip.1),
+        ));
+        let pose = &mut self.motion.pose;
+        // Along an arc, which half of the turn describes well enough within a step.
+        let heading = pose.yaw + velocity.yaw * seconds / 2.0;
+        pose.x += velocity.x * heading.cos() * seconds;
+        pose.y += velocity.x * heading.sin() * seconds;
+        pose.yaw = wrap(pose.yaw + velocity.yaw * seconds);
+        self.motion.velocity = velocity;
+        self.motion.acceleration = Acceleration {
+            x: (velocity.x - before.x) / seconds,
+            // What the passengers feel in a curve.
+            y: velocity.x * velocity.yaw,
+            yaw: (velocity.yaw - before.yaw) / seconds,
+            ..Acceleration::default()
+        };
+    }
+}
+
+impl Platform for SkidSteer {
+    fn handle_time(&mut self, now: Instant) {
+        let since = now.saturating_duration_since(self.time.unwrap_or(now));
+        self.time = Some(self.time.map_or(now, |time| time.max(now)));
+        let mut left = since.min(Self::LONGEST_GAP);
+        while !left.is_zero() {
+            let step = left.min(Self::STEP);
+            self.step(step.as_secs_f64());
+            left -= step;
+        }
+    }
+
+    fn motion(&self) -> Motion {
+        self.motion
+    }
+
+    fn set_pose(&mut self, pose: Pose) {
+        self.motion.pose = Pose {
+            yaw: wrap(pose.yaw),
+            ..pose
+        };
+    }
+
+    fn drive(&mut self, command: Drive) {
+        self.command = command;
+    }
+
+    fn limits(&self) -> Limits {
+        self.config.limits
+    }
+}
+
+/// A value closer to a goal by at most `most`.
+fn approach(value: f64, goal: f64, most: f64) -> f64 {
+    value + (goal - value).clamp(-most, most)
+}
