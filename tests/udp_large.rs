@@ -15,7 +15,7 @@ use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::endpoint::{Event, Outgoing};
+use jaus::endpoint::{Counter, Event, Outgoing};
 use jaus::link::Group;
 use jaus::node::{Config, Node, Port};
 
@@ -117,7 +117,7 @@ async fn sixteen_mebibytes_with_acknowledgement_arrive_through_usual_buffers() {
 /// More than a mailbox holds.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn what_was_acknowledged_is_not_dropped_when_the_receiver_is_slow() {
-    let (_nodes, [sender, mut receiver]) = pair(None).await;
+    let (nodes, [sender, mut receiver]) = pair(None).await;
     const MESSAGES: usize = 40;
     let payloads: Vec<Bytes> = (0..MESSAGES).map(|number| image(1 << 20, number)).collect();
     let mut sent = Vec::new();
@@ -126,12 +126,16 @@ async fn what_was_acknowledged_is_not_dropped_when_the_receiver_is_slow() {
         let sender = sender.sender();
         sent.push(tokio::spawn(async move { sender.deliver(message).await }));
     }
-    // The mailbox is full, and more wants to come, before anything is read.
-    sent.remove(0).await.unwrap().expect("the first has room");
+    // Nothing is read before the mailbox is full.
+    let full = async {
+        while nodes[1].counters().get(Counter::ReceiverBusy) == 0 {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+    };
+    tokio::time::timeout(LIMIT, full).await.expect("never full");
     let mut received = Vec::new();
     while received.len() < MESSAGES {
         received.push(receive(&mut receiver).await);
-        tokio::task::yield_now().await;
     }
     for result in sent {
         result.await.unwrap().expect("all is read in the end");
