@@ -108,48 +108,22 @@ impl Clients {
         patience: Patience,
         transmit: impl FnOnce(&mut Stack) -> Result<(), node::SendError>,
     ) {
+        // Whoever asked may have gone away: what cannot be told is nobody's loss.
         match hold {
             Hold::Subscribe { topic, reply } => {
-                let id = match stack.subscribe(Instant::now(), &topic, patience) {
-                    Ok(id) => id,
-                    // Here and below: whoever asked may have gone away.
-                    Err(error) => {
-                        let _ = reply.send(Err(NotSubscribed::Impossible(error)));
-                        return;
-                    }
-                };
-                match transmit(stack) {
-                    Ok(()) => {
-                        self.subscribing.insert(id, reply);
-                    }
-                    Err(error) => {
-                        stack.unsubscribe(Instant::now(), id);
-                        let _ = reply.send(Err(NotSubscribed::NotSent(error)));
-                    }
+                match begin_subscription(stack, &topic, patience, transmit) {
+                    Ok(id) => drop(self.subscribing.insert(id, reply)),
+                    Err(error) => drop(reply.send(Err(error))),
                 }
             }
             Hold::Control {
                 peer,
                 authority,
                 reply,
-            } => {
-                let id = match stack.request_control(Instant::now(), peer, authority, patience) {
-                    Ok(id) => id,
-                    Err(why) => {
-                        let _ = reply.send(Err(NotControlled::Refused(why)));
-                        return;
-                    }
-                };
-                match transmit(stack) {
-                    Ok(()) => {
-                        self.asking.insert(id, reply);
-                    }
-                    Err(error) => {
-                        stack.release_control(Instant::now(), id);
-                        let _ = reply.send(Err(NotControlled::NotSent(error)));
-                    }
-                }
-            }
+            } => match begin_control(stack, peer, authority, patience, transmit) {
+                Ok(id) => drop(self.asking.insert(id, reply)),
+                Err(error) => drop(reply.send(Err(error))),
+            },
         }
     }
 
@@ -230,4 +204,39 @@ impl Drop for Clients {
             feed.stop();
         }
     }
+}
+
+fn begin_subscription(
+    stack: &mut Stack,
+    topic: &Topic,
+    patience: Patience,
+    transmit: impl FnOnce(&mut Stack) -> Result<(), node::SendError>,
+) -> Result<SubscriptionId, NotSubscribed> {
+    let now = Instant::now();
+    let id = stack
+        .subscribe(now, topic, patience)
+        .map_err(NotSubscribed::Impossible)?;
+    transmit(stack).map_err(|error| {
+        stack.unsubscribe(now, id);
+        NotSubscribed::NotSent(error)
+    })?;
+    Ok(id)
+}
+
+fn begin_control(
+    stack: &mut Stack,
+    peer: JausId,
+    authority: u8,
+    patience: Patience,
+    transmit: impl FnOnce(&mut Stack) -> Result<(), node::SendError>,
+) -> Result<ControlId, NotControlled> {
+    let now = Instant::now();
+    let id = stack
+        .request_control(now, peer, authority, patience)
+        .map_err(NotControlled::Refused)?;
+    transmit(stack).map_err(|error| {
+        stack.release_control(now, id);
+        NotControlled::NotSent(error)
+    })?;
+    Ok(id)
 }

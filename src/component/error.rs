@@ -106,24 +106,24 @@ impl QueryError {
 #[non_exhaustive]
 pub enum SubscribeError {
     /// It cannot even be asked for.
-    #[error("no subscription to {query} of {peer} is possible")]
+    #[error("no subscription to {query} of {peer} is possible: {why}")]
     Impossible {
         /// Whose reports were wanted.
         peer: JausId,
         /// What was to be answered again and again.
         query: &'static str,
         /// Why not.
-        source: CannotSubscribe,
+        why: CannotSubscribe,
     },
     /// The peer did not confirm it.
-    #[error("no subscription to {query} of {peer}")]
+    #[error("no subscription to {query} of {peer}: {why}")]
     Ended {
         /// Whose reports were wanted.
         peer: JausId,
         /// What was to be answered again and again.
         query: &'static str,
         /// Why not.
-        source: SubscriptionEnd,
+        why: SubscriptionEnd,
     },
     /// The request could not be sent.
     #[error("CreateEvent for {query} could not be sent to {peer}")]

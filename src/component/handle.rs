@@ -161,11 +161,10 @@ impl Component {
         query: &Q,
         when: When,
     ) -> Result<Subscription<R>, SubscribeError> {
-        let query_name = Q::NAME;
-        let impossible = |source| SubscribeError::Impossible {
+        let impossible = |why| SubscribeError::Impossible {
             peer,
-            query: query_name,
-            source,
+            query: Q::NAME,
+            why,
         };
         let topic = Topic {
             peer,
@@ -176,11 +175,11 @@ impl Component {
         let subscribed = self.hold(|reply| Hold::Subscribe { topic, reply }).await;
         match subscribed.ok_or(SubscribeError::Stopped)? {
             Ok((ticket, feed)) => Ok(Subscription::new(ticket, self.clone(), peer, feed)),
-            Err(NotSubscribed::Impossible(source)) => Err(impossible(source)),
-            Err(NotSubscribed::Ended(source)) => Err(SubscribeError::Ended {
+            Err(NotSubscribed::Impossible(why)) => Err(impossible(why)),
+            Err(NotSubscribed::Ended(why)) => Err(SubscribeError::Ended {
                 peer,
                 query: Q::NAME,
-                source,
+                why,
             }),
             Err(NotSubscribed::NotSent(error)) => Err(SubscribeError::NotSent {
                 peer,

@@ -60,12 +60,12 @@ pub enum CannotSubscribe {
 #[non_exhaustive]
 pub enum SubscriptionEnd {
     /// The peer refused the event.
-    #[error("it was refused: {0}")]
+    #[error("the peer refuses it: {0}")]
     Rejected(Rejection),
     /// The peer neither confirmed nor refused it.
     #[error(
-        "{} answered CreateEvent with neither ConfirmEventRequest nor RejectEventRequest: asked {} times in {:.1} s",
-        .0.peer, .0.tries, .0.waited.as_secs_f64()
+        "CreateEvent was answered with neither ConfirmEventRequest nor RejectEventRequest: asked {} times in {:.1} s",
+        .0.tries, .0.waited.as_secs_f64()
     )]
     NoAnswer(NoAnswer),
     /// The peer is slower than is of use.

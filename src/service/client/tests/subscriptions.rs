@@ -186,7 +186,7 @@ fn a_rejection_ends_it_with_the_reason() {
     };
     assert_eq!(
         end.to_string(),
-        "it was refused: it has no events for this message (code 5)"
+        "the peer refuses it: it has no events for this message (code 5)"
     );
 }
 
