@@ -8,6 +8,7 @@
 //! |---|---|
 //! | [`Transport`] | is listed; the endpoint does its work |
 //! | [`Liveness`] | answers Query Heartbeat Pulse, sends a heartbeat if asked to |
+//! | [`ListManager`] | keeps a list of elements that drivers work off |
 //! | [`Discovery`] | says who we are, finds out who the others are, keeps the [`Directory`] |
 //! | [`Handlers`] | whatever an application offers, one function per message |
 
@@ -17,8 +18,13 @@ mod directory;
 mod discovery;
 mod handlers;
 mod inquiries;
+mod list;
 mod liveness;
+#[cfg(feature = "mobility")]
+pub mod mobility;
 mod outbox;
+#[cfg(test)]
+mod rig;
 mod stack;
 mod standing;
 mod transport;
@@ -37,6 +43,7 @@ pub use directory::{Component, Directory, Identification, Kind, Level, Node, Off
 pub use discovery::{Change, Discovery, Loss, Profile, Scope, Timing};
 pub use handlers::Handlers;
 pub use inquiries::{Inquiry, NoAnswer, Patience};
+pub use list::{ElementList, Elements, ListManager};
 pub use liveness::Liveness;
 pub use outbox::Outbox;
 pub use stack::{Event, Stack};

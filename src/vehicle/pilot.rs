@@ -61,6 +61,7 @@ pub struct Pilot {
     /// What the platform was told last.
     command: Drive,
     tickets: u64,
+    steps: u64,
     time: Option<Instant>,
 }
 
@@ -96,6 +97,7 @@ impl Pilot {
             course: None,
             command: Drive::Stop,
             tickets: 0,
+            steps: 0,
             time: None,
         }
     }
@@ -116,6 +118,7 @@ impl Pilot {
         }
         while time + Self::STEP <= now {
             time += Self::STEP;
+            self.steps += 1;
             self.control();
             self.platform.handle_time(time);
         }
@@ -190,6 +193,13 @@ impl Pilot {
     #[must_use]
     pub fn motion(&self) -> Motion {
         self.platform.motion()
+    }
+
+    /// How many steps the platform has been controlled so far: as long as this is the same, nothing
+    /// has moved.
+    #[must_use]
+    pub const fn steps(&self) -> u64 {
+        self.steps
     }
 
     /// Where on the globe it is.

@@ -1,0 +1,230 @@
+//! The List Manager service: a linked list of elements that a client builds and drivers work off.
+//!
+//! The list itself is [`ElementList`], behind the shared handle [`Elements`]; [`ListManager`] is
+//! the service that lets clients read and change it. Drivers that work a list off hold a clone of
+//! the same handle, and say what kinds of elements they can work with
+//! ([`Elements::accept`]).
+
+mod elements;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use bytes::Bytes;
+
+use super::{Context, Handled, Service, Standing, State, code_of, read};
+use crate::codec::{Message, ServiceId};
+use crate::endpoint::Received;
+use crate::messages::core::reject_element_request::ResponseCode;
+use crate::messages::core::set_element::{ElementDataFormat, ElementRec};
+use crate::messages::core::{
+    ConfirmElementRequest, DeleteElement, QueryElement, QueryElementCount, QueryElementList,
+    RejectElementRequest, ReportElement, ReportElementCount, ReportElementList, SetElement,
+    list_manager, report_element_list,
+};
+
+pub use elements::ElementList;
+
+/// A list that a [`ListManager`] and any number of drivers share.
+#[derive(Debug, Clone, Default)]
+pub struct Elements {
+    shared: Arc<Mutex<Shared>>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    list: ElementList,
+    kinds: BTreeMap<u16, fn(&Bytes) -> bool>,
+}
+
+impl Elements {
+    /// An empty list that takes no elements until something is [accepted](Self::accept).
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Elements that hold a message of type `M` are welcome.
+    pub fn accept<M: Message>(&self) {
+        let is_readable: fn(&Bytes) -> bool = |octets| M::decode(octets).is_ok();
+        self.lock().kinds.insert(M::CODE, is_readable);
+    }
+
+    /// The element with a number, if it is in the list; 0 stands for the first one.
+    #[must_use]
+    pub fn get(&self, uid: u16) -> Option<ElementRec> {
+        self.lock().list.get(uid).cloned()
+    }
+
+    /// Removes everything.
+    pub fn clear(&self) {
+        self.lock().list.clear();
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Shared> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Shared {
+    /// Whether a driver can work with an element.
+    fn check(&self, element: &ElementRec) -> Result<(), ResponseCode> {
+        let data = &element.element_data;
+        let is_readable = code_of(&data.data).and_then(|code| self.kinds.get(&code));
+        let is_readable = is_readable.is_some_and(|is_readable| is_readable(&data.data));
+        if data.format == ElementDataFormat::JAUS_MESSAGE && is_readable {
+            Ok(())
+        } else {
+            Err(ResponseCode::UNSUPPORTED_ELEMENT_TYPE)
+        }
+    }
+
+    fn set(&mut self, elements: &[ElementRec]) -> Result<(), ResponseCode> {
+        elements
+            .iter()
+            .try_for_each(|element| self.check(element))?;
+        self.list.set(elements)
+    }
+}
+
+/// Lets clients read the list, and the client in control change it.
+///
+/// A request is carried out as a whole or refused as a whole. A reset of the component empties the
+/// list.
+#[derive(Debug)]
+pub struct ListManager {
+    elements: Elements,
+}
+
+impl ListManager {
+    /// The service over a list.
+    #[must_use]
+    pub const fn new(elements: Elements) -> Self {
+        Self { elements }
+    }
+
+    fn set(&self, message: &Received, context: &mut Context<'_>) {
+        if let Some(request) = requested::<SetElement>(message, context) {
+            let result = self.elements.lock().set(&request.element_list);
+            let id = request.request_id_rec.request_id;
+            answer(id, result, message, context);
+        }
+    }
+
+    fn delete(&self, message: &Received, context: &mut Context<'_>) {
+        if let Some(request) = requested::<DeleteElement>(message, context) {
+            let uids = request.delete_element_list.iter();
+            let uids: Vec<_> = uids.map(|element| element.element_uid).collect();
+            let result = self.elements.lock().list.delete(&uids);
+            let id = request.request_id_rec.request_id;
+            answer(id, result, message, context);
+        }
+    }
+
+    /// An element that is not there is not reported: the definition has no answer for it.
+    fn report(&self, message: &Received, context: &mut Context<'_>) {
+        let element = read::<QueryElement>(message);
+        let element = element.and_then(|query| self.elements.get(query.element_uid));
+        if let Some(element) = element {
+            let report = ReportElement {
+                element_uid: element.element_uid,
+                previous_uid: element.previous_uid,
+                next_uid: element.next_uid,
+                element_data: element.element_data,
+            };
+            context.reply(message, &report);
+        }
+    }
+
+    fn report_list(&self) -> ReportElementList {
+        let shared = self.elements.lock();
+        let uids = shared.list.uids();
+        ReportElementList {
+            element_list: uids
+                .map(|element_uid| report_element_list::ElementListRec { element_uid })
+                .collect(),
+        }
+    }
+
+    fn report_count(&self) -> ReportElementCount {
+        ReportElementCount {
+            element_count: self.elements.lock().list.len(),
+        }
+    }
+}
+
+/// A request of the client in control; others' are ignored.
+fn requested<M: Message>(message: &Received, context: &Context<'_>) -> Option<M> {
+    if context.standing().obeys(message.source) {
+        return read(message);
+    }
+    tracing::debug!(source = %message.source, message = M::NAME, "not in control");
+    None
+}
+
+/// Confirms or refuses a request, and says that the list has changed.
+fn answer(
+    request_id: u8,
+    result: Result<(), ResponseCode>,
+    message: &Received,
+    context: &mut Context<'_>,
+) {
+    match result {
+        Ok(()) => {
+            context.reply(message, &ConfirmElementRequest { request_id });
+            changed(context);
+        }
+        Err(response_code) => {
+            tracing::debug!(source = %message.source, ?response_code, "element request refused");
+            let refusal = RejectElementRequest {
+                request_id,
+                response_code,
+            };
+            context.reply(message, &refusal);
+        }
+    }
+}
+
+fn changed(context: &mut Context<'_>) {
+    context.changed::<QueryElement>();
+    context.changed::<QueryElementList>();
+    context.changed::<QueryElementCount>();
+}
+
+impl Service for ListManager {
+    fn offers(&self) -> Vec<ServiceId> {
+        // Version 1.0 has the same messages; mobility drivers of 2009 inherit it.
+        let first = ServiceId {
+            minor: 0,
+            ..list_manager::V1_1
+        };
+        vec![list_manager::V1_1, first]
+    }
+
+    fn handle_message(
+        &mut self,
+        _: Instant,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Handled {
+        match code_of(&message.payload) {
+            Some(SetElement::CODE) => self.set(message, context),
+            Some(DeleteElement::CODE) => self.delete(message, context),
+            Some(QueryElement::CODE) => self.report(message, context),
+            Some(QueryElementList::CODE) => context.reply(message, &self.report_list()),
+            Some(QueryElementCount::CODE) => context.reply(message, &self.report_count()),
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+
+    fn handle_standing(&mut self, _: Instant, _: &Standing, context: &mut Context<'_>) {
+        if context.standing().state == State::Initialize {
+            self.elements.clear();
+            changed(context);
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! A message that has come for a vehicle, and all that is needed to deal with it.
+
+use std::time::{Duration, Instant};
+
+use super::clock;
+use super::vehicle::Cockpit;
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::messages::mobility::report_local_pose::TimeStamp;
+use crate::service::{Context, Standing, read};
+
+/// One message, with the vehicle and the context in which it came.
+pub(super) struct Exchange<'a, 'c> {
+    pub(super) now: Instant,
+    pub(super) cockpit: &'a mut Cockpit,
+    pub(super) message: &'a Received,
+    pub(super) context: &'a mut Context<'c>,
+}
+
+impl Exchange<'_, '_> {
+    /// Reads a query, whoever asks.
+    pub(super) fn query<Q: Message>(&self) -> Option<Q> {
+        read(self.message)
+    }
+
+    /// Reads what sets something up; only the client in control may.
+    pub(super) fn configure<M: Message>(&self) -> Option<M> {
+        self.read_if(Standing::obeys)
+    }
+
+    /// Reads what makes the vehicle act; only the client in control may, while the component is
+    /// ready.
+    pub(super) fn command<M: Message>(&self) -> Option<M> {
+        self.read_if(Standing::acts_for)
+    }
+
+    fn read_if<M: Message>(&self, may: fn(&Standing, crate::address::JausId) -> bool) -> Option<M> {
+        let (standing, source) = (self.context.standing(), self.message.source);
+        if may(standing, source) {
+            return read(self.message);
+        }
+        let state = standing.state;
+        tracing::debug!(%source, message = M::NAME, %state, "ignored: not in control or not ready");
+        None
+    }
+
+    /// Answers.
+    pub(super) fn reply<R: Message>(&mut self, report: &R) {
+        self.context.reply(self.message, report);
+    }
+
+    /// The time since the beginning of 1970, if it is known.
+    pub(super) fn since_1970(&self) -> Option<Duration> {
+        let clock = self.cockpit.clock.as_ref()?;
+        Some(clock.since_1970(self.now))
+    }
+
+    /// Seconds of the time since 1970, for the reports of version 1.1.
+    pub(super) fn seconds(&self) -> Option<u32> {
+        u32::try_from(self.since_1970()?.as_secs()).ok()
+    }
+
+    /// The rest of the time since 1970 in nanoseconds.
+    pub(super) fn nanoseconds(&self) -> Option<u32> {
+        Some(self.since_1970()?.subsec_nanos())
+    }
+
+    /// The time, for the reports of version 1.0.
+    pub(super) fn stamp(&self) -> Option<TimeStamp> {
+        clock::stamp(self.since_1970()?)
+    }
+}

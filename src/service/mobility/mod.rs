@@ -1,0 +1,42 @@
+//! The mobility services (AS6009) over a vehicle: its sensors and its drivers.
+//!
+//! All services of one component share one [`Vehicle`], and each takes part in driving it:
+//!
+//! ```
+//! use jaus::service::mobility::Vehicle;
+//! use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+//!
+//! let rover = SkidSteer::new(SkidSteerConfig::default());
+//! let vehicle = Vehicle::new(Pilot::new(rover, Frame::at(52.5, 13.4)));
+//! let services = [
+//!     vehicle.local_pose_sensor(),
+//!     vehicle.velocity_state_sensor(),
+//!     vehicle.primitive_driver(),
+//! ];
+//! ```
+//!
+//! Sensors answer anyone. Poses and waypoints are set by the client in control alone, and what
+//! moves the vehicle is obeyed only while the component is ready, too. The vehicle stops when the
+//! component may no longer act or another client takes control; it does not go on by itself
+//! afterwards.
+
+mod acceleration_state_sensor;
+mod clock;
+mod exchange;
+mod global_pose_sensor;
+mod local_pose_sensor;
+mod primitive_driver;
+#[cfg(test)]
+mod tests;
+mod vehicle;
+mod velocity_state_sensor;
+mod wanted;
+
+pub use vehicle::{OnVehicle, Vehicle};
+
+use crate::codec::ServiceId;
+
+/// A service in its versions 1.1 and 1.0: the second has no messages that the first has not.
+const fn both_versions(newest: ServiceId) -> [ServiceId; 2] {
+    [newest, ServiceId { minor: 0, ..newest }]
+}

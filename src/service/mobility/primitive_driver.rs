@@ -1,0 +1,145 @@
+//! Primitive Driver: uses the vehicle's drives and brakes directly, without feedback.
+
+use super::both_versions;
+use super::exchange::Exchange;
+use super::vehicle::{Behaviour, Cockpit};
+use super::wanted::Wanted;
+use crate::codec::{Message, ServiceId};
+use crate::messages::mobility::report_wrench_effort as fields;
+use crate::messages::mobility::{
+    QueryWrenchEffort, ReportWrenchEffort, SetWrenchEffort, primitive_driver,
+};
+use crate::service::{Context, Handled};
+use crate::vehicle::{Effort, Goal, Ticket};
+
+/// Of the twelve efforts of the message a ground vehicle has four: along X, about Z, and their
+/// brakes. The others are kept and reported, and have no effect.
+#[derive(Default)]
+pub(super) struct PrimitiveDriver {
+    effort: SetWrenchEffort,
+    ticket: Option<Ticket>,
+}
+
+impl Behaviour for PrimitiveDriver {
+    fn offers(&self) -> Vec<ServiceId> {
+        both_versions(primitive_driver::V1_1).into()
+    }
+
+    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        match code {
+            SetWrenchEffort::CODE => {
+                if let Some(effort) = exchange.command() {
+                    self.set(effort, exchange);
+                }
+            }
+            QueryWrenchEffort::CODE => {
+                if let Some(query) = exchange.query() {
+                    self.forget_what_others_replaced(exchange.cockpit);
+                    exchange.reply(&self.report(&query));
+                }
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+
+    fn handle_stop(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+        *self = Self::default();
+        context.changed::<QueryWrenchEffort>();
+    }
+}
+
+impl PrimitiveDriver {
+    fn set(&mut self, message: SetWrenchEffort, exchange: &mut Exchange<'_, '_>) {
+        let share = |percent: Option<f64>| percent.unwrap_or_default() / 100.0;
+        let effort = Effort {
+            forward: share(message.propulsive_linear_effort_x_percent()),
+            turn: share(message.propulsive_rotational_effort_z_percent()),
+            brake: share(message.resistive_linear_effort_x_percent()),
+            turn_brake: share(message.resistive_rotational_effort_z_percent()),
+        };
+        tracing::info!(source = %exchange.message.source, ?effort, "wrench effort set");
+        self.ticket = Some(exchange.cockpit.pilot.pursue(Goal::Effort(effort)));
+        self.effort = message;
+        exchange.context.changed::<QueryWrenchEffort>();
+    }
+
+    /// What another driver has replaced is no longer what the vehicle does.
+    fn forget_what_others_replaced(&mut self, cockpit: &Cockpit) {
+        if self
+            .ticket
+            .is_some_and(|ticket| !cockpit.pilot.pursues(ticket))
+        {
+            *self = Self::default();
+        }
+    }
+
+    /// The efforts that were set, and 0 for those that were not.
+    fn report(&self, query: &QueryWrenchEffort) -> ReportWrenchEffort {
+        let wanted = Wanted(query.presence_vector.into());
+        let effort = &self.effort;
+        let or_none = Option::unwrap_or_default;
+        ReportWrenchEffort {
+            propulsive_linear_effort_x: wanted.real(
+                0,
+                or_none(effort.propulsive_linear_effort_x_percent()),
+                fields::PropulsiveLinearEffortX::new,
+            ),
+            propulsive_linear_effort_y: wanted.real(
+                1,
+                or_none(effort.propulsive_linear_effort_y_percent()),
+                fields::PropulsiveLinearEffortY::new,
+            ),
+            propulsive_linear_effort_z: wanted.real(
+                2,
+                or_none(effort.propulsive_linear_effort_z_percent()),
+                fields::PropulsiveLinearEffortZ::new,
+            ),
+            propulsive_rotational_effort_x: wanted.real(
+                3,
+                or_none(effort.propulsive_rotational_effort_x_percent()),
+                fields::PropulsiveRotationalEffortX::new,
+            ),
+            propulsive_rotational_effort_y: wanted.real(
+                4,
+                or_none(effort.propulsive_rotational_effort_y_percent()),
+                fields::PropulsiveRotationalEffortY::new,
+            ),
+            propulsive_rotational_effort_z: wanted.real(
+                5,
+                or_none(effort.propulsive_rotational_effort_z_percent()),
+                fields::PropulsiveRotationalEffortZ::new,
+            ),
+            resistive_linear_effort_x: wanted.real(
+                6,
+                or_none(effort.resistive_linear_effort_x_percent()),
+                fields::ResistiveLinearEffortX::new,
+            ),
+            resistive_linear_effort_y: wanted.real(
+                7,
+                or_none(effort.resistive_linear_effort_y_percent()),
+                fields::ResistiveLinearEffortY::new,
+            ),
+            resistive_linear_effort_z: wanted.real(
+                8,
+                or_none(effort.resistive_linear_effort_z_percent()),
+                fields::ResistiveLinearEffortZ::new,
+            ),
+            resistive_rotational_effort_x: wanted.real(
+                9,
+                or_none(effort.resistive_rotational_effort_x_percent()),
+                fields::ResistiveRotationalEffortX::new,
+            ),
+            resistive_rotational_effort_y: wanted.real(
+                10,
+                or_none(effort.resistive_rotational_effort_y_percent()),
+                fields::ResistiveRotationalEffortY::new,
+            ),
+            resistive_rotational_effort_z: wanted.real(
+                11,
+                or_none(effort.resistive_rotational_effort_z_percent()),
+                fields::ResistiveRotationalEffortZ::new,
+            ),
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! The vehicle that all mobility services of a component share, and what they have in common.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::acceleration_state_sensor::AccelerationStateSensor;
+use super::clock::Clock;
+use super::exchange::Exchange;
+use super::global_pose_sensor::GlobalPoseSensor;
+use super::local_pose_sensor::LocalPoseSensor;
+use super::primitive_driver::PrimitiveDriver;
+use super::velocity_state_sensor::VelocityStateSensor;
+use crate::codec::ServiceId;
+use crate::endpoint::Received;
+use crate::service::{Context, Handled, Service, Standing, code_of};
+use crate::vehicle::{GlobalPose, Motion, Pilot};
+
+/// A vehicle as the mobility services see it. Cheap to clone; the clones are one vehicle.
+#[derive(Clone)]
+pub struct Vehicle {
+    cockpit: Arc<Mutex<Cockpit>>,
+}
+
+/// What the services of a vehicle share.
+pub(super) struct Cockpit {
+    pub(super) pilot: Pilot,
+    pub(super) clock: Option<Clock>,
+    /// Magnetic north as seen from true north, in radians, once set.
+    pub(super) magnetic_variation: f64,
+}
+
+impl Vehicle {
+    /// A vehicle that nobody drives yet, and that does not know what time it is: its reports carry
+    /// no time stamps.
+    #[must_use]
+    pub fn new(pilot: Pilot) -> Self {
+        let cockpit = Cockpit {
+            pilot,
+            clock: None,
+            magnetic_variation: 0.0,
+        };
+        Self {
+            cockpit: Arc::new(Mutex::new(cockpit)),
+        }
+    }
+
+    /// Tells it what time it was at some moment, as the time since the beginning of 1970 (UTC).
+    #[must_use]
+    pub fn with_time(self, at: Instant, since_1970: Duration) -> Self {
+        self.lock().clock = Some(Clock { at, since_1970 });
+        self
+    }
+
+    /// Where it was last and how it moved.
+    #[must_use]
+    pub fn motion(&self) -> Motion {
+        self.lock().pilot.motion()
+    }
+
+    /// Where on the globe it was last.
+    #[must_use]
+    pub fn global_pose(&self) -> GlobalPose {
+        self.lock().pilot.global_pose()
+    }
+
+    /// Velocity State Sensor: tells how fast it moves.
+    #[must_use]
+    pub fn velocity_state_sensor(&self) -> OnVehicle {
+        self.service(VelocityStateSensor)
+    }
+
+    /// Acceleration State Sensor: tells how its velocity changes.
+    #[must_use]
+    pub fn acceleration_state_sensor(&self) -> OnVehicle {
+        self.service(AccelerationStateSensor)
+    }
+
+    /// Local Pose Sensor: tells where it is in its local frame, and lets the client in control
+    /// say where that is.
+    #[must_use]
+    pub fn local_pose_sensor(&self) -> OnVehicle {
+        self.service(LocalPoseSensor)
+    }
+
+    /// Global Pose Sensor: tells where it is on the globe, and lets the client in control say
+    /// where that is.
+    #[must_use]
+    pub fn global_pose_sensor(&self) -> OnVehicle {
+        self.service(GlobalPoseSensor)
+    }
+
+    /// Primitive Driver: uses its drives and brakes without feedback.
+    #[must_use]
+    pub fn primitive_driver(&self) -> OnVehicle {
+        self.service(PrimitiveDriver::default())
+    }
+
+    fn service(&self, behaviour: impl Behaviour + 'static) -> OnVehicle {
+        OnVehicle {
+            vehicle: self.clone(),
+            behaviour: Box::new(behaviour),
+            steps: 0,
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Cockpit> {
+        self.cockpit.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The cockpit, its vehicle having moved on to `now`.
+    fn at(&self, now: Instant) -> MutexGuard<'_, Cockpit> {
+        let mut cockpit = self.lock();
+        cockpit.pilot.handle_time(now);
+        cockpit
+    }
+}
+
+impl std::fmt::Debug for Vehicle {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Vehicle")
+            .field("motion", &self.motion())
+            .finish()
+    }
+}
+
+/// What is particular to one mobility service.
+pub(super) trait Behaviour: Send {
+    /// What is offered, the newest version first.
+    fn offers(&self) -> Vec<ServiceId>;
+
+    /// Deals with a message that has this code.
+    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled;
+
+    /// The vehicle has moved: says which answers are others now.
+    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+        let _ = (cockpit, context);
+    }
+
+    /// The vehicle has been stopped, because the component may no longer act.
+    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+        let _ = (cockpit, context);
+    }
+}
+
+/// A mobility service of a [`Vehicle`], to be offered by a component.
+pub struct OnVehicle {
+    vehicle: Vehicle,
+    behaviour: Box<dyn Behaviour>,
+    /// The step of the vehicle that was told last.
+    steps: u64,
+}
+
+impl std::fmt::Debug for OnVehicle {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("OnVehicle")
+            .field("offers", &self.offers())
+            .finish()
+    }
+}
+
+impl Service for OnVehicle {
+    fn offers(&self) -> Vec<ServiceId> {
+        self.behaviour.offers()
+    }
+
+    fn handle_message(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Handled {
+        let Some(code) = code_of(&message.payload) else {
+            return Handled::No;
+        };
+        let mut exchange = Exchange {
+            now,
+            cockpit: &mut self.vehicle.at(now),
+            message,
+            context,
+        };
+        self.behaviour.handle(code, &mut exchange)
+    }
+
+    fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {
+        let mut cockpit = self.vehicle.at(now);
+        let steps = cockpit.pilot.steps();
+        if self.steps != steps {
+            self.steps = steps;
+            self.behaviour.handle_motion(&mut cockpit, context);
+        }
+    }
+
+    fn handle_standing(&mut self, now: Instant, before: &Standing, context: &mut Context<'_>) {
+        let client = |standing: &Standing| standing.controller.map(|controller| controller.id);
+        let standing = context.standing();
+        if !standing.may_act() || client(standing) != client(before) {
+            let mut cockpit = self.vehicle.at(now);
+            cockpit.pilot.stop();
+            self.behaviour.handle_stop(&mut cockpit, context);
+        }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.vehicle.lock().pilot.poll_timeout()
+    }
+}

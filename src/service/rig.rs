@@ -1,0 +1,112 @@
+//! For tests: services without a stack, whose standing and time are set by hand.
+
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use super::{Context, Controller, Handled, Outbox, Service, Standing, State};
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::wire::{Broadcast, Priority};
+
+/// The client that is in control from the beginning.
+pub(crate) const CLIENT: JausId = JausId::new(42, 1, 1);
+/// Somebody else.
+pub(crate) const STRANGER: JausId = JausId::new(42, 2, 1);
+
+/// Services, and what a stack would know.
+pub(crate) struct Rig {
+    pub(crate) services: Vec<Box<dyn Service>>,
+    pub(crate) now: Instant,
+    pub(crate) changed: BTreeSet<u16>,
+    standing: Standing,
+    out: Outbox,
+}
+
+impl Rig {
+    /// Services in the state Ready, with [`CLIENT`] in control.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "any moment will do as the beginning of virtual time"
+    )]
+    pub(crate) fn new(services: Vec<Box<dyn Service>>) -> Self {
+        let mut rig = Self {
+            services,
+            now: Instant::now(),
+            changed: BTreeSet::new(),
+            standing: Standing::default(),
+            out: Outbox::new(JausId::new(101, 1, 1)),
+        };
+        rig.stand(State::Ready, Some(CLIENT));
+        rig.wake();
+        rig
+    }
+
+    /// Brings the component into another state, or under the control of another client.
+    pub(crate) fn stand(&mut self, state: State, controller: Option<JausId>) {
+        let controller = controller.map(|id| Controller { id, authority: 127 });
+        let before = std::mem::replace(
+            &mut self.standing,
+            Standing {
+                state,
+                exclusive: true,
+                controller,
+            },
+        );
+        for service in &mut self.services {
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            service.handle_standing(self.now, &before, &mut context);
+        }
+    }
+
+    /// Hands a message to the first service that wants it; says whether one did.
+    pub(crate) fn send<M: Message>(&mut self, source: JausId, message: &M) -> bool {
+        let received = Received {
+            source,
+            destination: self.out.source(),
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            payload: message.encode().unwrap(),
+            path: None,
+            to: self.out.source(),
+        };
+        self.services.iter_mut().any(|service| {
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            service.handle_message(self.now, &received, &mut context) == Handled::Yes
+        })
+    }
+
+    /// The answer to a query, if there is one.
+    pub(crate) fn ask<R: Message>(&mut self, query: &impl Message) -> Option<R> {
+        assert!(self.send(STRANGER, query), "nobody wants the query");
+        self.answer()
+    }
+
+    /// The next message that was sent.
+    pub(crate) fn answer<R: Message>(&mut self) -> Option<R> {
+        self.out.pop().map(|sent| R::decode(&sent.payload).unwrap())
+    }
+
+    /// Lets time pass, and wakes the services when they want it.
+    pub(crate) fn run(&mut self, duration: Duration) {
+        let end = self.now + duration;
+        while let Some(wake) = self.poll_timeout().filter(|&wake| wake <= end) {
+            self.now = self.now.max(wake);
+            self.wake();
+        }
+        self.now = end;
+        self.wake();
+    }
+
+    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+        let services = self.services.iter();
+        services.filter_map(|service| service.poll_timeout()).min()
+    }
+
+    fn wake(&mut self) {
+        for service in &mut self.services {
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            service.handle_timeout(self.now, &mut context);
+        }
+    }
+}
