@@ -47,7 +47,7 @@ fn what_is_not_offered_is_skipped_and_counted_and_the_rest_conforms_as_tested() 
         "by unicast, to the component",
         "  passed   B6   Query Heartbeat Pulse beside the event",
         "8 passed, 0 failed, 10 skipped",
-        "105.1.1 conforms to the judge's script as tested: 8 steps passed; 10 steps did not apply",
+        "105.1.1 conforms to the contests' script as tested: 8 steps passed; 10 steps did not apply",
     ] {
         assert!(run.stdout.contains(part), "no `{part}` in {}", run.stdout);
     }
@@ -84,7 +84,7 @@ fn a_run_is_written_down_in_every_form_that_is_asked_for() {
     assert!(
         judged
             .stdout
-            .contains("does not conform to the judge's script as tested: 1 step failed"),
+            .contains("does not conform to the contests' script as tested: 1 step failed"),
         "{judged:?}"
     );
 
@@ -166,6 +166,10 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
             "write A1 to A6 or B1 to B36",
         ),
         (
+            &["judge", "105.1.1", "--service", "Livness"],
+            "there is no service Livness",
+        ),
+        (
             &["judge", "105.1.1", "--only", "B37"],
             "there is no step B37",
         ),
@@ -194,6 +198,18 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
         assert!(run.stderr.contains(advice), "{arguments:?}: {}", run.stderr);
         assert_eq!((run.status, &*run.stdout), (2, ""), "{arguments:?}");
     }
+}
+
+#[test]
+fn a_service_is_walked_through_by_its_definition() {
+    let flags = network();
+    let _peer = Peer::offering(&[liveness::URN]).start(&flags);
+    let network: Vec<&str> = flags.iter().map(String::as_str).collect();
+    let judge = ["judge", "105.1.1", "--service", "Liveness", "--unicast"];
+    let run = run(&[&judge, &*network].concat(), b"");
+    let conclusion = "105.1.1 conforms to urn:jaus:jss:core:Liveness as tested: 1 step passed";
+    assert!(run.stdout.contains(conclusion), "{run:?}");
+    assert_eq!(run.status, 0);
 }
 
 #[test]

@@ -13,8 +13,8 @@ use jaus::messages::core::{
     ReportStatus, RequestControl, access_control, events, liveness, management,
 };
 use jaus::messages::mobility::{
-    QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState, local_pose_sensor,
-    velocity_state_sensor,
+    QueryLocalPose, QueryVelocityState, QueryWrenchEffort, ReportLocalPose, ReportVelocityState,
+    ReportWrenchEffort, local_pose_sensor, primitive_driver, velocity_state_sensor,
 };
 
 use crate::cli_support::run;
@@ -26,20 +26,16 @@ const FIRST: JausId = JausId::new(42, 2, 1);
 /// Judges a peer by one step and those that it rests on; gives the reason why it failed.
 #[track_caller]
 fn reason(step: &str, peer: Peer) -> String {
+    reason_with(&["--only", step], step, peer)
+}
+
+#[track_caller]
+fn reason_with(steps: &[&str], step: &str, peer: Peer) -> String {
     let flags = network();
     let _peer = peer.start(&flags);
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
-    let judge = [
-        "judge",
-        "105.1.1",
-        "--unicast",
-        "--only",
-        step,
-        "--limit",
-        "0.3",
-        "--json",
-    ];
-    let run = run(&[&judge, &*network].concat(), b"");
+    let judge = ["judge", "105.1.1", "--unicast", "--limit", "0.3", "--json"];
+    let run = run(&[&judge, steps, &*network].concat(), b"");
     assert_eq!(run.status, 1, "{run:?}");
     let lines = run.json();
     let judged = lines.iter().find(|line| line["step"] == step);
@@ -187,4 +183,37 @@ fn an_event_stream_that_is_confirmed_but_never_comes_is_told() {
         .answers::<CreateEvent>(&confirmation)
         .answers::<QueryHeartbeatPulse>(&ReportHeartbeatPulse);
     assert_eq!(reason("B4", peer), "of event 7 only 0 came, not 3");
+}
+
+/// A peer that answers whatever begins like a query, and then obeys who is not in control.
+fn obedient() -> Peer {
+    let effort = |x| {
+        let mut report = ReportWrenchEffort::default();
+        report.set_propulsive_linear_effort_x_percent(x).unwrap();
+        report
+    };
+    let mut peer = Peer::offering(&[primitive_driver::URN]);
+    for report in [0.0, 0.0, 0.0, 25.0].map(effort) {
+        peer = peer.answers::<QueryWrenchEffort>(&report);
+    }
+    peer
+}
+
+#[test]
+fn a_service_that_answers_half_a_query_is_told() {
+    let reason = reason_with(&["--service", "PrimitiveDriver"], "S2", obedient());
+    assert_eq!(reason, "it was answered with ReportWrenchEffort");
+}
+
+#[test]
+fn a_service_that_obeys_without_control_is_told_with_what_changed() {
+    let reason = reason_with(&["--service", "PrimitiveDriver"], "S3", obedient());
+    assert!(
+        reason.starts_with("ReportWrenchEffort: it was {"),
+        "{reason}"
+    );
+    assert!(
+        reason.contains("\"PropulsiveLinearEffortX\":25"),
+        "{reason}"
+    );
 }

@@ -64,7 +64,7 @@ pub(super) fn step(dictionary: &Dictionary, result: &StepResult) -> String {
     let proceedings = result.proceedings.iter();
     let step = Step {
         step: result.name.to_string(),
-        title: result.title,
+        title: &result.title,
         form: result.form.name(),
         verdict: result.verdict.name(),
         reason: result.verdict.reason(),
@@ -75,7 +75,7 @@ pub(super) fn step(dictionary: &Dictionary, result: &StepResult) -> String {
 }
 
 /// The last line.
-pub(super) fn end(subject: &Subject, tally: &Tally) -> String {
+pub(super) fn end(subject: &Subject, tally: &Tally, against: &str) -> String {
     let latency = tally.latency();
     to_line(&End {
         subject: subject.id.to_string(),
@@ -86,7 +86,7 @@ pub(super) fn end(subject: &Subject, tally: &Tally) -> String {
         latency_median_ms: latency.map(|(median, _)| millis(median)),
         latency_most_ms: latency.map(|(_, most)| millis(most)),
         conforms: tally.conforms(),
-        conclusion: conclusion(subject, tally),
+        conclusion: conclusion(subject, tally, against),
     })
 }
 

@@ -1,6 +1,9 @@
 //! What a run remembers from one exchange to the next.
 
+use std::collections::BTreeMap;
+
 use jaus::address::JausId;
+use serde_json::Value as Json;
 
 use super::step::{Speaker, Stream};
 
@@ -19,6 +22,8 @@ pub(super) struct Memory {
     pub(super) position: Option<[f64; 2]>,
     /// The time stamp of the last report that had one, in milliseconds of the day.
     pub(super) time: Option<u32>,
+    /// What the service that is walked through reported last, by code.
+    pub(super) reports: BTreeMap<u16, Json>,
     /// How many waypoints of the drive have been reached, in their order.
     pub(super) reached: usize,
 }
@@ -32,6 +37,7 @@ impl Memory {
             streams: Vec::new(),
             position: None,
             time: None,
+            reports: BTreeMap::new(),
             reached: 0,
         }
     }

@@ -68,6 +68,16 @@ pub(crate) struct Judge {
     #[arg(long, value_name = "STEPS", value_delimiter = ',')]
     only: Vec<Span>,
 
+    /// Walk through this service instead of the contests' steps (repeatable): its URN or name
+    ///
+    /// From the service's definition: every query is asked, and its report read and checked; a
+    /// query that ends too early must be ignored; every command that only the controlling client
+    /// may give is given without control, must be ignored, and must leave the service's reports as
+    /// they were. The definitions do not yet describe the transitions between states: those of
+    /// Access Control, Management and Events are in steps B3 to B26.
+    #[arg(long, value_name = "URN", value_parser = script::service::known, conflicts_with = "only")]
+    service: Vec<&'static str>,
+
     /// Ask by multicast only [default: first by multicast, then by unicast]
     #[arg(long, conflicts_with = "unicast")]
     multicast: bool,
@@ -151,11 +161,24 @@ impl Judge {
     }
 
     /// The steps that are to be carried out.
-    fn steps(&self) -> Vec<Step> {
+    fn steps(&self, subject: Option<&Subject>) -> Vec<Step> {
+        if !self.service.is_empty() {
+            let version = |urn: &str| subject.and_then(|subject| subject.version(urn));
+            return script::service::steps(&self.service, version);
+        }
         let spans = &self.only;
         let in_span = |name: Name, span: &Span| (span.first..=span.last).contains(&name);
         let chosen = |name| spans.is_empty() || spans.iter().any(|span| in_span(name, span));
         script::selected(script::steps(), chosen)
+    }
+
+    /// What the steps are taken from, in words.
+    fn against(&self) -> String {
+        if self.service.is_empty() {
+            "the contests' script".to_owned()
+        } else {
+            self.service.join(", ")
+        }
     }
 
     fn forms(&self) -> Vec<Form> {
@@ -169,7 +192,7 @@ impl Judge {
 
     fn list(&self) -> Result<Outcome, Failure> {
         let mut output = Output::new();
-        for step in self.steps() {
+        for step in self.steps(None) {
             let names = step.needs.iter().filter_map(|urn| urn.rsplit(':').next());
             let needs = names.collect::<Vec<_>>().join(", ");
             output.line(format_args!("{:<3}  {}  ({needs})", step.name, step.title))?;
@@ -214,7 +237,7 @@ impl Judge {
         subject: &Subject,
         papers: &mut Papers<'_>,
     ) -> Result<(), Failure> {
-        let steps = self.steps();
+        let steps = self.steps(Some(subject));
         for form in self.forms() {
             papers.form(form)?;
             runner.begin(form);

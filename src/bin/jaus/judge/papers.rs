@@ -27,6 +27,8 @@ pub(super) struct Papers<'d> {
     everything: bool,
     json: Option<(PathBuf, BufWriter<File>)>,
     junit: Option<PathBuf>,
+    /// What the subject is judged by.
+    against: String,
     clock: Clock,
     tally: Tally,
     results: Vec<StepResult>,
@@ -52,6 +54,7 @@ impl<'d> Papers<'d> {
             everything: judge.all,
             json,
             junit: judge.junit.clone(),
+            against: judge.against(),
             clock: Clock::start(),
             tally: Tally::default(),
             results: Vec::new(),
@@ -91,9 +94,10 @@ impl<'d> Papers<'d> {
 
     /// Writes the end of everything. Whether the subject conforms.
     pub(super) fn end(mut self, subject: &Subject) -> Result<bool, Failure> {
-        let end = self.report.end(subject, &self.tally, self.clock.elapsed());
+        let took = self.clock.elapsed();
+        let end = self.report.end(subject, &self.tally, &self.against, took);
         self.lines(&end)?;
-        self.json(&json::end(subject, &self.tally))?;
+        self.json(&json::end(subject, &self.tally, &self.against))?;
         if let Some((path, file)) = &mut self.json {
             let flushed = file.flush();
             flushed.map_err(|error| Failure::file(path, &error))?;

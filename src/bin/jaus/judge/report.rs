@@ -71,7 +71,7 @@ impl<'d> Report<'d> {
             Verdict::Skipped(reason) => format!("  ({reason})"),
             _ => String::new(),
         };
-        let (name, title) = (result.name, result.title);
+        let (name, title) = (result.name, &result.title);
         let slowest = slowest.unwrap_or_default();
         let mut lines = vec![format!("  {verdict}  {name:<3}  {title}{because}{slowest}")];
         let failed = matches!(result.verdict, Verdict::Failed(_));
@@ -121,7 +121,13 @@ impl<'d> Report<'d> {
     }
 
     /// How it went, and what that means.
-    pub(super) fn end(&self, subject: &Subject, tally: &Tally, took: Duration) -> Vec<String> {
+    pub(super) fn end(
+        &self,
+        subject: &Subject,
+        tally: &Tally,
+        against: &str,
+        took: Duration,
+    ) -> Vec<String> {
         let Tally {
             passed,
             failed,
@@ -138,7 +144,7 @@ impl<'d> Report<'d> {
             let (median, most) = (millis(median), millis(most));
             lines.push(format!("answers took {median} (median) to {most} (most)"));
         }
-        lines.push(conclusion(subject, tally));
+        lines.push(conclusion(subject, tally, against));
         lines
     }
 
@@ -154,7 +160,7 @@ impl<'d> Report<'d> {
 const INDENT: &str = "           ";
 
 /// What a run means, in one sentence that promises no more than was tested.
-pub(super) fn conclusion(subject: &Subject, tally: &Tally) -> String {
+pub(super) fn conclusion(subject: &Subject, tally: &Tally, against: &str) -> String {
     let id = subject.id;
     let steps = |number| {
         if number == 1 {
@@ -165,7 +171,7 @@ pub(super) fn conclusion(subject: &Subject, tally: &Tally) -> String {
     };
     if tally.failed > 0 {
         let failed = steps(tally.failed);
-        return format!("{id} does not conform to the judge's script as tested: {failed} failed");
+        return format!("{id} does not conform to {against} as tested: {failed} failed");
     }
     if tally.passed == 0 {
         return format!("nothing can be said about {id}: no step applies to what it offers");
@@ -175,7 +181,7 @@ pub(super) fn conclusion(subject: &Subject, tally: &Tally) -> String {
         number => format!("; {} did not apply to what it offers", steps(number)),
     };
     let passed = steps(tally.passed);
-    format!("{id} conforms to the judge's script as tested: {passed} passed{skipped}")
+    format!("{id} conforms to {against} as tested: {passed} passed{skipped}")
 }
 
 /// A message as its name and its fields.

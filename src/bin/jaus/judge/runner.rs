@@ -58,7 +58,7 @@ impl Runner {
         self.step = format!("{} {}: {}", step.name, form.name(), step.title);
         let start = Instant::now();
         let mut proceedings = Vec::new();
-        let verdict = if let Some(urn) = subject.lacks(step.needs) {
+        let verdict = if let Some(urn) = subject.lacks(&step.needs) {
             let service = urn.rsplit(':').next().unwrap_or(urn);
             Verdict::Skipped(format!("{service} is not offered"))
         } else {
@@ -69,7 +69,7 @@ impl Runner {
         };
         Ok(StepResult {
             name: step.name,
-            title: step.title,
+            title: step.title.to_string(),
             form,
             verdict,
             took: start.elapsed(),
@@ -97,6 +97,9 @@ impl Runner {
                     let streams = streams(&self.memory);
                     let silence = |streams| Observation::silence(streams, *lasting);
                     self.watch(streams.map(silence), proceedings).await?
+                }
+                Act::Ignored { exchange, lasting } => {
+                    self.be_ignored(exchange, *lasting, proceedings).await?
                 }
                 Act::Pause(time) => {
                     self.listen_until(Instant::now() + *time).await?;
@@ -147,6 +150,32 @@ impl Runner {
                 proceeding.latency = Some(heard.at - start);
                 check = (expectation.check)(&heard.octets, &mut self.memory)
                     .map_err(|reason| format!("{}: {reason}", expectation.name));
+            }
+        }
+        proceedings.push(proceeding);
+        Ok(check)
+    }
+
+    /// Says something, and sees to it that nothing comes of it.
+    async fn be_ignored(
+        &mut self,
+        exchange: &Exchange,
+        lasting: Duration,
+        proceedings: &mut Vec<Proceeding>,
+    ) -> Came {
+        let check = self.exchange(exchange, proceedings).await?;
+        if check.is_err() {
+            return Ok(check);
+        }
+        let deadline = Instant::now() + lasting;
+        let words = format!("nothing for {} s", lasting.as_secs_f64());
+        let mut proceeding = Proceeding::of(None, vec![words]);
+        let mut check = Ok(());
+        while let Some(heard) = self.panel.hear(deadline, &self.step).await? {
+            if heard.code() != Some(Event::CODE) && heard.to == exchange.from {
+                check = Err(format!("it was answered with {}", name_of(&heard.octets)));
+                proceeding.came.push(self.said(&heard));
+                break;
             }
         }
         proceedings.push(proceeding);

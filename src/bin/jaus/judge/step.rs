@@ -3,6 +3,7 @@
 //! A step is data: who says what, what must come back, and in which words a wrong answer is told.
 //! Nothing here sends or waits; the [runner](super::runner) does.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
@@ -37,13 +38,15 @@ impl Speaker {
     ];
 }
 
-/// The two rule books that the steps come from.
+/// Where the steps come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
     /// The six tasks of the challenges of 2010 to 2013.
     A,
     /// The interface tasks of the challenges since 2014.
     B,
+    /// One service's definition.
+    S,
 }
 
 /// A step's name, such as `B16`.
@@ -58,6 +61,7 @@ impl fmt::Display for Name {
         let part = match self.part {
             Part::A => 'A',
             Part::B => 'B',
+            Part::S => 'S',
         };
         f.pad(&format!("{part}{}", self.number))
     }
@@ -103,9 +107,9 @@ pub(super) type Check = Result<(), String>;
 /// One step of the script.
 pub(super) struct Step {
     pub(super) name: Name,
-    pub(super) title: &'static str,
+    pub(super) title: Cow<'static, str>,
     /// URNs of the services without which the step says nothing.
-    pub(super) needs: &'static [&'static str],
+    pub(super) needs: Vec<&'static str>,
     /// The steps of the same part that must have run before, because they leave the subject as
     /// this one expects it.
     pub(super) rests_on: &'static [u8],
@@ -130,6 +134,11 @@ pub(super) enum Act {
     Watch(Watch),
     /// Event streams have ended: nothing comes for this time.
     Silence { streams: Streams, lasting: Duration },
+    /// Something is said that must be ignored: for this time nothing comes but events.
+    Ignored {
+        exchange: Exchange,
+        lasting: Duration,
+    },
     /// Time for the subject.
     Pause(Duration),
     /// The exchanges are repeated until the check says that the end is reached.
@@ -167,7 +176,7 @@ pub(super) struct Expectation {
     pub(super) code: u16,
     pub(super) name: &'static str,
     /// What it must say, in words.
-    pub(super) words: &'static str,
+    pub(super) words: Cow<'static, str>,
     pub(super) check: Look,
 }
 
@@ -202,11 +211,11 @@ pub(super) struct Until {
 }
 
 /// Begins a step.
-pub(super) fn step(part: Part, number: u8, title: &'static str) -> Step {
+pub(super) fn step(part: Part, number: u8, title: impl Into<Cow<'static, str>>) -> Step {
     Step {
         name: Name { part, number },
-        title,
-        needs: &[],
+        title: title.into(),
+        needs: Vec::new(),
         rests_on: &[],
         by_unicast_only: false,
         acts: Vec::new(),
@@ -215,8 +224,8 @@ pub(super) fn step(part: Part, number: u8, title: &'static str) -> Step {
 }
 
 impl Step {
-    pub(super) fn needs(mut self, urns: &'static [&'static str]) -> Self {
-        self.needs = urns;
+    pub(super) fn needs(mut self, urns: &[&'static str]) -> Self {
+        self.needs = urns.to_vec();
         self
     }
 
@@ -297,6 +306,16 @@ impl Exchange {
         }
     }
 
+    /// Says these octets.
+    pub(super) fn octets(from: Speaker, octets: Bytes) -> Self {
+        Self {
+            from,
+            content: Box::new(move |_| Ok(octets.clone())),
+            reach: Reach::Node,
+            expects: Vec::new(),
+        }
+    }
+
     pub(super) fn to(mut self, reach: Reach) -> Self {
         self.reach = reach;
         self
@@ -333,7 +352,7 @@ impl Expectation {
             to,
             code: R::CODE,
             name: R::NAME,
-            words,
+            words: words.into(),
             check: Box::new(check),
         }
     }

@@ -68,6 +68,11 @@ impl Subject {
         Ok(is_there.then_some(Self { id, name, services }))
     }
 
+    /// The version in which it offers a service.
+    pub(super) fn version(&self, urn: &str) -> Option<(u8, u8)> {
+        self.services.as_ref()?.get(urn).copied()
+    }
+
     /// The first of these services that it does not offer.
     pub(super) fn lacks(&self, urns: &[&'static str]) -> Option<&'static str> {
         let services = self.services.as_ref()?;

@@ -39,7 +39,7 @@ impl Verdict {
 #[derive(Debug)]
 pub(super) struct StepResult {
     pub(super) name: Name,
-    pub(super) title: &'static str,
+    pub(super) title: String,
     pub(super) form: Form,
     pub(super) verdict: Verdict,
     pub(super) took: Duration,

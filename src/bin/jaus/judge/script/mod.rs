@@ -10,6 +10,8 @@ mod control;
 mod drive;
 mod events;
 mod mobility;
+pub(super) mod service;
+mod specimen;
 
 use jaus::messages::{core, mobility as jss};
 

@@ -1,0 +1,269 @@
+//! Steps made from a service's definition: its queries, and its commands without control.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::codec::{Message, MessageInfo, ServiceInfo};
+use jaus::messages::core::{
+    CancelEvent, ClearEmergency, CreateCommandEvent, CreateEvent, QueryElement, RegisterServices,
+    ReleaseControl, RequestControl, SetEmergency, UpdateEvent, access_control,
+};
+use jaus::messages::{registry, services};
+use serde_json::Value as Json;
+
+use super::super::memory::Memory;
+use super::super::step::{
+    Act, Check, Exchange, Expectation, Part,
+    Speaker::{Main, Second},
+    Step, step,
+};
+use super::specimen;
+
+/// How long nothing must come of something that is to be ignored.
+const IGNORED: Duration = Duration::from_millis(300);
+/// How far a number in a report may move by itself, of its value …
+const WANDERING: f64 = 0.02;
+/// … and at least, in whatever unit it has.
+const LEAST_WANDERING: f64 = 0.1;
+
+/// Commands that anybody may give, whoever is in control.
+const ANYBODYS: [u16; 9] = [
+    CancelEvent::CODE,
+    ClearEmergency::CODE,
+    CreateCommandEvent::CODE,
+    CreateEvent::CODE,
+    RegisterServices::CODE,
+    ReleaseControl::CODE,
+    RequestControl::CODE,
+    SetEmergency::CODE,
+    UpdateEvent::CODE,
+];
+/// Queries that are answered only where there is something of the kind.
+const OF_SOMETHING: [u16; 1] = [QueryElement::CODE];
+
+/// The URN of a service, by its URN or its name.
+pub(in super::super) fn known(text: &str) -> Result<&'static str, String> {
+    let is_it = |info: &&ServiceInfo| info.id.urn == text || info.name == text;
+    if let Some(info) = services().find(is_it) {
+        return Ok(info.id.urn);
+    }
+    let names: BTreeSet<_> = services().map(|info| info.name).collect();
+    let names: Vec<_> = names.into_iter().collect();
+    Err(format!(
+        "there is no service {text} here; there are {}",
+        names.join(", ")
+    ))
+}
+
+/// The steps that walk through services, each in the version that is offered, or else the newest.
+pub(in super::super) fn steps(
+    urns: &[&'static str],
+    offered: impl Fn(&str) -> Option<(u8, u8)>,
+) -> Vec<Step> {
+    let mut numbers = 1_u8..;
+    let mut steps = Vec::new();
+    for urn in urns {
+        let version = offered(urn);
+        let of_urn = || services().filter(|info| info.id.urn == *urn);
+        let is_offered = |info: &&ServiceInfo| version == Some((info.id.major, info.id.minor));
+        let newest = || of_urn().max_by_key(|info| (info.id.major, info.id.minor));
+        let Some(service) = of_urn().find(is_offered).or_else(newest) else {
+            continue;
+        };
+        for (title, acts) in walk(service) {
+            // More than 255 messages are in no service.
+            let Some(number) = numbers.next() else { break };
+            let mut step = step(Part::S, number, title).needs(&[urn]);
+            step.acts = acts;
+            steps.push(step);
+        }
+    }
+    steps
+}
+
+/// The titles and acts of the steps of one service.
+fn walk(service: &ServiceInfo) -> Vec<(Cow<'static, str>, Vec<Act>)> {
+    let inputs = service.inputs.iter();
+    let inputs: Vec<_> = inputs
+        .filter_map(|&code| registry().in_service(service.id, code))
+        .collect();
+    let queries = inputs.iter().filter(|info| report_of(info).is_some());
+    let queries: Vec<_> = queries
+        .copied()
+        .filter(|info| !OF_SOMETHING.contains(&info.code))
+        .collect();
+    let mut steps = Vec::new();
+    for query in &queries {
+        let title = format!("{} is answered", query.name).into();
+        steps.push((title, ask(query, takes_report).into_iter().collect()));
+        let cut = cut(query);
+        if !cut.is_empty() {
+            let title = format!("{} that ends too early is ignored", query.name).into();
+            steps.push((title, cut));
+        }
+    }
+    if !is_controlled(service) {
+        return steps;
+    }
+    let commands = inputs.iter();
+    let commands = commands.filter(|info| info.is_command && !ANYBODYS.contains(&info.code));
+    for command in commands {
+        let title = format!("{} without control is ignored", command.name).into();
+        steps.push((title, without_control(command, &queries)));
+    }
+    steps
+}
+
+/// Whether the service is or inherits Access Control.
+fn is_controlled(service: &ServiceInfo) -> bool {
+    if service.id.urn == access_control::URN {
+        return true;
+    }
+    let parent = service.inherits_from;
+    let parent = parent.and_then(|id| services().find(|info| info.id == id));
+    parent.is_some_and(is_controlled)
+}
+
+/// The type of the report that answers a query.
+fn report_of(query: &MessageInfo) -> Option<&'static MessageInfo> {
+    if query.code >> 12 != 2 {
+        return None;
+    }
+    registry().by_code(query.code + 0x2000).next()
+}
+
+/// Asks a query in its shortest form.
+fn ask(query: &MessageInfo, check: fn(u16, &Json, &mut Memory) -> Check) -> Option<Act> {
+    let report = report_of(query)?;
+    let mut exchange = Exchange::octets(Main, specimen::shortest(query)?);
+    exchange.expects.push(Expectation {
+        to: Main,
+        code: report.code,
+        name: report.name,
+        words: "as its definition has it".into(),
+        check: Box::new(move |octets, memory| check(report.code, &read(octets)?, memory)),
+    });
+    Some(exchange.into())
+}
+
+/// Asks a query without its last octet, if it has a body; and then the whole query, which must be
+/// answered still.
+fn cut(query: &MessageInfo) -> Vec<Act> {
+    let Some(octets) = specimen::shortest(query).filter(|octets| octets.len() > 2) else {
+        return Vec::new();
+    };
+    let ignored = Act::Ignored {
+        exchange: Exchange::octets(Main, octets.slice(..octets.len() - 1)),
+        lasting: IGNORED,
+    };
+    let whole = ask(query, takes_report);
+    std::iter::once(ignored).chain(whole).collect()
+}
+
+/// Gives a command without control. The reports before and after must be the same.
+fn without_control(command: &MessageInfo, queries: &[&MessageInfo]) -> Vec<Act> {
+    let before = queries.iter().filter_map(|query| ask(query, takes_report));
+    let mut acts: Vec<Act> = before.collect();
+    if let Some(octets) = specimen::telling(command) {
+        acts.push(Act::Ignored {
+            exchange: Exchange::octets(Second, octets),
+            lasting: IGNORED,
+        });
+    }
+    acts.extend(queries.iter().filter_map(|query| ask(query, is_unchanged)));
+    acts
+}
+
+/// A report as people see it.
+fn read(octets: &Bytes) -> Result<Json, String> {
+    let message = registry().decode(octets).ok_or("it is no known message")?;
+    let message = message.map_err(|error| error.to_string())?;
+    serde_json::to_value(message.view()).map_err(|error| error.to_string())
+}
+
+fn takes_report(code: u16, report: &Json, memory: &mut Memory) -> Check {
+    memory.reports.insert(code, report.clone());
+    Ok(())
+}
+
+fn is_unchanged(code: u16, report: &Json, memory: &mut Memory) -> Check {
+    let before = memory.reports.get(&code).unwrap_or(&Json::Null);
+    if is_same(before, report) {
+        return Ok(());
+    }
+    Err(format!("it was {before} before, and is {report} now"))
+}
+
+/// Whether two reports say the same, but for time stamps and for what wanders by itself.
+fn is_same(one: &Json, other: &Json) -> bool {
+    match (one, other) {
+        (Json::Object(one), Json::Object(other)) => {
+            one.len() == other.len()
+                && one.iter().all(|(key, value)| {
+                    key == "TimeStamp" || other.get(key).is_some_and(|other| is_same(value, other))
+                })
+        }
+        (Json::Array(one), Json::Array(other)) => {
+            one.len() == other.len()
+                && one
+                    .iter()
+                    .zip(other)
+                    .all(|(one, other)| is_same(one, other))
+        }
+        (Json::Number(one), Json::Number(other)) => match (one.as_f64(), other.as_f64()) {
+            (Some(one), Some(other)) => {
+                (one - other).abs() <= LEAST_WANDERING.max(WANDERING * one.abs())
+            }
+            _ => one == other,
+        },
+        _ => one == other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn titles(name: &str) -> Vec<String> {
+        let steps = steps(&[known(name).unwrap()], |_| None);
+        steps.iter().map(|step| step.title.to_string()).collect()
+    }
+
+    #[test]
+    fn a_services_queries_and_commands_become_steps() {
+        assert_eq!(titles("Liveness"), ["QueryHeartbeatPulse is answered"]);
+        assert_eq!(
+            titles("LocalPoseSensor")[..3],
+            [
+                "QueryLocalPose is answered",
+                "QueryLocalPose that ends too early is ignored",
+                "QueryLocalPoseExt is answered",
+            ]
+        );
+        let management = titles("Management");
+        assert!(management.contains(&"Resume without control is ignored".to_owned()));
+        assert!(
+            !management.iter().any(|title| title.contains("Emergency")),
+            "anybody may"
+        );
+    }
+
+    #[test]
+    fn every_service_can_be_walked_through() {
+        for service in services() {
+            let steps = steps(&[service.id.urn], |_| {
+                Some((service.id.major, service.id.minor))
+            });
+            let has_steps = !steps.is_empty() || service.inputs.is_empty();
+            assert!(has_steps || service.name == "Transport", "{}", service.id);
+        }
+    }
+
+    #[test]
+    fn an_unknown_service_is_refused_with_those_that_are_known() {
+        let refused = known("urn:jaus:jss:core:Livness").unwrap_err();
+        assert!(refused.contains("Liveness"), "{refused}");
+    }
+}

@@ -1,0 +1,80 @@
+//! One valid message of each type, made of nothing but its decoder.
+
+use bytes::Bytes;
+use jaus::codec::{Message, MessageInfo};
+use jaus::messages::core::{QueryConfiguration, QueryIdentification};
+
+/// Octets of a body that are tried at most.
+const LONGEST: usize = 96;
+/// What fields are filled with: valid in most, and far from where things stand by themselves.
+const FILLING: u8 = 0x40;
+/// The subsystem, for queries in which zero means nothing.
+const SUBSYSTEM: u8 = 2;
+
+/// The shortest message of this type, all zeros where that is possible.
+pub(super) fn shortest(info: &MessageInfo) -> Option<Bytes> {
+    let mut octets = info.code.to_le_bytes().to_vec();
+    while !is_valid(info, &octets) {
+        if octets.len() > LONGEST {
+            return None;
+        }
+        octets.push(0);
+    }
+    if [QueryIdentification::CODE, QueryConfiguration::CODE].contains(&info.code) {
+        octets.truncate(2);
+        octets.push(SUBSYSTEM);
+    }
+    Some(octets.into())
+}
+
+/// A message of this type that would change something: with its first optional field, if its
+/// fields are optional, and with values that are not zero.
+pub(super) fn telling(info: &MessageInfo) -> Option<Bytes> {
+    let mut octets = shortest(info)?.to_vec();
+    if octets.len() > 2 {
+        octets = with_first_field(info, &octets).unwrap_or(octets);
+    }
+    // The first octet of the body may be a presence vector, which is as it shall be.
+    for at in 3..octets.len() {
+        let before = std::mem::replace(&mut octets[at], FILLING);
+        if !is_valid(info, &octets) {
+            octets[at] = before;
+        }
+    }
+    if octets.len() == 3 {
+        let filled = [octets[0], octets[1], FILLING];
+        if is_valid(info, &filled) {
+            octets = filled.to_vec();
+        }
+    }
+    Some(octets.into())
+}
+
+/// The same message with the first field of its presence vector, if it begins with one.
+fn with_first_field(info: &MessageInfo, octets: &[u8]) -> Option<Vec<u8>> {
+    (1..=8).find_map(|extra| {
+        let mut longer = octets.to_vec();
+        longer[2] |= 1;
+        longer.resize(octets.len() + extra, FILLING);
+        is_valid(info, &longer).then_some(longer)
+    })
+}
+
+fn is_valid(info: &MessageInfo, octets: &[u8]) -> bool {
+    (info.decode)(&Bytes::copy_from_slice(octets)).is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn there_is_a_specimen_of_every_message() {
+        for info in jaus::messages::registry().iter() {
+            for specimen in [shortest(info), telling(info)] {
+                let specimen = specimen.unwrap_or_else(|| panic!("no specimen of {info:?}"));
+                assert!(is_valid(info, &specimen), "{info:?}: {specimen:02X?}");
+            }
+        }
+    }
+}
