@@ -11,7 +11,8 @@ use super::watch::Outlet;
 use crate::address::JausId;
 use crate::node::{self, Node, Port};
 use crate::service::{
-    Discovery, Kind, Liveness, Patience, Profile, Scope, Service, Stack, Timing, Transport,
+    AccessControl, Discovery, Kind, Liveness, Management, Patience, Profile, Scope, Service, Stack,
+    Timing, Transport,
 };
 
 /// A component that is not attached yet. Transport, Discovery and Liveness are always offered.
@@ -23,7 +24,15 @@ pub struct Builder {
     patience: Patience,
     seed: Option<u64>,
     liveness: Liveness,
+    guard: Guard,
     services: Vec<Box<dyn Service>>,
+}
+
+/// What stands between a client and a command.
+enum Guard {
+    None,
+    AccessControl(AccessControl),
+    Management(Management),
 }
 
 /// Why a component could not be attached.
@@ -52,6 +61,7 @@ impl Builder {
             patience: Patience::default(),
             seed: None,
             liveness: Liveness::new(),
+            guard: Guard::None,
             services: Vec::new(),
         }
     }
@@ -59,6 +69,19 @@ impl Builder {
     /// Offers a service.
     pub fn offer(mut self, service: impl Service + 'static) -> Self {
         self.services.push(Box::new(service));
+        self
+    }
+
+    /// Offers Access Control: only the client in control is obeyed. Replaces Management.
+    pub const fn access_control(mut self, settings: AccessControl) -> Self {
+        self.guard = Guard::AccessControl(settings);
+        self
+    }
+
+    /// Offers Management, and Access Control with it: the component acts only while a client
+    /// controls it and has made it ready.
+    pub const fn management(mut self, settings: Management) -> Self {
+        self.guard = Guard::Management(settings);
         self
     }
 
@@ -137,10 +160,12 @@ impl Builder {
         let stack = self.stack(id);
         let (commands, inbox) = mpsc::channel(Shared::COMMANDS);
         let (directory, directories) = watch::channel(Arc::new(stack.directory().clone()));
+        let (standing, standings) = watch::channel(*stack.standing());
         let changes = Arc::new(Outlet::new(Shared::CHANGES));
         let messages = Arc::new(Outlet::new(Shared::MESSAGES));
         let publisher = Publisher {
             directory,
+            standing,
             changes: changes.clone(),
             messages: messages.clone(),
         };
@@ -148,6 +173,7 @@ impl Builder {
             sender: port.sender(),
             commands,
             directories,
+            standings,
             changes,
             messages,
         };
@@ -161,7 +187,12 @@ impl Builder {
         let mut services: Vec<Box<dyn Service>> =
             vec![Box::new(Transport), Box::new(self.liveness)];
         services.append(&mut self.services);
-        Stack::new(discovery, services)
+        let stack = Stack::new(discovery, services);
+        match self.guard {
+            Guard::None => stack,
+            Guard::AccessControl(settings) => stack.access_control(settings),
+            Guard::Management(settings) => stack.management(settings),
+        }
     }
 
     fn check_names(&self) -> Result<(), AttachError> {

@@ -13,7 +13,9 @@ use super::watch::Outlet;
 use crate::address::JausId;
 use crate::endpoint::Received;
 use crate::node::{self, Port};
-use crate::service::{Change, Directory, Event, Inquiry, NoAnswer, Patience, Service, Stack};
+use crate::service::{
+    Change, Condition, Directory, Event, Inquiry, NoAnswer, Patience, Service, Stack, Standing,
+};
 
 /// What the application wants of its component.
 pub(super) enum Command {
@@ -30,6 +32,10 @@ pub(super) enum Command {
     Offer(Box<dyn Service>),
     /// To offer one less.
     Withdraw(&'static str),
+    /// To show how the component is.
+    Condition(Condition),
+    /// To tell subscribers that the answer to the query with this code is another.
+    Announce(u16),
 }
 
 /// What has become of a question.
@@ -43,6 +49,7 @@ pub(super) enum Answer {
 /// What the application may read and listen to.
 pub(super) struct Publisher {
     pub(super) directory: watch::Sender<Arc<Directory>>,
+    pub(super) standing: watch::Sender<Standing>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
 }
@@ -136,6 +143,8 @@ impl Driver {
             Command::Withdraw(urn) => {
                 self.stack.withdraw(Instant::now(), urn);
             }
+            Command::Condition(condition) => self.stack.set_condition(Instant::now(), condition),
+            Command::Announce(query) => self.stack.announce(Instant::now(), query),
         }
     }
 
@@ -169,6 +178,7 @@ impl Driver {
                 }
                 Event::Subscription(id, news) => self.clients.tell_subscriber(id, news),
                 Event::Control(id, news) => self.clients.tell_controller(id, news),
+                Event::Standing(standing) => _ = self.publisher.standing.send_replace(standing),
                 Event::Message(message) => self.publisher.messages.send(message),
             }
         }

@@ -16,7 +16,7 @@ use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::node;
-use crate::service::{Change, Directory, Kind, Offer, Service, Topic, When};
+use crate::service::{Change, Condition, Directory, Kind, Offer, Service, Standing, Topic, When};
 
 /// A component that lives on a node. Cheap to clone; it stops when the last clone is dropped.
 #[derive(Debug, Clone)]
@@ -29,6 +29,7 @@ pub(super) struct Shared {
     pub(super) sender: node::Sender,
     pub(super) commands: mpsc::Sender<Command>,
     pub(super) directories: watch::Receiver<Arc<Directory>>,
+    pub(super) standings: watch::Receiver<Standing>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
 }
@@ -69,6 +70,34 @@ impl Component {
     #[must_use]
     pub fn directory(&self) -> Arc<Directory> {
         self.shared.directories.borrow().clone()
+    }
+
+    /// The state of this component, and who controls it.
+    #[must_use]
+    pub fn standing(&self) -> Standing {
+        *self.shared.standings.borrow()
+    }
+
+    /// The same, to wait for changes of it.
+    #[must_use]
+    pub fn watch_standing(&self) -> watch::Receiver<Standing> {
+        self.shared.standings.clone()
+    }
+
+    /// Tells how this component is, which Management shows to everybody.
+    pub async fn set_condition(&self, condition: Condition) {
+        // As in `offer`.
+        let _ = self
+            .shared
+            .commands
+            .send(Command::Condition(condition))
+            .await;
+    }
+
+    /// Tells whoever subscribed to the query `Q` that its answer is another now.
+    pub async fn changed<Q: Message>(&self) {
+        // As in `offer`.
+        let _ = self.shared.commands.send(Command::Announce(Q::CODE)).await;
     }
 
     /// The changes of the directory from now on.

@@ -48,9 +48,9 @@ mod subscription;
 mod watch;
 
 pub use crate::service::{
-    CannotSubscribe, Change, ControlLost, ControlRefused, Directory, Handlers, Identification,
-    Kind, Level, Liveness, Loss, Offer, Outage, Patience, Rejection, Scope, Service,
-    SubscriptionEnd, Timing, When,
+    AccessControl, CannotSubscribe, Change, Condition, ControlLost, ControlRefused, Directory,
+    Handlers, Identification, Kind, Level, Liveness, Loss, Management, Offer, Outage, Patience,
+    Rejection, Scope, Service, Standing, State, SubscriptionEnd, Timing, When,
 };
 pub use builder::{AttachError, Builder};
 pub use control::Control;

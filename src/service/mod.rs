@@ -10,10 +10,12 @@
 //! | [`Liveness`] | answers Query Heartbeat Pulse, sends a heartbeat if asked to |
 //! | [`ListManager`] | keeps a list of elements that drivers work off |
 //! | [`Discovery`] | says who we are, finds out who the others are, keeps the [`Directory`] |
+//! | [`AccessControl`], [`Management`] | say who may command, and stop everything in an emergency |
 //! | [`Handlers`] | whatever an application offers, one function per message |
 
 mod client;
 mod context;
+mod control;
 mod directory;
 mod discovery;
 mod handlers;
@@ -39,6 +41,7 @@ pub use client::{
     SubscriptionEnd, SubscriptionId, SubscriptionNews, Topic, When,
 };
 pub use context::Context;
+pub use control::{AccessControl, Condition, Management};
 pub use directory::{Component, Directory, Identification, Kind, Level, Node, Offer, Subsystem};
 pub use discovery::{Change, Discovery, Loss, Profile, Scope, Timing};
 pub use handlers::Handlers;

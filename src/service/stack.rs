@@ -6,6 +6,7 @@ use std::time::Instant;
 use bytes::Bytes;
 
 use super::client::{Controls, Subscriptions};
+use super::control::{AccessControl, Condition, Control, Management};
 use super::inquiries::Inquiries;
 use super::{
     CannotSubscribe, Change, Context, ControlId, ControlNews, ControlRefused, Directory, Discovery,
@@ -15,11 +16,14 @@ use super::{
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::{Outgoing, Received};
+use crate::messages::core::{QueryAuthority, QueryControl, QueryStatus};
 
 /// A component without a network: its services, its view of the others, and its open questions.
 pub struct Stack {
     discovery: Discovery,
     services: Vec<Box<dyn Service>>,
+    control: Control,
+    /// What the services know of the control.
     standing: Standing,
     changed: BTreeSet<u16>,
     inquiries: Inquiries,
@@ -40,6 +44,8 @@ pub enum Event {
     Subscription(SubscriptionId, SubscriptionNews),
     /// Something has become of the control over a peer.
     Control(ControlId, ControlNews),
+    /// The component's own state, or who controls it, is another now.
+    Standing(Standing),
     /// A message that no service wanted.
     Message(Received),
 }
@@ -47,13 +53,12 @@ pub enum Event {
 impl Stack {
     /// A component with its discovery and what else it offers.
     #[must_use]
-    pub fn new(mut discovery: Discovery, services: Vec<Box<dyn Service>>) -> Self {
-        let mut out = Outbox::new(discovery.id());
-        let offers = services.iter().flat_map(|service| service.offers());
-        discovery.set_offers(offers, &mut out);
-        Self {
+    pub fn new(discovery: Discovery, services: Vec<Box<dyn Service>>) -> Self {
+        let out = Outbox::new(discovery.id());
+        let stack = Self {
             discovery,
             services,
+            control: Control::default(),
             standing: Standing::default(),
             changed: BTreeSet::new(),
             inquiries: Inquiries::default(),
@@ -61,7 +66,29 @@ impl Stack {
             controls: Controls::default(),
             out,
             events: VecDeque::new(),
-        }
+        };
+        stack.with_control(Control::default())
+    }
+
+    /// Offers Access Control: commands come from the client in control alone.
+    #[must_use]
+    pub fn access_control(self, settings: AccessControl) -> Self {
+        self.with_control(Control::with_access_control(settings))
+    }
+
+    /// Offers Management and Access Control: the component acts only while a client controls it and
+    /// has made it ready.
+    #[must_use]
+    pub fn management(self, settings: Management) -> Self {
+        self.with_control(Control::with_management(settings))
+    }
+
+    /// A stack that has not begun to live, with this control.
+    fn with_control(mut self, control: Control) -> Self {
+        self.standing = *control.standing();
+        self.control = control;
+        self.tell_offers();
+        self
     }
 
     /// The component's id.
@@ -76,6 +103,24 @@ impl Stack {
         self.discovery.directory()
     }
 
+    /// The component's state, and who controls it.
+    #[must_use]
+    pub const fn standing(&self) -> &Standing {
+        &self.standing
+    }
+
+    /// The application tells how the component is, which Management shows.
+    pub fn set_condition(&mut self, now: Instant, condition: Condition) {
+        self.control.handle_condition(condition, &mut self.out);
+        self.collect(now);
+    }
+
+    /// The application tells that the answer to the query with this code is another now.
+    pub fn announce(&mut self, now: Instant, query: u16) {
+        self.changed.insert(query);
+        self.collect(now);
+    }
+
     /// Begins to live: the services get their first wake-up.
     pub fn start(&mut self, now: Instant) {
         self.wake(now);
@@ -88,6 +133,9 @@ impl Stack {
         let mut handled = self.discovery.handle_message(now, message, &mut self.out);
         if handled == Handled::No {
             handled = self.handle_as_client(now, message);
+        }
+        if handled == Handled::No {
+            handled = self.control.handle_message(now, message, &mut self.out);
         }
         for service in &mut self.services {
             if handled == Handled::Yes {
@@ -222,9 +270,14 @@ impl Stack {
     }
 
     fn publish_offers(&mut self, now: Instant) {
-        let offers = self.services.iter().flat_map(|service| service.offers());
-        self.discovery.set_offers(offers, &mut self.out);
+        self.tell_offers();
         self.collect(now);
+    }
+
+    fn tell_offers(&mut self) {
+        let services = self.services.iter().flat_map(|service| service.offers());
+        let offers = self.control.offers().into_iter().chain(services);
+        self.discovery.set_offers(offers, &mut self.out);
     }
 
     /// The next message to send.
@@ -246,6 +299,7 @@ impl Stack {
             .filter_map(|service| service.poll_timeout());
         services
             .chain(self.discovery.poll_timeout())
+            .chain(self.control.poll_timeout())
             .chain(self.inquiries.poll_timeout())
             .chain(self.subscriptions.poll_timeout())
             .chain(self.controls.poll_timeout())
@@ -254,6 +308,7 @@ impl Stack {
 
     fn wake(&mut self, now: Instant) {
         self.discovery.handle_timeout(now, &mut self.out);
+        self.control.handle_timeout(now, &mut self.out);
         for service in &mut self.services {
             let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
             service.handle_timeout(now, &mut context);
@@ -267,8 +322,12 @@ impl Stack {
     fn collect(&mut self, now: Instant) {
         while let Some(change) = self.discovery.poll_change() {
             self.subscriptions.handle_change(now, &change);
+            if let Change::Lost(id, _) = change {
+                self.control.forget(id, &mut self.out);
+            }
             self.events.push_back(Event::Change(change));
         }
+        self.follow_control(now);
         while let Some((inquiry, failure)) = self.inquiries.poll_failure() {
             self.events.push_back(Event::Answer(inquiry, Err(failure)));
         }
@@ -279,5 +338,26 @@ impl Stack {
         while let Some((control, news)) = self.controls.poll_news() {
             self.events.push_back(Event::Control(control, news));
         }
+    }
+
+    /// Tells the services what the control has decided.
+    fn follow_control(&mut self, now: Instant) {
+        let after = *self.control.standing();
+        let before = std::mem::replace(&mut self.standing, after);
+        if before == after {
+            return;
+        }
+        if before.state != after.state {
+            self.changed.insert(QueryStatus::CODE);
+        }
+        if before.controller != after.controller {
+            self.changed
+                .extend([QueryControl::CODE, QueryAuthority::CODE]);
+        }
+        for service in &mut self.services {
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            service.handle_standing(now, &before, &mut context);
+        }
+        self.events.push_back(Event::Standing(after));
     }
 }

@@ -1,0 +1,164 @@
+//! Access Control: who is in control, and who may be.
+
+use std::time::Instant;
+
+use super::{AccessControl, Control, timeout_field, with};
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::messages::core::confirm_control::ResponseCode as Confirmation;
+use crate::messages::core::reject_control::ResponseCode as Rejection;
+use crate::messages::core::{
+    ConfirmControl, QueryAuthority, QueryControl, QueryTimeout, RejectControl, ReleaseControl,
+    ReportAuthority, ReportControl, ReportTimeout, RequestControl, SetAuthority,
+};
+use crate::service::{Controller, Handled, Outbox, State};
+
+impl Control {
+    pub(super) fn handle_access(
+        &mut self,
+        now: Instant,
+        access: AccessControl,
+        code: u16,
+        message: &Received,
+        out: &mut Outbox,
+    ) -> Handled {
+        match code {
+            RequestControl::CODE => with(message, |request: RequestControl| {
+                self.request(now, access, request.authority_code, message, out);
+            }),
+            ReleaseControl::CODE => {
+                self.release(message, out);
+                Handled::Yes
+            }
+            SetAuthority::CODE => with(message, |set: SetAuthority| {
+                self.set_authority(access, set.authority_code, message);
+            }),
+            QueryControl::CODE => {
+                out.reply(message, &self.report_control());
+                Handled::Yes
+            }
+            QueryAuthority::CODE => {
+                let controller = self.standing.controller;
+                let report = ReportAuthority {
+                    authority_code: controller.map_or(access.authority, |it| it.authority),
+                };
+                out.reply(message, &report);
+                Handled::Yes
+            }
+            QueryTimeout::CODE => {
+                let report = ReportTimeout {
+                    timeout: timeout_field(access.timeout),
+                };
+                out.reply(message, &report);
+                Handled::Yes
+            }
+            _ => Handled::No,
+        }
+    }
+
+    fn request(
+        &mut self,
+        now: Instant,
+        access: AccessControl,
+        authority: u8,
+        message: &Received,
+        out: &mut Outbox,
+    ) {
+        let client = message.source;
+        if !self.is_available() {
+            return confirm(message, Confirmation::NOT_AVAILABLE, out);
+        }
+        match self.standing.controller {
+            // It has made itself too weak to keep control.
+            Some(controller) if controller.id == client && authority < access.authority => {
+                return self.drop_controller(out);
+            }
+            Some(controller) if controller.id == client => {}
+            Some(controller) if authority <= controller.authority => {
+                return confirm(message, Confirmation::INSUFFICIENT_AUTHORITY, out);
+            }
+            // Whoever is stronger than the controller takes over. Its rank is not less than the
+            // default authority, as the controller's is not.
+            Some(controller) => reject(controller, Rejection::CONTROL_RELEASED, out),
+            None if authority < access.authority => {
+                return confirm(message, Confirmation::INSUFFICIENT_AUTHORITY, out);
+            }
+            None => {}
+        }
+        tracing::debug!(id = %out.source(), %client, authority, "control granted");
+        self.standing.controller = Some(Controller {
+            id: client,
+            authority,
+        });
+        self.renew(now);
+        confirm(message, Confirmation::CONTROL_ACCEPTED, out);
+    }
+
+    fn release(&mut self, message: &Received, out: &mut Outbox) {
+        let client = message.source;
+        let answer = |code| RejectControl {
+            response_code: code,
+        };
+        if self.standing.state == State::Emergency {
+            out.reply(message, &answer(Rejection::NOT_AVAILABLE));
+        } else if self.is_controller(client) {
+            self.drop_controller(out);
+        } else if self.standing.controller.is_none() {
+            // Whoever asks again, because the answer got lost, gets it again.
+            out.reply(message, &answer(Rejection::CONTROL_RELEASED));
+        }
+    }
+
+    /// Any rank from the default authority up to the present one.
+    fn set_authority(&mut self, access: AccessControl, authority: u8, message: &Received) {
+        let emergency = self.standing.state == State::Emergency;
+        if let Some(controller) = &mut self.standing.controller
+            && controller.id == message.source
+            && !emergency
+            && (access.authority..=controller.authority).contains(&authority)
+        {
+            controller.authority = authority;
+        }
+    }
+
+    fn report_control(&self) -> ReportControl {
+        self.standing
+            .controller
+            .map_or_else(ReportControl::default, |controller| ReportControl {
+                subsystem_id: controller.id.subsystem(),
+                node_id: controller.id.node(),
+                component_id: controller.id.component(),
+                authority_code: controller.authority,
+            })
+    }
+
+    /// Whether control can be had at all.
+    const fn is_available(&self) -> bool {
+        matches!(self.standing.state, State::Ready | State::Standby)
+    }
+
+    /// Ends control and says so; what was ready falls back to standby.
+    pub(super) fn drop_controller(&mut self, out: &mut Outbox) {
+        self.deadline = None;
+        if let Some(controller) = self.standing.controller.take() {
+            reject(controller, Rejection::CONTROL_RELEASED, out);
+        }
+        if self.management.is_some() && self.standing.state == State::Ready {
+            self.standing.state = State::Standby;
+        }
+    }
+}
+
+fn confirm(request: &Received, code: Confirmation, out: &mut Outbox) {
+    let confirm = ConfirmControl {
+        response_code: code,
+    };
+    out.reply(request, &confirm);
+}
+
+fn reject(controller: Controller, code: Rejection, out: &mut Outbox) {
+    let reject = RejectControl {
+        response_code: code,
+    };
+    out.send(controller.id, &reject);
+}

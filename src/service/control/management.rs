@@ -1,0 +1,121 @@
+//! Management: the states of a component, and emergencies.
+
+use super::{Condition, Control};
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::messages::core::{
+    ClearEmergency, QueryStatus, ReportStatus, Reset, Resume, SetEmergency, Shutdown, Standby,
+    report_status,
+};
+use crate::service::{Handled, Outbox, State};
+
+/// The most clients whose emergencies are remembered; those of others last until these have been
+/// cleared.
+const MOST_EMERGENCIES: usize = 64;
+
+impl Control {
+    pub(super) fn handle_management(
+        &mut self,
+        code: u16,
+        message: &Received,
+        out: &mut Outbox,
+    ) -> Handled {
+        let client = message.source;
+        match code {
+            QueryStatus::CODE => out.reply(message, &self.report_status()),
+            Resume::CODE => self.resume(client),
+            Standby::CODE => self.stand_by(client),
+            Reset::CODE => self.reset(client, out),
+            Shutdown::CODE => self.shut_down(client, out),
+            // Whatever the code of the emergency is: stopping is always right.
+            SetEmergency::CODE => self.set_emergency(client),
+            ClearEmergency::CODE => self.clear_emergency(client),
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+
+    /// The application tells how it is.
+    pub(in crate::service) fn handle_condition(&mut self, condition: Condition, out: &mut Outbox) {
+        if self.management.is_none() {
+            return;
+        }
+        match (condition, self.standing.state) {
+            (Condition::Initialized, State::Initialize) => self.standing.state = State::Standby,
+            // Told during an emergency, it still counts afterwards.
+            (Condition::Initialized, State::Emergency) => self.resting = State::Standby,
+            (Condition::Initialized, _)
+            | (Condition::Failed, State::Emergency | State::Shutdown) => {}
+            (Condition::Failed, _) => {
+                self.drop_controller(out);
+                self.standing.state = State::Failure;
+            }
+        }
+    }
+
+    pub(super) fn first_state(&self) -> State {
+        let initializes = self.management.is_some_and(|it| it.initializes);
+        if initializes {
+            State::Initialize
+        } else {
+            State::Standby
+        }
+    }
+
+    fn report_status(&self) -> ReportStatus {
+        ReportStatus {
+            status: report_status::Status(self.standing.state as u8),
+            reserved: 0,
+        }
+    }
+
+    fn resume(&mut self, client: JausId) {
+        if self.is_controller(client) && self.standing.state == State::Standby {
+            self.standing.state = State::Ready;
+        }
+    }
+
+    fn stand_by(&mut self, client: JausId) {
+        if self.is_controller(client) && self.standing.state == State::Ready {
+            self.standing.state = State::Standby;
+        }
+    }
+
+    fn reset(&mut self, client: JausId, out: &mut Outbox) {
+        if self.is_controller(client) && self.standing.state != State::Emergency {
+            self.drop_controller(out);
+            self.standing.state = self.first_state();
+        }
+    }
+
+    fn shut_down(&mut self, client: JausId, out: &mut Outbox) {
+        if self.is_controller(client) && self.standing.state != State::Emergency {
+            self.drop_controller(out);
+            self.standing.state = State::Shutdown;
+        }
+    }
+
+    fn set_emergency(&mut self, client: JausId) {
+        if self.emergencies.len() < MOST_EMERGENCIES {
+            self.emergencies.insert(client);
+        }
+        let state = self.standing.state;
+        if state != State::Emergency {
+            tracing::warn!(%client, "emergency");
+            self.resting = match state {
+                State::Ready => State::Standby,
+                other => other,
+            };
+            self.standing.state = State::Emergency;
+        }
+    }
+
+    fn clear_emergency(&mut self, client: JausId) {
+        let cleared = self.emergencies.remove(&client);
+        if cleared && self.emergencies.is_empty() {
+            tracing::info!(%client, "the last emergency is cleared");
+            self.standing.state = self.resting;
+        }
+    }
+}

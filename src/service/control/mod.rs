@@ -1,0 +1,249 @@
+//! Who may command a component, and what it is fit for: the services Access Control and Management
+//! (AS5710) as one machine, because the second only adds states to the first.
+//!
+//! | state | controlled by a client | what a component does |
+//! |---|---|---|
+//! | [`Initialize`](State::Initialize) | never | gets ready, if it [said so](Management::initializes) |
+//! | [`Standby`](State::Standby) | or not | nothing; where it starts, and where it falls back to |
+//! | [`Ready`](State::Ready) | always | acts |
+//! | [`Emergency`](State::Emergency) | or not | nothing, until each client that set one clears it |
+//! | [`Failure`](State::Failure), [`Shutdown`](State::Shutdown) | never | nothing any more |
+//!
+//! A component with Access Control alone is always ready. Losing control (released, timed out, taken
+//! by nobody else, its client gone) leads from Ready to Standby.
+//!
+//! # Where sources disagree
+//!
+//! * **After an emergency** the published machines of 1.1 go back to where they were, so that
+//!   clearing sets a vehicle in motion; others (fkie) go to Standby. We go to Standby: whoever is in
+//!   control must say Resume. Control itself is kept, as 1.1 has it.
+//! * **Release in an emergency** is refused with Not Available whether the client was in control or
+//!   not, as the public contests' judges expect it.
+//! * **The time-out** is 0 (never) unless set, as with the vehicles that contests were won with:
+//!   the contests' operators request control once and do not renew it. A client that discovery finds
+//!   gone loses control all the same. With a time-out, control ends a quarter of it late, which
+//!   JAUS++ clients, which renew it four times in its course, never meet.
+
+mod access;
+mod management;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use super::{Handled, Outbox, Standing, State, code_of, read};
+use crate::address::JausId;
+use crate::codec::{Message, ServiceId};
+use crate::endpoint::Received;
+use crate::messages::core::{self, report_timeout};
+
+/// How a component can be controlled.
+///
+/// ```
+/// use jaus::service::AccessControl;
+///
+/// let settings = AccessControl::new().authority(100).timeout(5);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AccessControl {
+    authority: u8,
+    timeout: u8,
+}
+
+impl AccessControl {
+    /// Obeys any client with an authority of at least 1, for as long as the client is there.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            authority: 1,
+            timeout: 0,
+        }
+    }
+
+    /// The default authority: clients with less do not get control.
+    #[must_use]
+    pub const fn authority(mut self, code: u8) -> Self {
+        self.authority = code;
+        self
+    }
+
+    /// After how many seconds control ends unless its client requests it again; 0 for never.
+    #[must_use]
+    pub const fn timeout(mut self, seconds: u8) -> Self {
+        self.timeout = seconds;
+        self
+    }
+}
+
+impl Default for AccessControl {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The life of a component that clients start and stop, which includes Access Control.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Management {
+    access: AccessControl,
+    initializes: bool,
+}
+
+impl Management {
+    /// In standby from the beginning, with the usual [`AccessControl`].
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            access: AccessControl::new(),
+            initializes: false,
+        }
+    }
+
+    /// How it can be controlled.
+    #[must_use]
+    pub const fn access_control(mut self, access: AccessControl) -> Self {
+        self.access = access;
+        self
+    }
+
+    /// Begins in [`State::Initialize`], and returns there at each reset, until the application says
+    /// that it is done.
+    #[must_use]
+    pub const fn initializes(mut self) -> Self {
+        self.initializes = true;
+        self
+    }
+}
+
+/// What the application tells about its own state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Condition {
+    /// It has become fit to work; without effect but in [`State::Initialize`].
+    Initialized,
+    /// Something is broken; without effect in an emergency and while shutting down.
+    Failed,
+}
+
+/// The control over one component. Without settings anyone is obeyed, and no message is answered.
+#[derive(Debug, Default)]
+pub(super) struct Control {
+    access: Option<AccessControl>,
+    management: Option<Management>,
+    standing: Standing,
+    /// When control ends unless it is renewed.
+    deadline: Option<Instant>,
+    /// Who has set an emergency and not cleared it.
+    emergencies: BTreeSet<JausId>,
+    /// Where an emergency leads back to.
+    resting: State,
+}
+
+impl Control {
+    pub(super) fn with_access_control(settings: AccessControl) -> Self {
+        Self {
+            access: Some(settings),
+            standing: Standing {
+                exclusive: true,
+                ..Standing::default()
+            },
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn with_management(settings: Management) -> Self {
+        let mut control = Self::with_access_control(settings.access);
+        control.management = Some(settings);
+        control.standing.state = control.first_state();
+        control
+    }
+
+    pub(super) const fn standing(&self) -> &Standing {
+        &self.standing
+    }
+
+    pub(super) fn offers(&self) -> Vec<ServiceId> {
+        let mut offers = Vec::new();
+        if self.access.is_some() {
+            offers.extend([core::access_control::V1_1, core::access_control::V1_0]);
+        }
+        if self.management.is_some() {
+            offers.extend([core::management::V1_1, core::management::V1_0]);
+        }
+        offers
+    }
+
+    pub(super) fn handle_message(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        out: &mut Outbox,
+    ) -> Handled {
+        let Some(code) = code_of(&message.payload) else {
+            return Handled::No;
+        };
+        if let Some(access) = self.access
+            && self.handle_access(now, access, code, message, out) == Handled::Yes
+        {
+            return Handled::Yes;
+        }
+        if self.management.is_some() {
+            self.handle_management(code, message, out)
+        } else {
+            Handled::No
+        }
+    }
+
+    pub(super) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
+        let Some(deadline) = self.deadline else {
+            return;
+        };
+        if now < deadline {
+            return;
+        }
+        if self.standing.state == State::Emergency {
+            // Control is kept over an emergency.
+            self.renew(now);
+        } else {
+            tracing::info!(id = %out.source(), "control has timed out");
+            self.drop_controller(out);
+        }
+    }
+
+    pub(super) const fn poll_timeout(&self) -> Option<Instant> {
+        self.deadline
+    }
+
+    /// A client is gone, as far as discovery can tell.
+    pub(super) fn forget(&mut self, client: JausId, out: &mut Outbox) {
+        if self.is_controller(client) {
+            tracing::info!(id = %out.source(), %client, "the client in control is gone");
+            self.drop_controller(out);
+        }
+    }
+
+    fn is_controller(&self, client: JausId) -> bool {
+        self.standing
+            .controller
+            .is_some_and(|controller| controller.id == client)
+    }
+
+    /// Begins the time-out anew.
+    fn renew(&mut self, now: Instant) {
+        let seconds = self.access.map_or(0, |access| access.timeout);
+        let timeout = Duration::from_secs(seconds.into());
+        self.deadline = (seconds > 0).then(|| now + timeout + timeout / 4);
+    }
+}
+
+/// The octet of Report Timeout.
+fn timeout_field(seconds: u8) -> report_timeout::Timeout {
+    report_timeout::Timeout(seconds)
+}
+
+/// Reads a message and does something with it, if it can be read.
+fn with<M: Message>(message: &Received, act: impl FnOnce(M)) -> Handled {
+    if let Some(message) = read(message) {
+        act(message);
+    }
+    Handled::Yes
+}

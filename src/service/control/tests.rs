@@ -1,0 +1,369 @@
+//! Each row of Access Control and Management, with a whole component and under virtual time.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "a test begins at some time, and all that follows is virtual"
+)]
+
+use std::time::{Duration, Instant};
+
+use super::{AccessControl, Condition, Management};
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::messages::core::confirm_control::ResponseCode as Confirmation;
+use crate::messages::core::reject_control::ResponseCode as Rejection;
+use crate::messages::core::*;
+use crate::service::{
+    Discovery, Kind, Profile, Scope, Stack, Standing as Now, State, Timing, Transport,
+};
+use crate::wire::{Broadcast, Priority};
+
+const US: JausId = JausId::new(105, 1, 1);
+const FIRST: JausId = JausId::new(42, 2, 1);
+const SECOND: JausId = JausId::new(42, 2, 2);
+const THIRD: JausId = JausId::new(42, 2, 4);
+
+/// A component with what it has said.
+struct Rig {
+    stack: Stack,
+    now: Instant,
+}
+
+impl Rig {
+    fn new(settings: impl FnOnce(Stack) -> Stack) -> Self {
+        let profile = Profile::new(Kind::Vehicle, "Rover");
+        let discovery = Discovery::new(US, profile, Scope::Nobody, Timing::default(), 1);
+        let stack = settings(Stack::new(discovery, vec![Box::new(Transport)]));
+        let now = Instant::now();
+        Self { stack, now }
+    }
+
+    fn managed() -> Self {
+        Self::new(|stack| stack.management(Management::new()))
+    }
+
+    /// A client sends something; what it and others are told.
+    fn hear<M: Message>(&mut self, source: JausId, message: &M) -> Vec<(JausId, Vec<u8>)> {
+        let received = Received {
+            source,
+            destination: US,
+            to: US,
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            payload: message.encode().unwrap(),
+            path: None,
+        };
+        self.stack.handle_message(self.now, &received);
+        self.said()
+    }
+
+    fn pass(&mut self, time: Duration) -> Vec<(JausId, Vec<u8>)> {
+        self.now += time;
+        self.stack.handle_timeout(self.now);
+        self.said()
+    }
+
+    fn said(&mut self) -> Vec<(JausId, Vec<u8>)> {
+        std::iter::from_fn(|| self.stack.poll_transmit())
+            .map(|message| (message.destination, message.payload.to_vec()))
+            .collect()
+    }
+
+    fn request(&mut self, client: JausId, authority_code: u8) -> Vec<(JausId, Vec<u8>)> {
+        self.hear(client, &RequestControl { authority_code })
+    }
+
+    /// `FIRST` is in control, and has made the component ready.
+    fn ready() -> Self {
+        let mut rig = Self::managed();
+        rig.request(FIRST, 100);
+        rig.hear(FIRST, &Resume);
+        assert_eq!(rig.state(), State::Ready);
+        rig
+    }
+
+    fn state(&self) -> State {
+        self.stack.standing().state
+    }
+
+    fn controller(&self) -> Option<(JausId, u8)> {
+        let controller = self.stack.standing().controller;
+        controller.map(|controller| (controller.id, controller.authority))
+    }
+}
+
+fn confirmed(to: JausId, response_code: Confirmation) -> (JausId, Vec<u8>) {
+    told(to, &ConfirmControl { response_code })
+}
+
+fn rejected(to: JausId, response_code: Rejection) -> (JausId, Vec<u8>) {
+    told(to, &RejectControl { response_code })
+}
+
+fn told<M: Message>(to: JausId, message: &M) -> (JausId, Vec<u8>) {
+    (to, message.encode().unwrap().to_vec())
+}
+
+const STOP: SetEmergency = SetEmergency {
+    emergency_code: set_emergency::EmergencyCode(1),
+};
+const CLEAR: ClearEmergency = ClearEmergency {
+    emergency_code: clear_emergency::EmergencyCode(1),
+};
+
+#[test]
+fn control_goes_to_who_has_the_default_authority() {
+    for (authority, answer, controller) in [
+        (0, Confirmation::INSUFFICIENT_AUTHORITY, None),
+        (1, Confirmation::CONTROL_ACCEPTED, Some((FIRST, 1))),
+        (220, Confirmation::CONTROL_ACCEPTED, Some((FIRST, 220))),
+    ] {
+        let mut rig = Rig::managed();
+        assert_eq!(rig.request(FIRST, authority), [confirmed(FIRST, answer)]);
+        assert_eq!(rig.controller(), controller, "authority {authority}");
+    }
+}
+
+#[test]
+fn a_stronger_client_takes_control_over_and_the_former_is_told() {
+    let mut rig = Rig::managed();
+    rig.request(FIRST, 220);
+    for weaker in [200, 220] {
+        let refused = confirmed(SECOND, Confirmation::INSUFFICIENT_AUTHORITY);
+        assert_eq!(rig.request(SECOND, weaker), [refused]);
+    }
+    let expected = [
+        rejected(FIRST, Rejection::CONTROL_RELEASED),
+        confirmed(SECOND, Confirmation::CONTROL_ACCEPTED),
+    ];
+    assert_eq!(rig.request(SECOND, 231), expected);
+    assert_eq!(rig.controller(), Some((SECOND, 231)));
+}
+
+#[test]
+fn the_client_in_control_may_change_its_authority_by_asking_again() {
+    let mut rig = Rig::ready();
+    let granted = confirmed(FIRST, Confirmation::CONTROL_ACCEPTED);
+    assert_eq!(rig.request(FIRST, 50), [granted]);
+    assert_eq!(rig.controller(), Some((FIRST, 50)));
+    assert_eq!(rig.state(), State::Ready, "renewing stops nothing");
+    let lost = rejected(FIRST, Rejection::CONTROL_RELEASED);
+    assert_eq!(rig.request(FIRST, 0), [lost]);
+    assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
+}
+
+#[test]
+fn authority_is_set_by_the_client_in_control_alone_and_only_downwards() {
+    let mut rig = Rig::new(|stack| stack.access_control(AccessControl::new().authority(10)));
+    rig.request(FIRST, 220);
+    for (client, authority_code, expected) in [
+        (SECOND, 200, 220),
+        (FIRST, 221, 220),
+        (FIRST, 219, 219),
+        (FIRST, 9, 219),
+        (FIRST, 10, 10),
+    ] {
+        assert_eq!(rig.hear(client, &SetAuthority { authority_code }), []);
+        let report = ReportAuthority {
+            authority_code: expected,
+        };
+        assert_eq!(rig.hear(SECOND, &QueryAuthority), [told(SECOND, &report)]);
+    }
+}
+
+#[test]
+fn queries_tell_who_controls_and_for_how_long() {
+    let settings = AccessControl::new().authority(7).timeout(5);
+    let mut rig = Rig::new(|stack| stack.access_control(settings));
+    let nobody = ReportControl::default();
+    assert_eq!(rig.hear(SECOND, &QueryControl), [told(SECOND, &nobody)]);
+    let default = ReportAuthority { authority_code: 7 };
+    assert_eq!(rig.hear(SECOND, &QueryAuthority), [told(SECOND, &default)]);
+    rig.request(FIRST, 220);
+    let first = ReportControl {
+        subsystem_id: 42,
+        node_id: 2,
+        component_id: 1,
+        authority_code: 220,
+    };
+    assert_eq!(rig.hear(SECOND, &QueryControl), [told(SECOND, &first)]);
+    let timeout = ReportTimeout {
+        timeout: report_timeout::Timeout(5),
+    };
+    assert_eq!(rig.hear(SECOND, &QueryTimeout), [told(SECOND, &timeout)]);
+}
+
+#[test]
+fn release_is_answered_to_the_client_in_control_and_when_nobody_is() {
+    let mut rig = Rig::ready();
+    assert_eq!(rig.hear(SECOND, &ReleaseControl), []);
+    let released = rejected(FIRST, Rejection::CONTROL_RELEASED);
+    for _again in 0..2 {
+        assert_eq!(
+            rig.hear(FIRST, &ReleaseControl),
+            std::slice::from_ref(&released)
+        );
+        assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
+    }
+}
+
+#[test]
+fn control_that_is_not_renewed_times_out() {
+    let settings = AccessControl::new().timeout(4);
+    let mut rig = Rig::new(|stack| stack.management(Management::new().access_control(settings)));
+    rig.request(FIRST, 100);
+    rig.hear(FIRST, &Resume);
+    assert_eq!(rig.pass(Duration::from_secs(4)), []);
+    rig.request(FIRST, 100);
+    assert_eq!(rig.pass(Duration::from_secs(4)), []);
+    let lost = rejected(FIRST, Rejection::CONTROL_RELEASED);
+    assert_eq!(rig.pass(Duration::from_secs(1)), [lost]);
+    assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
+    assert_eq!(rig.pass(Duration::from_secs(60)), []);
+}
+
+#[test]
+fn control_without_a_time_out_lasts() {
+    let mut rig = Rig::ready();
+    rig.pass(Duration::from_secs(3600));
+    assert_eq!(rig.state(), State::Ready);
+}
+
+#[test]
+fn a_managed_component_begins_in_standby_and_only_its_controller_moves_it() {
+    let mut rig = Rig::managed();
+    assert_eq!(rig.state(), State::Standby);
+    rig.hear(FIRST, &Resume);
+    assert_eq!(rig.state(), State::Standby, "nobody controls it");
+    rig.request(FIRST, 100);
+    rig.hear(SECOND, &Resume);
+    assert_eq!(rig.state(), State::Standby, "somebody else does");
+    rig.hear(FIRST, &Resume);
+    assert_eq!(rig.state(), State::Ready);
+    rig.hear(SECOND, &Standby);
+    rig.hear(SECOND, &Reset);
+    rig.hear(SECOND, &Shutdown);
+    assert_eq!(rig.state(), State::Ready);
+    rig.hear(FIRST, &Standby);
+    assert_eq!(rig.state(), State::Standby);
+}
+
+#[test]
+fn a_reset_drops_control_and_leads_to_standby() {
+    let mut rig = Rig::ready();
+    let lost = rejected(FIRST, Rejection::CONTROL_RELEASED);
+    assert_eq!(rig.hear(FIRST, &Reset), [lost]);
+    assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
+}
+
+#[test]
+fn a_component_that_initializes_cannot_be_controlled_before() {
+    let mut rig = Rig::new(|stack| stack.management(Management::new().initializes()));
+    let refused = confirmed(FIRST, Confirmation::NOT_AVAILABLE);
+    assert_eq!(rig.request(FIRST, 100), [refused]);
+    rig.stack.set_condition(rig.now, Condition::Initialized);
+    assert_eq!(rig.state(), State::Standby);
+    rig.request(FIRST, 100);
+    rig.hear(FIRST, &Resume);
+    rig.hear(FIRST, &Reset);
+    assert_eq!(rig.state(), State::Initialize);
+}
+
+#[test]
+fn shutdown_and_failure_end_control_for_good() {
+    let ends: [fn(&mut Rig); 2] = [
+        |rig| _ = rig.hear(FIRST, &Shutdown),
+        |rig| rig.stack.set_condition(rig.now, Condition::Failed),
+    ];
+    for (end, state) in ends.iter().zip([State::Shutdown, State::Failure]) {
+        let mut rig = Rig::ready();
+        end(&mut rig);
+        assert_eq!((rig.controller(), rig.state()), (None, state));
+        rig.said();
+        let refused = confirmed(FIRST, Confirmation::NOT_AVAILABLE);
+        assert_eq!(rig.request(FIRST, 255), [refused]);
+        rig.hear(FIRST, &Resume);
+        assert_eq!(rig.state(), state);
+    }
+}
+
+#[test]
+fn anybody_can_set_an_emergency_and_only_the_same_client_clears_it() {
+    let mut rig = Rig::ready();
+    rig.hear(THIRD, &STOP);
+    assert_eq!(rig.state(), State::Emergency);
+    for client in [FIRST, SECOND] {
+        rig.hear(client, &CLEAR);
+        assert_eq!(rig.state(), State::Emergency);
+    }
+    rig.hear(THIRD, &CLEAR);
+    assert_eq!(
+        rig.state(),
+        State::Standby,
+        "it does not move off by itself"
+    );
+    assert_eq!(rig.controller(), Some((FIRST, 100)), "control is kept");
+}
+
+#[test]
+fn an_emergency_ends_when_the_last_of_several_is_cleared() {
+    let mut rig = Rig::ready();
+    for client in [SECOND, THIRD, SECOND] {
+        rig.hear(client, &STOP);
+    }
+    rig.hear(SECOND, &CLEAR);
+    assert_eq!(rig.state(), State::Emergency);
+    rig.hear(THIRD, &CLEAR);
+    assert_eq!(rig.state(), State::Standby);
+}
+
+#[test]
+fn in_an_emergency_control_neither_comes_nor_goes() {
+    let mut rig = Rig::ready();
+    rig.hear(THIRD, &STOP);
+    let refused = confirmed(SECOND, Confirmation::NOT_AVAILABLE);
+    assert_eq!(rig.request(SECOND, 255), [refused]);
+    let kept = rejected(FIRST, Rejection::NOT_AVAILABLE);
+    assert_eq!(rig.hear(FIRST, &ReleaseControl), [kept]);
+    rig.hear(FIRST, &Resume);
+    rig.hear(FIRST, &Reset);
+    rig.hear(FIRST, &Shutdown);
+    rig.hear(FIRST, &SetAuthority { authority_code: 5 });
+    assert_eq!(rig.controller(), Some((FIRST, 100)));
+    let status = ReportStatus {
+        status: report_status::Status(5),
+        reserved: 0,
+    };
+    assert_eq!(rig.hear(SECOND, &QueryStatus), [told(SECOND, &status)]);
+}
+
+#[test]
+fn a_flood_of_emergencies_is_bounded_and_can_be_cleared() {
+    let mut rig = Rig::managed();
+    let client = |i: u16| JausId::new(1000 + i, 1, 1);
+    for i in 0..1000 {
+        rig.hear(client(i), &STOP);
+    }
+    for i in 0..64 {
+        assert_eq!(rig.state(), State::Emergency);
+        rig.hear(client(i), &CLEAR);
+    }
+    assert_eq!(rig.state(), State::Standby);
+}
+
+#[test]
+fn access_control_alone_leaves_a_component_ready_and_management_unanswered() {
+    let mut rig = Rig::new(|stack| stack.access_control(AccessControl::new()));
+    assert_eq!(rig.hear(FIRST, &QueryStatus), []);
+    rig.hear(FIRST, &STOP);
+    rig.request(FIRST, 100);
+    rig.hear(FIRST, &ReleaseControl);
+    assert_eq!(rig.state(), State::Ready);
+}
+
+#[test]
+fn a_component_without_settings_obeys_anyone_and_answers_nothing() {
+    let mut rig = Rig::new(|stack| stack);
+    assert_eq!(rig.request(FIRST, 100), []);
+    assert_eq!(*rig.stack.standing(), Now::default());
+}
