@@ -87,6 +87,13 @@ impl Rig {
         self.out.pop().map(|sent| R::decode(&sent.payload).unwrap())
     }
 
+    /// The code of the next message that was sent.
+    pub(crate) fn answer_code(&mut self) -> Option<u16> {
+        self.out
+            .pop()
+            .and_then(|sent| super::code_of(&sent.payload))
+    }
+
     /// Lets time pass, and wakes the services when they want it.
     pub(crate) fn run(&mut self, duration: Duration) {
         let end = self.now + duration;

@@ -29,16 +29,25 @@ use crate::messages::core::{
 pub use elements::ElementList;
 
 /// A list that a [`ListManager`] and any number of drivers share.
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct Elements {
     shared: Arc<Mutex<Shared>>,
 }
 
-#[derive(Debug, Default)]
+impl std::fmt::Debug for Elements {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.lock().list.fmt(f)
+    }
+}
+
+#[derive(Default)]
 struct Shared {
     list: ElementList,
-    kinds: BTreeMap<u16, fn(&Bytes) -> bool>,
+    /// By the code of the message in an element: whether a driver can work with it.
+    kinds: BTreeMap<u16, Check>,
 }
+
+type Check = Box<dyn Fn(&Bytes) -> Result<(), ResponseCode> + Send>;
 
 impl Elements {
     /// An empty list that takes no elements until something is [accepted](Self::accept).
@@ -49,8 +58,18 @@ impl Elements {
 
     /// Elements that hold a message of type `M` are welcome.
     pub fn accept<M: Message>(&self) {
-        let is_readable: fn(&Bytes) -> bool = |octets| M::decode(octets).is_ok();
-        self.lock().kinds.insert(M::CODE, is_readable);
+        self.accept_if(|_: &M| true);
+    }
+
+    /// Elements that hold a message of type `M` are welcome if it can be worked with, for instance
+    /// if it is in range.
+    pub fn accept_if<M: Message>(&self, can_do: impl Fn(&M) -> bool + Send + 'static) {
+        let check = move |octets: &Bytes| match M::decode(octets) {
+            Ok(message) if can_do(&message) => Ok(()),
+            Ok(_) => Err(ResponseCode::UNSPECIFIED_ERROR),
+            Err(_) => Err(ResponseCode::UNSUPPORTED_ELEMENT_TYPE),
+        };
+        self.lock().kinds.insert(M::CODE, Box::new(check));
     }
 
     /// The element with a number, if it is in the list; 0 stands for the first one.
@@ -73,12 +92,10 @@ impl Shared {
     /// Whether a driver can work with an element.
     fn check(&self, element: &ElementRec) -> Result<(), ResponseCode> {
         let data = &element.element_data;
-        let is_readable = code_of(&data.data).and_then(|code| self.kinds.get(&code));
-        let is_readable = is_readable.is_some_and(|is_readable| is_readable(&data.data));
-        if data.format == ElementDataFormat::JAUS_MESSAGE && is_readable {
-            Ok(())
-        } else {
-            Err(ResponseCode::UNSUPPORTED_ELEMENT_TYPE)
+        let check = code_of(&data.data).and_then(|code| self.kinds.get(&code));
+        match check.filter(|_| data.format == ElementDataFormat::JAUS_MESSAGE) {
+            Some(check) => check(&data.data),
+            None => Err(ResponseCode::UNSUPPORTED_ELEMENT_TYPE),
         }
     }
 

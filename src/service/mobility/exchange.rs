@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::clock;
 use super::vehicle::Cockpit;
-use crate::codec::Message;
+use crate::codec::{Message, OutOfRange};
 use crate::endpoint::Received;
 use crate::messages::mobility::report_local_pose::TimeStamp;
 use crate::service::{Context, Standing, read};
@@ -47,6 +47,14 @@ impl Exchange<'_, '_> {
     /// Answers.
     pub(super) fn reply<R: Message>(&mut self, report: &R) {
         self.context.reply(self.message, report);
+    }
+
+    /// Answers, unless the answer has a number that the report cannot hold.
+    pub(super) fn reply_if<R: Message>(&mut self, report: Result<R, OutOfRange>) {
+        match report {
+            Ok(report) => self.reply(&report),
+            Err(error) => tracing::debug!(report = R::NAME, %error, "cannot be reported"),
+        }
     }
 
     /// The time since the beginning of 1970, if it is known.

@@ -24,13 +24,19 @@ mod acceleration_state_sensor;
 mod clock;
 mod exchange;
 mod global_pose_sensor;
+mod global_waypoint;
 mod local_pose_sensor;
+mod local_waypoint;
+mod place;
 mod primitive_driver;
 #[cfg(test)]
 mod tests;
+mod travel;
 mod vehicle;
 mod velocity_state_sensor;
 mod wanted;
+mod waypoint_driver;
+mod waypoint_list_driver;
 
 pub use vehicle::{OnVehicle, Vehicle};
 

@@ -1,12 +1,18 @@
 //! The mobility services on a simulated vehicle, under virtual time.
 
+mod lists;
 mod sensors;
+mod waypoints;
 
 use std::time::Duration;
 
 use super::*;
-use crate::service::State;
+use crate::codec::{FormattedBlob, Message};
+use crate::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
+use crate::messages::core::{ConfirmElementRequest, RejectElementRequest, SetElement};
+use crate::messages::mobility::{ExecuteList, SetLocalWaypoint};
 use crate::service::rig::{CLIENT, Rig, STRANGER};
+use crate::service::{Service, State};
 use crate::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 
 /// Berlin, where the vehicle of the tests stands.
@@ -20,15 +26,19 @@ fn vehicle() -> Vehicle {
 /// All services on one vehicle, Ready and controlled by [`CLIENT`].
 fn rig() -> (Rig, Vehicle) {
     let vehicle = vehicle();
-    let services = [
-        vehicle.velocity_state_sensor(),
-        vehicle.acceleration_state_sensor(),
-        vehicle.local_pose_sensor(),
-        vehicle.global_pose_sensor(),
-        vehicle.primitive_driver(),
+    let services: Vec<Box<dyn Service>> = vec![
+        Box::new(vehicle.velocity_state_sensor()),
+        Box::new(vehicle.acceleration_state_sensor()),
+        Box::new(vehicle.local_pose_sensor()),
+        Box::new(vehicle.global_pose_sensor()),
+        Box::new(vehicle.primitive_driver()),
+        Box::new(vehicle.local_waypoint_driver()),
+        Box::new(vehicle.global_waypoint_driver()),
+        Box::new(vehicle.list_manager()),
+        Box::new(vehicle.local_waypoint_list_driver()),
+        Box::new(vehicle.global_waypoint_list_driver()),
     ];
-    let boxed = |service| Box::new(service) as Box<dyn crate::service::Service>;
-    let rig = Rig::new(services.into_iter().map(boxed).collect());
+    let rig = Rig::new(services);
     // 2015-06-08 01:02:03.004 UTC.
     let since_1970 = Duration::from_millis(1_433_725_323_004);
     let vehicle = vehicle.with_time(rig.now, since_1970);
@@ -37,4 +47,46 @@ fn rig() -> (Rig, Vehicle) {
 
 fn seconds(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
+}
+
+fn local_waypoint(x: f64, y: f64) -> SetLocalWaypoint {
+    let mut waypoint = SetLocalWaypoint::default();
+    waypoint.set_x_m(x).unwrap();
+    waypoint.set_y_m(y).unwrap();
+    waypoint
+}
+
+/// A message as an element of a list.
+fn element(uid: u16, previous_uid: u16, next_uid: u16, message: &impl Message) -> ElementRec {
+    let data = message.encode().unwrap();
+    ElementRec {
+        element_uid: uid,
+        previous_uid,
+        next_uid,
+        element_data: FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, data),
+    }
+}
+
+/// Sets elements; says whether that was confirmed.
+fn set_elements(rig: &mut Rig, element_list: Vec<ElementRec>) -> bool {
+    let request_id_rec = RequestIdRec { request_id: 44 };
+    let request = SetElement {
+        request_id_rec,
+        element_list,
+    };
+    rig.send(CLIENT, &request);
+    match rig.answer_code() {
+        Some(ConfirmElementRequest::CODE) => true,
+        Some(RejectElementRequest::CODE) => false,
+        other => panic!("unexpected answer: {other:04X?}"),
+    }
+}
+
+fn execute(uid: Option<u16>, speed: f64) -> ExecuteList {
+    let mut message = ExecuteList {
+        element_uid: uid,
+        ..ExecuteList::default()
+    };
+    message.set_speed_m_per_s(speed).unwrap();
+    message
 }

@@ -7,12 +7,17 @@ use super::acceleration_state_sensor::AccelerationStateSensor;
 use super::clock::Clock;
 use super::exchange::Exchange;
 use super::global_pose_sensor::GlobalPoseSensor;
+use super::global_waypoint::Global;
 use super::local_pose_sensor::LocalPoseSensor;
+use super::local_waypoint::Local;
 use super::primitive_driver::PrimitiveDriver;
+use super::travel::Travel;
 use super::velocity_state_sensor::VelocityStateSensor;
+use super::waypoint_driver::WaypointDriver;
+use super::waypoint_list_driver::WaypointListDriver;
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
-use crate::service::{Context, Handled, Service, Standing, code_of};
+use crate::service::{Context, Elements, Handled, ListManager, Service, Standing, code_of};
 use crate::vehicle::{GlobalPose, Motion, Pilot};
 
 /// A vehicle as the mobility services see it. Cheap to clone; the clones are one vehicle.
@@ -24,6 +29,9 @@ pub struct Vehicle {
 /// What the services of a vehicle share.
 pub(super) struct Cockpit {
     pub(super) pilot: Pilot,
+    /// The list that the list drivers work off.
+    pub(super) elements: Elements,
+    pub(super) travel: Travel,
     pub(super) clock: Option<Clock>,
     /// Magnetic north as seen from true north, in radians, once set.
     pub(super) magnetic_variation: f64,
@@ -36,6 +44,8 @@ impl Vehicle {
     pub fn new(pilot: Pilot) -> Self {
         let cockpit = Cockpit {
             pilot,
+            elements: Elements::new(),
+            travel: Travel::default(),
             clock: None,
             magnetic_variation: 0.0,
         };
@@ -93,6 +103,43 @@ impl Vehicle {
     #[must_use]
     pub fn primitive_driver(&self) -> OnVehicle {
         self.service(PrimitiveDriver::default())
+    }
+
+    /// Local Waypoint Driver: drives to one waypoint in the local frame.
+    #[must_use]
+    pub fn local_waypoint_driver(&self) -> OnVehicle {
+        self.service(WaypointDriver::<Local>::new())
+    }
+
+    /// Global Waypoint Driver: drives to one waypoint on the globe.
+    #[must_use]
+    pub fn global_waypoint_driver(&self) -> OnVehicle {
+        self.service(WaypointDriver::<Global>::new())
+    }
+
+    /// List Manager: keeps the list of the list drivers, one for all of them. It takes what they
+    /// can drive to.
+    #[must_use]
+    pub fn list_manager(&self) -> ListManager {
+        ListManager::new(self.elements())
+    }
+
+    /// Local Waypoint List Driver: drives to waypoints in the local frame, one after the other.
+    /// Needs the [`list_manager`](Self::list_manager) beside it.
+    #[must_use]
+    pub fn local_waypoint_list_driver(&self) -> OnVehicle {
+        self.service(WaypointListDriver::<Local>::on(&self.elements()))
+    }
+
+    /// Global Waypoint List Driver: drives to waypoints on the globe, one after the other. Needs
+    /// the [`list_manager`](Self::list_manager) beside it.
+    #[must_use]
+    pub fn global_waypoint_list_driver(&self) -> OnVehicle {
+        self.service(WaypointListDriver::<Global>::on(&self.elements()))
+    }
+
+    fn elements(&self) -> Elements {
+        self.lock().elements.clone()
     }
 
     fn service(&self, behaviour: impl Behaviour + 'static) -> OnVehicle {

@@ -22,4 +22,14 @@ impl Wanted {
     ) -> Option<T> {
         self.field(bit, field(value).ok())
     }
+
+    /// The same for a number that may be missing.
+    pub(super) fn optional<T>(
+        self,
+        bit: u32,
+        value: Option<f64>,
+        field: fn(f64) -> Result<T, OutOfRange>,
+    ) -> Option<T> {
+        self.real(bit, value?, field)
+    }
 }

@@ -1,7 +1,6 @@
 //! What the sensors tell and take, and that effort moves the vehicle only when it may.
 
 use super::*;
-use crate::codec::Message;
 use crate::messages::mobility::{
     QueryAccelerationState, QueryGeomagneticProperty, QueryGlobalPose, QueryLocalPose,
     QueryLocalPoseExt, QueryVelocityState, QueryVelocityStateExt, QueryWrenchEffort,

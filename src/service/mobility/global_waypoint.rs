@@ -1,0 +1,140 @@
+//! A waypoint on the globe, whatever message it came in.
+
+use super::exchange::Exchange;
+use super::place::{Kind, Place};
+use super::wanted::Wanted;
+use crate::codec::{Message, OutOfRange, ServiceId};
+use crate::messages::mobility::report_global_waypoint as fields;
+use crate::messages::mobility::report_global_waypoint_ext as ext;
+use crate::messages::mobility::set_global_waypoint_ext::{ZPosition, ZPositionAltitudeMsl};
+use crate::messages::mobility::{
+    QueryGlobalWaypoint, QueryGlobalWaypointExt, ReportGlobalWaypoint, ReportGlobalWaypointExt,
+    SetGlobalWaypoint, SetGlobalWaypointExt, global_waypoint_driver, global_waypoint_list_driver,
+};
+use crate::service::Handled;
+use crate::vehicle::{Frame, GlobalPose, Waypoint};
+
+/// A waypoint on the globe: degrees, metres and radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct GlobalWaypoint {
+    latitude: f64,
+    longitude: f64,
+    altitude: Option<f64>,
+    roll: Option<f64>,
+    pitch: Option<f64>,
+    yaw: Option<f64>,
+    waypoint_tolerance: Option<f64>,
+    path_tolerance: Option<f64>,
+}
+
+impl From<SetGlobalWaypoint> for Place {
+    fn from(message: SetGlobalWaypoint) -> Self {
+        Self::Global(GlobalWaypoint {
+            latitude: message.latitude_deg(),
+            longitude: message.longitude_deg(),
+            altitude: message.altitude_m(),
+            roll: message.roll_rad(),
+            pitch: message.pitch_rad(),
+            yaw: message.yaw_rad(),
+            waypoint_tolerance: message.waypoint_tolerance_m(),
+            path_tolerance: message.path_tolerance_m(),
+        })
+    }
+}
+
+impl From<SetGlobalWaypointExt> for Place {
+    fn from(message: SetGlobalWaypointExt) -> Self {
+        let altitude = match message.z_position {
+            Some(ZPosition::AltitudeMsl(altitude)) => Some(altitude.value()),
+            // A ground vehicle has no choice of heights.
+            _ => None,
+        };
+        Self::Global(GlobalWaypoint {
+            latitude: message.latitude_deg(),
+            longitude: message.longitude_deg(),
+            altitude,
+            roll: message.roll_rad(),
+            pitch: message.pitch_rad(),
+            yaw: message.heading_rad(),
+            waypoint_tolerance: message.waypoint_tolerance_m(),
+            path_tolerance: message.path_tolerance_m(),
+        })
+    }
+}
+
+impl GlobalWaypoint {
+    /// What the vehicle is to drive to.
+    pub(super) fn waypoint(&self, frame: &Frame) -> Waypoint {
+        let place = frame.to_local(&GlobalPose {
+            latitude: self.latitude,
+            longitude: self.longitude,
+            yaw: self.yaw.unwrap_or_default(),
+            ..GlobalPose::default()
+        });
+        Waypoint {
+            x: place.x,
+            y: place.y,
+            heading: self.yaw.map(|_| place.yaw),
+            tolerance: self.waypoint_tolerance.unwrap_or(Waypoint::TOLERANCE),
+        }
+    }
+
+    fn report(&self, wanted: Wanted) -> Result<ReportGlobalWaypoint, OutOfRange> {
+        let tolerance = fields::WaypointTolerance::new;
+        Ok(ReportGlobalWaypoint {
+            latitude: fields::Latitude::new(self.latitude)?,
+            longitude: fields::Longitude::new(self.longitude)?,
+            altitude: wanted.optional(0, self.altitude, fields::Altitude::new),
+            roll: wanted.optional(1, self.roll, fields::Roll::new),
+            pitch: wanted.optional(2, self.pitch, fields::Pitch::new),
+            yaw: wanted.optional(3, self.yaw, fields::Yaw::new),
+            waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
+            path_tolerance: wanted.optional(5, self.path_tolerance, fields::PathTolerance::new),
+        })
+    }
+
+    fn report_ext(&self, wanted: Wanted) -> Result<ReportGlobalWaypointExt, OutOfRange> {
+        let tolerance = ext::WaypointTolerance::new;
+        let altitude = wanted.optional(0, self.altitude, ZPositionAltitudeMsl::new);
+        Ok(ReportGlobalWaypointExt {
+            latitude: ext::Latitude::new(self.latitude)?,
+            longitude: ext::Longitude::new(self.longitude)?,
+            z_position: altitude.map(ZPosition::AltitudeMsl),
+            roll: wanted.optional(1, self.roll, ext::Roll::new),
+            pitch: wanted.optional(2, self.pitch, ext::Pitch::new),
+            heading: wanted.optional(3, self.yaw, ext::Heading::new),
+            waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
+            path_tolerance: wanted.optional(5, self.path_tolerance, ext::PathTolerance::new),
+        })
+    }
+}
+
+/// Waypoints on the globe.
+pub(super) struct Global;
+
+impl Kind for Global {
+    const DRIVER: ServiceId = global_waypoint_driver::V1_1;
+    const LIST_DRIVER: ServiceId = global_waypoint_list_driver::V1_1;
+    type Set = SetGlobalWaypoint;
+    type SetExt = SetGlobalWaypointExt;
+
+    fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        let Some(Place::Global(waypoint)) = exchange.cockpit.place() else {
+            return Handled::No;
+        };
+        match code {
+            QueryGlobalWaypoint::CODE => {
+                if let Some(query) = exchange.query::<QueryGlobalWaypoint>() {
+                    exchange.reply_if(waypoint.report(Wanted(query.presence_vector.into())));
+                }
+            }
+            QueryGlobalWaypointExt::CODE => {
+                if let Some(query) = exchange.query::<QueryGlobalWaypointExt>() {
+                    exchange.reply_if(waypoint.report_ext(Wanted(query.presence_vector.into())));
+                }
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+}

@@ -1,0 +1,246 @@
+//! What the drivers that go to places have in common: the travel speed, the place that is driven
+//! to, and the list that is worked off.
+//!
+//! A component has one of each, whichever of its drivers is asked.
+
+use super::exchange::Exchange;
+use super::place::Place;
+use super::vehicle::Cockpit;
+use crate::codec::Message;
+use crate::messages::mobility::set_travel_speed_ext::{Speed, SpeedSpeedOverGround};
+use crate::messages::mobility::{
+    ExecuteList, ExecuteListExt, QueryActiveElement, QueryGlobalWaypoint, QueryGlobalWaypointExt,
+    QueryLocalWaypoint, QueryLocalWaypointExt, QueryTravelSpeed, QueryTravelSpeedExt,
+    ReportActiveElement, ReportTravelSpeed, ReportTravelSpeedExt, SetTravelSpeed,
+    SetTravelSpeedExt,
+};
+use crate::service::{Context, Handled, State};
+use crate::vehicle::Ticket;
+
+/// A journey to a place, or along a list of places.
+#[derive(Debug, Default)]
+pub(super) struct Travel {
+    /// Metres per second, as a client wants it; what the vehicle cannot do it does not.
+    speed: f64,
+    place: Option<Place>,
+    /// The element that is driven to, if a list is worked off.
+    active: Option<u16>,
+    /// The element after it, 0 if it is the last.
+    next: u16,
+    ticket: Option<Ticket>,
+}
+
+impl Cockpit {
+    /// The place that was set last, or that is the first one of the list.
+    pub(super) fn place(&self) -> Option<Place> {
+        let first = || Place::of(&self.elements.get(0)?);
+        self.travel.place.or_else(first)
+    }
+
+    /// Sets the place to drive to, and sets out if there is a speed.
+    pub(super) fn set_place(&mut self, place: Place) {
+        self.travel.place = Some(place);
+        self.travel.active = None;
+        self.travel.next = 0;
+        self.set_out();
+    }
+
+    /// Changes the speed, and sets out or stops accordingly.
+    fn set_speed(&mut self, speed: f64) {
+        self.travel.speed = speed;
+        match self.travel.ticket.filter(|_| speed > 0.0) {
+            Some(ticket) if self.pilot.pursues(ticket) => self.pilot.set_speed(ticket, speed),
+            _ => self.set_out(),
+        }
+    }
+
+    /// Works the list off from an element on; 0 stands for the first one. Says whether that is in
+    /// the list.
+    fn execute(&mut self, uid: u16, speed: f64) -> bool {
+        let Some(element) = self.elements.get(uid) else {
+            return false;
+        };
+        self.travel.place = Place::of(&element);
+        self.travel.active = Some(element.element_uid);
+        self.travel.next = element.next_uid;
+        self.travel.speed = speed;
+        self.set_out();
+        true
+    }
+
+    /// Drives to the place if there is a speed, and stops otherwise.
+    fn set_out(&mut self) {
+        let Travel { speed, next, .. } = self.travel;
+        let place = self.travel.place.filter(|_| speed > 0.0);
+        let goal = place.and_then(|place| place.goal(self.pilot.frame(), speed, next != 0));
+        if let Some(goal) = goal {
+            self.travel.ticket = Some(self.pilot.pursue(goal));
+            return;
+        }
+        if place.is_some() {
+            tracing::warn!(?place, "out of reach");
+            self.travel.active = None;
+        }
+        if let Some(ticket) = self.travel.ticket.take() {
+            self.pilot.give_up(ticket);
+        }
+    }
+
+    /// Goes on to the next element of the list when one has been reached.
+    pub(super) fn work_off(&mut self, context: &mut Context<'_>) {
+        let Some(ticket) = self.travel.ticket else {
+            return;
+        };
+        if !self.pilot.pursues(ticket) {
+            // Another driver has taken over.
+            self.abandon(context);
+            return;
+        }
+        let Some(active) = self.travel.active else {
+            return;
+        };
+        // The list may have been changed meanwhile.
+        let Some(element) = self.elements.get(active) else {
+            tracing::warn!(active, "the element that was driven to has been deleted");
+            self.pilot.give_up(ticket);
+            self.abandon(context);
+            return;
+        };
+        if self.travel.next != element.next_uid {
+            self.travel.next = element.next_uid;
+            self.set_out();
+        } else if self.pilot.has_arrived(ticket) {
+            tracing::info!(element = active, next = element.next_uid, "element reached");
+            if element.next_uid == 0 || !self.execute(element.next_uid, self.travel.speed) {
+                self.travel.active = None;
+            }
+            changed(context);
+        }
+    }
+
+    /// Forgets the journey, but not the place.
+    pub(super) fn abandon(&mut self, context: &mut Context<'_>) {
+        let place = self.travel.place;
+        let is_reset = context.standing().state == State::Initialize;
+        self.travel = Travel {
+            place: place.filter(|_| !is_reset),
+            ..Travel::default()
+        };
+        changed(context);
+    }
+}
+
+/// Says that everything about a journey may be another now.
+pub(super) fn changed(context: &mut Context<'_>) {
+    context.changed::<QueryTravelSpeed>();
+    context.changed::<QueryTravelSpeedExt>();
+    context.changed::<QueryActiveElement>();
+    context.changed::<QueryLocalWaypoint>();
+    context.changed::<QueryLocalWaypointExt>();
+    context.changed::<QueryGlobalWaypoint>();
+    context.changed::<QueryGlobalWaypointExt>();
+}
+
+/// What drivers to a single place do with messages about the travel speed.
+pub(super) fn handle_speed(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+    match code {
+        SetTravelSpeed::CODE => {
+            if let Some(message) = exchange.command::<SetTravelSpeed>() {
+                set_speed(message.speed_m_per_s(), exchange);
+            }
+        }
+        SetTravelSpeedExt::CODE => {
+            let message = exchange.command::<SetTravelSpeedExt>();
+            if let Some(speed) = message.and_then(|message| metres_per_second(message.speed)) {
+                set_speed(speed, exchange);
+            }
+        }
+        _ => return handle_query(code, exchange),
+    }
+    Handled::Yes
+}
+
+/// What drivers along a list do with messages about its execution.
+pub(super) fn handle_list(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+    match code {
+        ExecuteList::CODE => {
+            if let Some(message) = exchange.command::<ExecuteList>() {
+                execute(message.element_uid, message.speed_m_per_s(), exchange);
+            }
+        }
+        ExecuteListExt::CODE => {
+            if let Some(message) = exchange.command::<ExecuteListExt>()
+                && let Some(speed) = metres_per_second(message.speed)
+            {
+                execute(message.element_uid, speed, exchange);
+            }
+        }
+        QueryActiveElement::CODE => {
+            let element_uid = exchange.cockpit.travel.active.unwrap_or_default();
+            exchange.reply(&ReportActiveElement { element_uid });
+        }
+        _ => return handle_query(code, exchange),
+    }
+    Handled::Yes
+}
+
+fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+    let speed = exchange.cockpit.travel.speed;
+    match code {
+        QueryTravelSpeed::CODE => {
+            let mut report = ReportTravelSpeed::default();
+            let report = report.set_speed_m_per_s(speed).map(|()| report);
+            exchange.reply_if(report);
+        }
+        QueryTravelSpeedExt::CODE => {
+            let speed = SpeedSpeedOverGround::new(speed).map(Speed::SpeedOverGround);
+            exchange.reply_if(speed.map(|speed| ReportTravelSpeedExt { speed }));
+        }
+        _ => return Handled::No,
+    }
+    Handled::Yes
+}
+
+/// A speed for a place; without a place there is nothing to drive to.
+fn set_speed(speed: f64, exchange: &mut Exchange<'_, '_>) {
+    let source = exchange.message.source;
+    if exchange.cockpit.travel.place.is_some() {
+        tracing::info!(%source, speed, "travel speed set");
+        exchange.cockpit.set_speed(speed);
+        changed(exchange.context);
+    } else {
+        tracing::info!(%source, "travel speed ignored: there is no waypoint yet");
+    }
+}
+
+/// Begins with an element of the list; without one, the speed of a list that is being worked off
+/// is changed.
+fn execute(uid: Option<u16>, speed: f64, exchange: &mut Exchange<'_, '_>) {
+    let source = exchange.message.source;
+    match uid {
+        Some(uid) if !exchange.cockpit.execute(uid, speed) => {
+            tracing::info!(%source, uid, "list not executed: there is no such element");
+            return;
+        }
+        Some(uid) => tracing::info!(%source, uid, speed, "list executed"),
+        None if exchange.cockpit.travel.active.is_some() => {
+            tracing::info!(%source, speed, "travel speed of the list set");
+            exchange.cockpit.set_speed(speed);
+        }
+        None => tracing::info!(%source, "travel speed ignored: no list is executed"),
+    }
+    changed(exchange.context);
+}
+
+/// A speed over ground. Through still air that is also the one relative to the medium; rotations
+/// are no speed of this vehicle, and it does not travel backwards.
+fn metres_per_second(speed: Speed) -> Option<f64> {
+    let speed = match speed {
+        Speed::SpeedOverGround(speed) => speed.value(),
+        Speed::SpeedRelativeToMedium(speed) => speed.value(),
+        Speed::IndicatedSpeed(speed) => speed.value(),
+        Speed::RotationsPerMinute(_) => return None,
+    };
+    // The step of the field next to 0 is not exactly 0.
+    (speed > -0.005).then_some(speed.max(0.0))
+}

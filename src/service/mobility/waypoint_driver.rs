@@ -1,0 +1,61 @@
+//! Local and Global Waypoint Driver: drive to one waypoint.
+
+use std::marker::PhantomData;
+
+use super::both_versions;
+use super::exchange::Exchange;
+use super::place::{Kind, Place};
+use super::travel;
+use super::vehicle::{Behaviour, Cockpit};
+use crate::codec::{Message, ServiceId};
+use crate::service::{Context, Handled};
+
+/// A driver to waypoints of one kind.
+pub(super) struct WaypointDriver<K>(PhantomData<K>);
+
+impl<K: Kind> WaypointDriver<K> {
+    pub(super) const fn new() -> Self {
+        Self(PhantomData)
+    }
+}
+
+impl<K: Kind> Behaviour for WaypointDriver<K> {
+    fn offers(&self) -> Vec<ServiceId> {
+        both_versions(K::DRIVER).into()
+    }
+
+    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        if code == K::Set::CODE {
+            set(exchange.configure::<K::Set>().map(Into::into), exchange);
+        } else if code == K::SetExt::CODE {
+            set(exchange.configure::<K::SetExt>().map(Into::into), exchange);
+        } else if K::handle_query(code, exchange) == Handled::No {
+            return travel::handle_speed(code, exchange);
+        }
+        Handled::Yes
+    }
+
+    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+        cockpit.work_off(context);
+    }
+
+    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+        cockpit.abandon(context);
+    }
+}
+
+/// Takes a waypoint; with a travel speed, the vehicle sets out at once.
+fn set(place: Option<Place>, exchange: &mut Exchange<'_, '_>) {
+    let Some(place) = place else {
+        return;
+    };
+    let source = exchange.message.source;
+    let frame = exchange.cockpit.pilot.frame();
+    if place.goal(frame, 0.0, false).is_none() {
+        tracing::warn!(%source, ?place, "waypoint ignored: it is out of reach");
+        return;
+    }
+    tracing::info!(%source, ?place, "waypoint set");
+    exchange.cockpit.set_place(place);
+    travel::changed(exchange.context);
+}
