@@ -89,7 +89,7 @@ pub fn run(arguments: &[&str], input: &[u8]) -> Run {
     }
 }
 
-/// A `jaus node` that runs until it is told to end.
+/// A `jaus node`, or another command that runs until it is told to end.
 pub struct Running {
     child: Child,
     stdout: BufReader<ChildStdout>,
@@ -97,8 +97,12 @@ pub struct Running {
 
 impl Running {
     pub fn node(flags: &[&str]) -> Self {
+        Self::command("node", flags)
+    }
+
+    pub fn command(name: &str, flags: &[&str]) -> Self {
         let mut child = jaus()
-            .arg("node")
+            .arg(name)
             .args(flags)
             .args(["--seconds", "60"])
             .stdout(Stdio::piped())

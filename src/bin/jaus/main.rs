@@ -25,6 +25,7 @@ mod runtime;
 mod settings;
 mod statistics;
 mod tree;
+mod vehicle;
 
 use std::process::ExitCode;
 
@@ -53,6 +54,7 @@ struct Cli {
 enum Command {
     Demo(demo::Demo),
     Node(node::NodeCommand),
+    Vehicle(vehicle::VehicleCommand),
     Monitor(monitor::Monitor),
     Discover(discover::Discover),
     Doctor(doctor::Doctor),
@@ -70,6 +72,7 @@ impl Command {
         match self {
             Self::Demo(demo) => demo.run(),
             Self::Node(node) => node.run(),
+            Self::Vehicle(vehicle) => vehicle.run(),
             Self::Monitor(monitor) => monitor.run(),
             Self::Discover(discover) => discover.run(),
             Self::Doctor(doctor) => doctor.run(),

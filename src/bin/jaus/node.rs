@@ -141,7 +141,11 @@ impl NodeCommand {
 }
 
 /// Prints what the node is and where.
-fn introduce(node: &Node, component: &Component, output: &mut Output) -> Result<(), Failure> {
+pub(crate) fn introduce(
+    node: &Node,
+    component: &Component,
+    output: &mut Output,
+) -> Result<(), Failure> {
     let directory = component.directory();
     for line in tree::lines(&directory, None) {
         output.line(line)?;

@@ -1,0 +1,83 @@
+//! `jaus vehicle`, the real binary, over the loopback interface of this computer.
+#![cfg(feature = "cli")]
+
+mod cli_support;
+
+use cli_support::{Running, own_group, run};
+
+#[test]
+fn the_vehicle_is_found_as_a_vehicle_tells_its_motion_and_ends_cleanly() {
+    let group = own_group(0);
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let flags = ["--id", "105.1.1", "--name", "Mule", "--at", "-33.9,18.4"];
+    let mut vehicle = Running::command("vehicle", &[&flags, &*network].concat());
+    let introduction = vehicle.read_until("Ctrl-C");
+    for part in [
+        "subsystem 105  vehicle \"Mule\"",
+        "105.1.1  \"Navigation\"",
+        "urn:jaus:jss:core:ListManager ",
+        "urn:jaus:jss:mobility:LocalPoseSensor ",
+        "urn:jaus:jss:mobility:LocalWaypointListDriver ",
+        "urn:jaus:jss:mobility:PrimitiveDriver ",
+    ] {
+        assert!(introduction.contains(part), "no `{part}` in {introduction}");
+    }
+    let ask = |query: &str, body: &str| {
+        let arguments = ["query", "105.1.1", query, body];
+        run(&[&arguments, &*network].concat(), b"").only_line()["body"].take()
+    };
+    let velocity = ask("QueryVelocityState", "{\"PresenceVector\":320}");
+    assert!(velocity["YawRate"] == 0.0 && velocity["TimeStamp"].is_object());
+    assert!(velocity.get("Velocity_X").is_none(), "{velocity}");
+    let pose = ask("QueryGlobalPose", "{\"PresenceVector\":3}");
+    let latitude = pose["Latitude"].as_f64().unwrap();
+    assert!((latitude + 33.9).abs() < 1e-6, "{pose}");
+    assert_eq!(ask("QueryTravelSpeed", "{}")["Speed"], 0.0);
+    assert_eq!(ask("QueryElementCount", "{}")["ElementCount"], 0);
+    assert_eq!(vehicle.terminate(), Some(0));
+}
+
+#[test]
+fn a_split_vehicle_has_two_components_and_only_the_second_drives() {
+    let group = own_group(1);
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let mut vehicle = Running::command(
+        "vehicle",
+        &[&["--id", "106.1", "--split"], &*network].concat(),
+    );
+    vehicle.read_until("106.1.1 is Platform Management, 106.1.2 Navigation");
+    vehicle.read_until("Ctrl-C");
+    let found = run(&[&["discover", "--seconds", "2"], &*network].concat(), b"");
+    let tree = found.stdout;
+    let (manager, driver) = tree
+        .split_once("106.1.2")
+        .unwrap_or_else(|| panic!("{tree}"));
+    assert!(
+        manager.contains("106.1.1  \"Platform Management\""),
+        "{tree}"
+    );
+    assert!(!manager.contains("urn:jaus:jss:mobility:"), "{tree}");
+    assert!(
+        driver.contains("urn:jaus:jss:mobility:PrimitiveDriver"),
+        "{tree}"
+    );
+}
+
+#[test]
+fn flags_out_of_their_range_are_told_with_the_range() {
+    for (flags, told) in [
+        (["--speed", "0"], "write a number from 0.1 to 50"),
+        (["--acceleration", "fast"], "write a number from 0.1 to 20"),
+        (["--noise", "NaN"], "write a number from 0 to 0.5"),
+        (["--at", "91,0"], "the latitude from -85 to 85"),
+    ] {
+        let run = run(&[&["vehicle"][..], &flags].concat(), b"");
+        assert!(run.status == 2 && run.stderr.contains(told), "{run:?}");
+        assert!(run.stderr.contains(flags[0]) && run.stderr.contains(flags[1]));
+    }
+    let run = run(
+        &["vehicle", "--split", "--id", "101.1.254", "--loopback"],
+        b"",
+    );
+    assert!(run.status == 2 && run.stderr.contains("--id"), "{run:?}");
+}
