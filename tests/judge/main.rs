@@ -13,4 +13,5 @@
 mod cli_support;
 mod papers;
 mod peer;
+mod right;
 mod wrong;
