@@ -11,11 +11,12 @@ use super::watch::Outlet;
 use crate::address::JausId;
 use crate::node::{self, Node, Port};
 use crate::service::{
-    AccessControl, Discovery, Kind, Liveness, Management, Patience, Profile, Scope, Service, Stack,
-    Timing, Transport,
+    AccessControl, Discovery, EventSettings, Kind, Liveness, Management, Patience, Profile, Scope,
+    Service, Stack, Timing, Transport,
 };
 
-/// A component that is not attached yet. Transport, Discovery and Liveness are always offered.
+/// A component that is not attached yet. Transport, Discovery, Liveness and Events are always
+/// offered.
 #[must_use = "a component exists once it is attached to a node"]
 pub struct Builder {
     profile: Profile,
@@ -25,6 +26,7 @@ pub struct Builder {
     seed: Option<u64>,
     liveness: Liveness,
     guard: Guard,
+    events: EventSettings,
     services: Vec<Box<dyn Service>>,
 }
 
@@ -62,6 +64,7 @@ impl Builder {
             seed: None,
             liveness: Liveness::new(),
             guard: Guard::None,
+            events: EventSettings::default(),
             services: Vec::new(),
         }
     }
@@ -69,6 +72,12 @@ impl Builder {
     /// Offers a service.
     pub fn offer(mut self, service: impl Service + 'static) -> Self {
         self.services.push(Box::new(service));
+        self
+    }
+
+    /// What clients may subscribe to at most.
+    pub const fn event_settings(mut self, settings: EventSettings) -> Self {
+        self.events = settings;
         self
     }
 
@@ -187,7 +196,7 @@ impl Builder {
         let mut services: Vec<Box<dyn Service>> =
             vec![Box::new(Transport), Box::new(self.liveness)];
         services.append(&mut self.services);
-        let stack = Stack::new(discovery, services);
+        let stack = Stack::new(discovery, services).event_settings(self.events);
         match self.guard {
             Guard::None => stack,
             Guard::AccessControl(settings) => stack.access_control(settings),

@@ -10,6 +10,7 @@
 //! | [`Liveness`] | answers Query Heartbeat Pulse, sends a heartbeat if asked to |
 //! | [`ListManager`] | keeps a list of elements that drivers work off |
 //! | [`Discovery`] | says who we are, finds out who the others are, keeps the [`Directory`] |
+//! | Events ([`EventSettings`]) | sends the answer to any query of the component, at a rate or on every change |
 //! | [`AccessControl`], [`Management`] | say who may command, and stop everything in an emergency |
 //! | [`Handlers`] | whatever an application offers, one function per message |
 
@@ -18,6 +19,7 @@ mod context;
 mod control;
 mod directory;
 mod discovery;
+mod events;
 mod handlers;
 mod inquiries;
 mod list;
@@ -44,6 +46,7 @@ pub use context::Context;
 pub use control::{AccessControl, Condition, Management};
 pub use directory::{Component, Directory, Identification, Kind, Level, Node, Offer, Subsystem};
 pub use discovery::{Change, Discovery, Loss, Profile, Scope, Timing};
+pub use events::EventSettings;
 pub use handlers::Handlers;
 pub use inquiries::{Inquiry, NoAnswer, Patience};
 pub use list::{ElementList, Elements, ListManager};

@@ -7,6 +7,7 @@ use bytes::Bytes;
 
 use super::client::{Controls, Subscriptions};
 use super::control::{AccessControl, Condition, Control, Management};
+use super::events::{EventSettings, Events, Outcome};
 use super::inquiries::Inquiries;
 use super::{
     CannotSubscribe, Change, Context, ControlId, ControlNews, ControlRefused, Directory, Discovery,
@@ -17,11 +18,13 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::{QueryAuthority, QueryControl, QueryStatus};
+use crate::wire::{Broadcast, Priority};
 
 /// A component without a network: its services, its view of the others, and its open questions.
 pub struct Stack {
     discovery: Discovery,
     services: Vec<Box<dyn Service>>,
+    subscribers: Events,
     control: Control,
     /// What the services know of the control.
     standing: Standing,
@@ -58,6 +61,7 @@ impl Stack {
         let stack = Self {
             discovery,
             services,
+            subscribers: Events::new(EventSettings::default()),
             control: Control::default(),
             standing: Standing::default(),
             changed: BTreeSet::new(),
@@ -68,6 +72,13 @@ impl Stack {
             events: VecDeque::new(),
         };
         stack.with_control(Control::default())
+    }
+
+    /// What clients may subscribe to at most.
+    #[must_use]
+    pub fn event_settings(mut self, settings: EventSettings) -> Self {
+        self.subscribers = Events::new(settings);
+        self
     }
 
     /// Offers Access Control: commands come from the client in control alone.
@@ -103,6 +114,12 @@ impl Stack {
         self.discovery.directory()
     }
 
+    /// How many events run for clients.
+    #[must_use]
+    pub fn event_count(&self) -> usize {
+        self.subscribers.len()
+    }
+
     /// The component's state, and who controls it.
     #[must_use]
     pub const fn standing(&self) -> &Standing {
@@ -135,14 +152,13 @@ impl Stack {
             handled = self.handle_as_client(now, message);
         }
         if handled == Handled::No {
+            handled = self.handle_event_request(now, message);
+        }
+        if handled == Handled::No {
             handled = self.control.handle_message(now, message, &mut self.out);
         }
-        for service in &mut self.services {
-            if handled == Handled::Yes {
-                break;
-            }
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
-            handled = service.handle_message(now, message, &mut context);
+        if handled == Handled::No {
+            handled = self.handle_by_services(now, message);
         }
         self.collect(now);
         match answered {
@@ -155,6 +171,57 @@ impl Stack {
             }
             None => {}
         }
+    }
+
+    fn handle_by_services(&mut self, now: Instant, message: &Received) -> Handled {
+        let (out, standing, changed) = (&mut self.out, &self.standing, &mut self.changed);
+        let handled = self.services.iter_mut().any(|service| {
+            let mut context = Context::new(out, standing, changed);
+            service.handle_message(now, message, &mut context) == Handled::Yes
+        });
+        if handled { Handled::Yes } else { Handled::No }
+    }
+
+    fn handle_event_request(&mut self, now: Instant, message: &Received) -> Handled {
+        let events = &mut self.subscribers;
+        match events.handle_message(now, message, &mut self.out) {
+            Outcome::NotOurs => return Handled::No,
+            Outcome::Done => {}
+            Outcome::Try(trial) => {
+                let report = self.answer(now, trial.client(), &trial.query);
+                let events = &mut self.subscribers;
+                events.conclude(now, &trial, report, &mut self.out);
+            }
+        }
+        Handled::Yes
+    }
+
+    /// What the component would answer to a client's query, if anything.
+    fn answer(&mut self, now: Instant, client: JausId, query: &Bytes) -> Option<Bytes> {
+        let id = self.id();
+        let message = Received {
+            source: client,
+            destination: id,
+            to: id,
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            payload: query.clone(),
+            path: None,
+        };
+        // What is said meanwhile is the answer and goes nowhere; a query changes nothing.
+        let out = std::mem::replace(&mut self.out, Outbox::new(id));
+        let changed = std::mem::take(&mut self.changed);
+        let discovered = self.discovery.handle_message(now, &message, &mut self.out);
+        if discovered == Handled::No
+            && self.control.handle_message(now, &message, &mut self.out) == Handled::No
+        {
+            self.handle_by_services(now, &message);
+        }
+        self.changed = changed;
+        let mut said = std::mem::replace(&mut self.out, out);
+        std::iter::from_fn(|| said.pop())
+            .find(|answer| answer.destination == client)
+            .map(|answer| answer.payload)
     }
 
     fn handle_as_client(&mut self, now: Instant, message: &Received) -> Handled {
@@ -276,7 +343,8 @@ impl Stack {
 
     fn tell_offers(&mut self) {
         let services = self.services.iter().flat_map(|service| service.offers());
-        let offers = self.control.offers().into_iter().chain(services);
+        let guards = self.subscribers.offers().into_iter();
+        let offers = guards.chain(self.control.offers()).chain(services);
         self.discovery.set_offers(offers, &mut self.out);
     }
 
@@ -300,6 +368,7 @@ impl Stack {
         services
             .chain(self.discovery.poll_timeout())
             .chain(self.control.poll_timeout())
+            .chain(self.subscribers.poll_timeout())
             .chain(self.inquiries.poll_timeout())
             .chain(self.subscriptions.poll_timeout())
             .chain(self.controls.poll_timeout())
@@ -309,6 +378,7 @@ impl Stack {
     fn wake(&mut self, now: Instant) {
         self.discovery.handle_timeout(now, &mut self.out);
         self.control.handle_timeout(now, &mut self.out);
+        self.subscribers.expire(now, &mut self.out);
         for service in &mut self.services {
             let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
             service.handle_timeout(now, &mut context);
@@ -324,10 +394,12 @@ impl Stack {
             self.subscriptions.handle_change(now, &change);
             if let Change::Lost(id, _) = change {
                 self.control.forget(id, &mut self.out);
+                self.subscribers.forget(id);
             }
             self.events.push_back(Event::Change(change));
         }
         self.follow_control(now);
+        self.tell_subscribers(now);
         while let Some((inquiry, failure)) = self.inquiries.poll_failure() {
             self.events.push_back(Event::Answer(inquiry, Err(failure)));
         }
@@ -359,5 +431,17 @@ impl Stack {
             service.handle_standing(now, &before, &mut context);
         }
         self.events.push_back(Event::Standing(after));
+    }
+
+    /// Sends what clients have subscribed to and is due, or has changed.
+    fn tell_subscribers(&mut self, now: Instant) {
+        for query in std::mem::take(&mut self.changed) {
+            self.subscribers.handle_change(now, query);
+        }
+        while let Some(due) = self.subscribers.poll_due(now) {
+            let report = self.answer(now, due.client(), &due.query);
+            let events = &mut self.subscribers;
+            events.report_due(now, &due, report, &mut self.out);
+        }
     }
 }

@@ -1,0 +1,460 @@
+//! The Events service (AS5710): clients name a query, and have its report sent at a rate or on every
+//! change.
+//!
+//! Every query that the component answers can be subscribed to: the [`Stack`](super::Stack) puts it
+//! to the component's own services as if the client had asked, and what they answer is the event.
+//! This module keeps the subscriptions, and says which report is due.
+//!
+//! # Choices
+//!
+//! * Event numbers are given out for each client by itself, so that a component can have more than
+//!   the 256 that an octet names. Clients know an event by producer and number.
+//! * The first report follows the confirmation at once, of both types: the client knows where
+//!   things stand, and need not ask beside.
+//! * Creating what is there already (same client, type and query) changes its rate and confirms the
+//!   same number, so that a client that repeats itself, because an answer got lost or it was
+//!   restarted, does not multiply streams.
+//! * Events do not expire unless [`EventSettings::timeout`] is set: clients of version 1.0 do not
+//!   know that they could. What is sent to a client that discovery finds gone ends.
+//! * Command events (1.1) are refused as unsupported: no service here tells when a command ends.
+
+mod table;
+#[cfg(test)]
+mod tests;
+
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::{Outbox, code_of, read};
+use crate::address::JausId;
+use crate::codec::{Message, ServiceId};
+use crate::endpoint::Received;
+use crate::messages::core::query_events::QueryEventsVar;
+use crate::messages::core::reject_event_request::ResponseCode;
+use crate::messages::core::{
+    self, CancelEvent, ConfirmEventRequest, CreateCommandEvent, CreateEvent, Event,
+    QueryEventTimeout, QueryEvents, RejectEventRequest, ReportEventTimeout, ReportEvents,
+    UpdateEvent, report_event_timeout, report_events,
+};
+pub(super) use table::Due;
+use table::{Kind, Name, Subscription, Table};
+
+const PERIODIC: u8 = 0;
+const EVERY_CHANGE: u8 = 1;
+
+/// What the component can take on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EventSettings {
+    /// Subscriptions of one client; the numbers of events allow 256.
+    pub per_client: usize,
+    /// Subscriptions of all clients.
+    pub total: usize,
+    /// The fastest rate of one subscription, in hertz. Faster ones are confirmed at this rate, and
+    /// changes that follow one another faster are told together.
+    pub fastest: f64,
+    /// The most reports a second that all periodic subscriptions may add up to.
+    pub reports_per_second: f64,
+    /// After how many minutes an event ends that its client does not renew; 0 for never.
+    pub timeout: u8,
+}
+
+impl Default for EventSettings {
+    /// 256 for each client and 4096 in all, up to 250 Hz each and 20 000 reports a second.
+    fn default() -> Self {
+        Self {
+            per_client: 256,
+            total: 4096,
+            fastest: 250.0,
+            reports_per_second: 20_000.0,
+            timeout: 0,
+        }
+    }
+}
+
+/// The subscriptions of all clients.
+#[derive(Debug)]
+pub(super) struct Events {
+    settings: EventSettings,
+    table: Table,
+}
+
+/// What became of a message.
+#[derive(Debug)]
+pub(super) enum Outcome {
+    /// It was none of ours.
+    NotOurs,
+    /// It is dealt with.
+    Done,
+    /// Whether the event can be had depends on whether anybody answers its query.
+    Try(Trial),
+}
+
+/// A subscription that is wanted.
+#[derive(Debug)]
+pub(super) struct Trial {
+    request: Received,
+    request_id: u8,
+    /// The event to be changed, if there is to be one.
+    event_id: Option<u8>,
+    kind: u8,
+    hertz: f64,
+    pub(super) query: Bytes,
+}
+
+impl Trial {
+    pub(super) const fn client(&self) -> JausId {
+        self.request.source
+    }
+}
+
+impl Events {
+    pub(super) fn new(settings: EventSettings) -> Self {
+        Self {
+            settings,
+            table: Table::default(),
+        }
+    }
+
+    pub(super) fn offers(&self) -> [ServiceId; 2] {
+        [core::events::V1_1, core::events::V1_0]
+    }
+
+    pub(super) fn handle_message(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        out: &mut Outbox,
+    ) -> Outcome {
+        match code_of(&message.payload) {
+            Some(CreateEvent::CODE) => {
+                read(message).map_or(Outcome::Done, |it| create(message, &it, out))
+            }
+            Some(UpdateEvent::CODE) => {
+                read(message).map_or(Outcome::Done, |it| self.update(message, &it, out))
+            }
+            Some(CancelEvent::CODE) => {
+                if let Some(cancel) = read(message) {
+                    self.cancel(message, &cancel, out);
+                }
+                Outcome::Done
+            }
+            Some(QueryEvents::CODE) => {
+                if let Some(query) = read::<QueryEvents>(message) {
+                    self.table.renew(message.source, self.expiry(now));
+                    out.reply(
+                        message,
+                        &self.report(message.source, &query.query_events_var),
+                    );
+                }
+                Outcome::Done
+            }
+            Some(QueryEventTimeout::CODE) => {
+                let report = ReportEventTimeout {
+                    timeout: report_event_timeout::Timeout(self.settings.timeout),
+                };
+                out.reply(message, &report);
+                Outcome::Done
+            }
+            Some(CreateCommandEvent::CODE) => {
+                if let Some(create) = read::<CreateCommandEvent>(message) {
+                    let why = ResponseCode::MESSAGE_NOT_SUPPORTED;
+                    reject(message, create.request_id, why, out);
+                }
+                Outcome::Done
+            }
+            _ => Outcome::NotOurs,
+        }
+    }
+
+    fn update(&self, message: &Received, update: &UpdateEvent, out: &mut Outbox) -> Outcome {
+        let name = (message.source, update.event_id);
+        if self.table.get(name).is_none() {
+            reject(message, update.request_id, INVALID_EVENT, out);
+            return Outcome::Done;
+        }
+        let trial = Trial {
+            request: message.clone(),
+            request_id: update.request_id,
+            event_id: Some(update.event_id),
+            kind: update.event_type.0,
+            hertz: update.requested_periodic_rate_hz(),
+            query: update.query_message.clone(),
+        };
+        check(trial, out)
+    }
+
+    fn cancel(&mut self, message: &Received, cancel: &CancelEvent, out: &mut Outbox) {
+        match self.table.remove((message.source, cancel.event_id)) {
+            Some(ended) => {
+                let name = (message.source, cancel.event_id);
+                confirm(message, cancel.request_id, name, &ended, out);
+            }
+            None => reject(message, cancel.request_id, INVALID_EVENT, out),
+        }
+    }
+
+    fn report(&self, client: JausId, which: &QueryEventsVar) -> ReportEvents {
+        let wanted = |id: u8, subscription: &Subscription| match which {
+            QueryEventsVar::MessageIdRec(wanted) => {
+                code_of(&subscription.query) == Some(wanted.message_code)
+            }
+            QueryEventsVar::EventTypeRec(wanted) => wanted.event_type.0 == type_of(subscription),
+            QueryEventsVar::EventIdRec(wanted) => wanted.event_id == id,
+            QueryEventsVar::AllEventsRec(_) => true,
+        };
+        let listed = self.table.of(client).filter(|&(id, it)| wanted(id, it));
+        let entry = |(event_id, subscription): (u8, &Subscription)| report_events::ReportEventRec {
+            event_type: report_events::EventType(type_of(subscription)),
+            event_id,
+            query_message: subscription.query.clone(),
+        };
+        // The list's count is an octet.
+        let event_list = listed.take(usize::from(u8::MAX)).map(entry).collect();
+        ReportEvents { event_list }
+    }
+
+    /// Nobody answers the query of a trial, or somebody does, with this report.
+    pub(super) fn conclude(
+        &mut self,
+        now: Instant,
+        trial: &Trial,
+        report: Option<Bytes>,
+        out: &mut Outbox,
+    ) {
+        let Some(report) = report else {
+            let why = ResponseCode::MESSAGE_NOT_SUPPORTED;
+            return reject(&trial.request, trial.request_id, why, out);
+        };
+        let kind = self.kind(trial);
+        let client = trial.client();
+        let known = trial
+            .event_id
+            .or_else(|| self.table.find(client, type_number(kind), &trial.query));
+        let before = known.and_then(|id| self.table.get((client, id)));
+        if !self.has_room_for(client, kind, before) {
+            let why = ResponseCode::CONNECTION_REFUSED;
+            return reject(&trial.request, trial.request_id, why, out);
+        }
+        let Some(id) = known.or_else(|| self.table.free_id(client)) else {
+            let why = ResponseCode::CONNECTION_REFUSED;
+            return reject(&trial.request, trial.request_id, why, out);
+        };
+        let sequence = before.map_or(0, |before| before.sequence);
+        let mut subscription = Subscription {
+            kind,
+            query: trial.query.clone(),
+            sequence,
+            told: None,
+            next: None,
+            expires: self.expiry(now),
+            request_id: trial.request_id,
+        };
+        let name = (client, id);
+        confirm(&trial.request, trial.request_id, name, &subscription, out);
+        send(now, &mut subscription, name, report, out);
+        subscription.next = match kind {
+            Kind::Periodic { period, .. } => Some(now + period),
+            Kind::EveryChange { .. } => None,
+        };
+        self.table.insert(name, subscription);
+    }
+
+    /// What the client gets of what it wants.
+    fn kind(&self, trial: &Trial) -> Kind {
+        let fastest = self.settings.fastest.max(0.1);
+        if trial.kind == EVERY_CHANGE {
+            return Kind::EveryChange {
+                pause: Duration::from_secs_f64(1.0 / fastest),
+            };
+        }
+        // At least the smallest step of the field, which `check` has made sure of.
+        let hertz = trial.hertz.clamp(0.01, fastest);
+        Kind::Periodic {
+            hertz,
+            period: Duration::from_secs_f64(1.0 / hertz),
+        }
+    }
+
+    fn has_room_for(&self, client: JausId, kind: Kind, before: Option<&Subscription>) -> bool {
+        let rate = |kind: Kind| match kind {
+            Kind::Periodic { hertz, .. } => hertz,
+            Kind::EveryChange { .. } => 0.0,
+        };
+        let freed = before.map_or(0.0, |before| rate(before.kind));
+        let load = self.table.load() - freed + rate(kind);
+        let fits = before.is_some()
+            || (self.table.of(client).count() < self.settings.per_client
+                && self.table.len() < self.settings.total);
+        fits && load <= self.settings.reports_per_second
+    }
+
+    fn expiry(&self, now: Instant) -> Option<Instant> {
+        let minutes = u64::from(self.settings.timeout);
+        (minutes > 0).then(|| now + Duration::from_secs(60 * minutes))
+    }
+
+    /// The answer to the query with this code is another now.
+    pub(super) fn handle_change(&mut self, now: Instant, query: u16) {
+        self.table.touch(now, query);
+    }
+
+    /// A client is gone, as far as discovery can tell.
+    pub(super) fn forget(&mut self, client: JausId) {
+        self.table.remove_client(client);
+    }
+
+    /// Events that their clients have not renewed end, and the clients are told.
+    pub(super) fn expire(&mut self, now: Instant, out: &mut Outbox) {
+        for (name, ended) in self.table.take_expired(now) {
+            let mut told = ConfirmEventRequest {
+                request_id: ended.request_id,
+                event_id: name.1,
+                ..ConfirmEventRequest::default()
+            };
+            set_rate(&mut told, &ended);
+            out.send(name.0, &told);
+        }
+    }
+
+    /// The next subscription whose report is due, to be [reported](Self::report_due).
+    pub(super) fn poll_due(&mut self, now: Instant) -> Option<Due> {
+        self.table.poll_due(now)
+    }
+
+    /// The report of what was due; `None` if nobody answers its query any more.
+    pub(super) fn report_due(
+        &mut self,
+        now: Instant,
+        due: &Due,
+        report: Option<Bytes>,
+        out: &mut Outbox,
+    ) {
+        let Some(report) = report else {
+            if let Some(ended) = self.table.remove(due.name) {
+                let reject = rejection(ended.request_id, ResponseCode::MESSAGE_NOT_SUPPORTED);
+                out.send(due.name.0, &reject);
+            }
+            return;
+        };
+        self.table.reschedule(due, now, |subscription| {
+            let news = matches!(subscription.kind, Kind::Periodic { .. })
+                || subscription.told.as_ref().map(|(_, told)| told) != Some(&report);
+            if news {
+                send(now, subscription, due.name, report, out);
+            }
+        });
+    }
+
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        self.table.poll_timeout()
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.table.len()
+    }
+}
+
+/// What is answered to a number that the client has no event by.
+const INVALID_EVENT: ResponseCode = ResponseCode::ERROR_INVALID_EVENT_ID_FOR_UPDATE_EVENT_REQUEST;
+
+fn create(message: &Received, create: &CreateEvent, out: &mut Outbox) -> Outcome {
+    let trial = Trial {
+        request: message.clone(),
+        request_id: create.request_id,
+        event_id: None,
+        kind: create.event_type.0,
+        hertz: create.requested_periodic_rate_hz(),
+        query: create.query_message.clone(),
+    };
+    check(trial, out)
+}
+
+/// Refuses what cannot be, whoever might answer the query.
+fn check(trial: Trial, out: &mut Outbox) -> Outcome {
+    let why = match code_of(&trial.query) {
+        Some(code) if !is_query(code) => ResponseCode::MESSAGE_NOT_SUPPORTED,
+        // Nothing comes of events about events.
+        Some(QueryEvents::CODE | QueryEventTimeout::CODE) => ResponseCode::MESSAGE_NOT_SUPPORTED,
+        Some(_) if trial.kind == EVERY_CHANGE || (trial.kind == PERIODIC && trial.hertz > 0.0) => {
+            return Outcome::Try(trial);
+        }
+        _ => ResponseCode::INVALID_EVENT_SETUP,
+    };
+    reject(&trial.request, trial.request_id, why, out);
+    Outcome::Done
+}
+
+/// Whether a message code is a query's (AS5710: 2000h to 3FFFh).
+const fn is_query(code: u16) -> bool {
+    matches!(code, 0x2000..=0x3FFF)
+}
+
+const fn type_number(kind: Kind) -> u8 {
+    match kind {
+        Kind::Periodic { .. } => PERIODIC,
+        Kind::EveryChange { .. } => EVERY_CHANGE,
+    }
+}
+
+const fn type_of(subscription: &Subscription) -> u8 {
+    type_number(subscription.kind)
+}
+
+fn confirm(
+    request: &Received,
+    request_id: u8,
+    (_, event_id): Name,
+    subscription: &Subscription,
+    out: &mut Outbox,
+) {
+    let mut confirm = ConfirmEventRequest {
+        request_id,
+        event_id,
+        ..ConfirmEventRequest::default()
+    };
+    set_rate(&mut confirm, subscription);
+    out.reply(request, &confirm);
+}
+
+fn set_rate(confirm: &mut ConfirmEventRequest, subscription: &Subscription) {
+    if let Kind::Periodic { hertz, .. } = subscription.kind
+        && let Err(error) = confirm.set_confirmed_periodic_rate_hz(hertz)
+    {
+        // Settings beyond what the field can say.
+        tracing::debug!(%error, "rate cannot be confirmed");
+    }
+}
+
+fn reject(request: &Received, request_id: u8, why: ResponseCode, out: &mut Outbox) {
+    tracing::debug!(client = %request.source, request_id, ?why, "event refused");
+    out.reply(request, &rejection(request_id, why));
+}
+
+/// The code alone: the text for people would be 80 octets that no known peer shows.
+fn rejection(request_id: u8, why: ResponseCode) -> RejectEventRequest {
+    RejectEventRequest {
+        request_id,
+        response_code: Some(why),
+        error_message: None,
+    }
+}
+
+fn send(
+    now: Instant,
+    subscription: &mut Subscription,
+    name: Name,
+    report: Bytes,
+    out: &mut Outbox,
+) {
+    let event = Event {
+        event_id: name.1,
+        sequence_number: subscription.sequence,
+        report_message: report.clone(),
+    };
+    subscription.sequence = subscription.sequence.wrapping_add(1);
+    if matches!(subscription.kind, Kind::EveryChange { .. }) {
+        subscription.told = Some((now, report));
+    }
+    out.send(name.0, &event);
+}

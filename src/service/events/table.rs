@@ -1,0 +1,243 @@
+//! The subscriptions by client and number, with what is due when, and which wait for which change:
+//! no question is answered by looking at all of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use crate::address::JausId;
+use crate::service::code_of;
+
+/// The client, and its number of the event.
+pub(super) type Name = (JausId, u8);
+
+/// When a subscription's reports are sent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    Periodic {
+        hertz: f64,
+        period: Duration,
+    },
+    /// With at least a pause between two.
+    EveryChange {
+        pause: Duration,
+    },
+}
+
+#[derive(Debug)]
+pub(super) struct Subscription {
+    pub(super) kind: Kind,
+    pub(super) query: Bytes,
+    pub(super) sequence: u8,
+    /// The last report, if changes are to be told, and when.
+    pub(super) told: Option<(Instant, Bytes)>,
+    /// When the next report is due; none while no change is known.
+    pub(super) next: Option<Instant>,
+    pub(super) expires: Option<Instant>,
+    /// The number of the request that it was last set up by.
+    pub(super) request_id: u8,
+}
+
+/// A report that is due.
+#[derive(Debug)]
+pub(in crate::service) struct Due {
+    pub(super) name: Name,
+    when: Instant,
+    pub(in crate::service) query: Bytes,
+}
+
+impl Due {
+    pub(in crate::service) const fn client(&self) -> JausId {
+        self.name.0
+    }
+}
+
+impl Subscription {
+    /// The soonest time from `now` on at which a change may be told.
+    fn after_its_pause(&self, now: Instant) -> Instant {
+        match (self.kind, &self.told) {
+            (Kind::EveryChange { pause }, Some((told, _))) => now.max(*told + pause),
+            _ => now,
+        }
+    }
+}
+
+#[derive(Debug, Default)]
+pub(super) struct Table {
+    subscriptions: BTreeMap<Name, Subscription>,
+    due: BTreeSet<(Instant, Name)>,
+    expiring: BTreeSet<(Instant, Name)>,
+    /// Those that wait for a change of the answer to a query, by its code.
+    by_query: BTreeSet<(u16, Name)>,
+    /// Reports a second of all periodic ones.
+    load: f64,
+}
+
+impl Table {
+    pub(super) fn len(&self) -> usize {
+        self.subscriptions.len()
+    }
+
+    pub(super) const fn load(&self) -> f64 {
+        self.load
+    }
+
+    pub(super) fn get(&self, name: Name) -> Option<&Subscription> {
+        self.subscriptions.get(&name)
+    }
+
+    /// The subscriptions of one client, in order of their numbers.
+    pub(super) fn of(&self, client: JausId) -> impl Iterator<Item = (u8, &Subscription)> {
+        self.subscriptions
+            .range((client, 0)..=(client, u8::MAX))
+            .map(|(name, subscription)| (name.1, subscription))
+    }
+
+    /// The number of a client's event of a type with this very query.
+    pub(super) fn find(&self, client: JausId, kind: u8, query: &[u8]) -> Option<u8> {
+        self.of(client)
+            .find(|(_, it)| super::type_of(it) == kind && it.query == query)
+            .map(|(id, _)| id)
+    }
+
+    /// The lowest number that a client does not use, beginning with 1: 0 means none to some peers.
+    pub(super) fn free_id(&self, client: JausId) -> Option<u8> {
+        (1..=u8::MAX)
+            .chain([0])
+            .find(|&id| !self.subscriptions.contains_key(&(client, id)))
+    }
+
+    /// Puts a subscription in, in place of another of that name.
+    pub(super) fn insert(&mut self, name: Name, subscription: Subscription) {
+        self.remove(name);
+        if let Some(next) = subscription.next {
+            self.due.insert((next, name));
+        }
+        if let Some(expires) = subscription.expires {
+            self.expiring.insert((expires, name));
+        }
+        match subscription.kind {
+            Kind::Periodic { hertz, .. } => self.load += hertz,
+            Kind::EveryChange { .. } => {
+                self.by_query
+                    .extend(code_of(&subscription.query).map(|code| (code, name)));
+            }
+        }
+        self.subscriptions.insert(name, subscription);
+    }
+
+    pub(super) fn remove(&mut self, name: Name) -> Option<Subscription> {
+        let gone = self.subscriptions.remove(&name)?;
+        if let Some(next) = gone.next {
+            self.due.remove(&(next, name));
+        }
+        if let Some(expires) = gone.expires {
+            self.expiring.remove(&(expires, name));
+        }
+        match gone.kind {
+            Kind::Periodic { hertz, .. } => self.load -= hertz,
+            Kind::EveryChange { .. } => {
+                if let Some(code) = code_of(&gone.query) {
+                    self.by_query.remove(&(code, name));
+                }
+            }
+        }
+        if self.subscriptions.is_empty() {
+            // What rounding has left.
+            self.load = 0.0;
+        }
+        Some(gone)
+    }
+
+    pub(super) fn remove_client(&mut self, client: JausId) {
+        let ids: Vec<u8> = self.of(client).map(|(id, _)| id).collect();
+        for id in ids {
+            self.remove((client, id));
+        }
+    }
+
+    /// A client has shown that it still wants its events.
+    pub(super) fn renew(&mut self, client: JausId, expires: Option<Instant>) {
+        for (name, subscription) in self
+            .subscriptions
+            .range_mut((client, 0)..=(client, u8::MAX))
+        {
+            if let Some(before) = std::mem::replace(&mut subscription.expires, expires) {
+                self.expiring.remove(&(before, *name));
+            }
+            self.expiring
+                .extend(expires.map(|expires| (expires, *name)));
+        }
+    }
+
+    pub(super) fn take_expired(&mut self, now: Instant) -> Vec<(Name, Subscription)> {
+        let mut expired = Vec::new();
+        while let Some(&(when, name)) = self.expiring.first()
+            && when <= now
+        {
+            self.expiring.pop_first();
+            expired.extend(self.remove(name).map(|it| (name, it)));
+        }
+        expired
+    }
+
+    /// Whoever waits for a change of this answer gets it, soon.
+    pub(super) fn touch(&mut self, now: Instant, query: u16) {
+        let all =
+            (query, (JausId::from_u32(0), 0))..=(query, (JausId::from_u32(u32::MAX), u8::MAX));
+        for &(_, name) in self.by_query.range(all) {
+            if let Some(subscription) = self.subscriptions.get_mut(&name) {
+                let next = subscription.after_its_pause(now);
+                let next = *subscription.next.get_or_insert(next);
+                self.due.insert((next, name));
+            }
+        }
+    }
+
+    /// The next that is due. It stays so until it is [rescheduled](Self::reschedule) or removed.
+    pub(super) fn poll_due(&mut self, now: Instant) -> Option<Due> {
+        let &(when, name) = self.due.first().filter(|(when, _)| *when <= now)?;
+        let query = self.subscriptions.get(&name)?.query.clone();
+        Some(Due { name, when, query })
+    }
+
+    /// Reports what was due with `report`, and settles when it is due again.
+    pub(super) fn reschedule(
+        &mut self,
+        due: &Due,
+        now: Instant,
+        report: impl FnOnce(&mut Subscription),
+    ) {
+        self.due.remove(&(due.when, due.name));
+        let Some(subscription) = self.subscriptions.get_mut(&due.name) else {
+            return;
+        };
+        report(subscription);
+        subscription.next = match subscription.kind {
+            Kind::Periodic { period, .. } => Some(following(due.when, period, now)),
+            Kind::EveryChange { .. } => None,
+        };
+        if let Some(next) = subscription.next {
+            self.due.insert((next, due.name));
+        }
+    }
+
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        let due = self.due.first().map(|&(when, _)| when);
+        let expiring = self.expiring.first().map(|&(when, _)| when);
+        due.into_iter().chain(expiring).min()
+    }
+}
+
+/// The next beat after `now`: beats that were missed are left out, and none comes late because one
+/// before it did.
+fn following(beat: Instant, period: Duration, now: Instant) -> Instant {
+    let next = beat + period;
+    if next > now {
+        return next;
+    }
+    let missed = now.saturating_duration_since(beat).as_nanos() / period.as_nanos().max(1);
+    let beats = u32::try_from(missed + 1).unwrap_or(u32::MAX);
+    beat + period.saturating_mul(beats)
+}

@@ -1,0 +1,493 @@
+//! Events of a whole component, under virtual time.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "a test begins at some time, and all that follows is virtual"
+)]
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU16, Ordering};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::EventSettings;
+use crate::address::JausId;
+use crate::codec::{Message, ServiceId};
+use crate::endpoint::Received;
+use crate::messages::core::create_event::EventType;
+use crate::messages::core::reject_event_request::ResponseCode;
+use crate::messages::core::*;
+use crate::service::{
+    Discovery, Handlers, Kind, Liveness, Management, Profile, Scope, Stack, Timing, Transport,
+};
+use crate::wire::{Broadcast, Priority};
+
+const US: JausId = JausId::new(105, 1, 1);
+const CLIENT: JausId = JausId::new(42, 1, 1);
+const OTHER: JausId = JausId::new(42, 2, 1);
+const SECOND: Duration = Duration::from_secs(1);
+
+/// A service of the test, whose answer is a number that the test sets.
+const COUNTER: ServiceId = ServiceId {
+    urn: "urn:test:Counter",
+    major: 1,
+    minor: 0,
+};
+
+struct Rig {
+    stack: Stack,
+    now: Instant,
+    number: Arc<AtomicU16>,
+}
+
+impl Rig {
+    fn new() -> Self {
+        Self::with(EventSettings::default())
+    }
+
+    fn with(settings: EventSettings) -> Self {
+        let number = Arc::new(AtomicU16::new(0));
+        let shown = number.clone();
+        let counter = Handlers::new(COUNTER).answer(move |_: QueryElement| ReportElementCount {
+            element_count: shown.load(Ordering::Relaxed),
+        });
+        let profile = Profile::new(Kind::Vehicle, "Rover");
+        let discovery = Discovery::new(US, profile, Scope::Nobody, Timing::default(), 1);
+        let services: Vec<Box<dyn crate::service::Service>> = vec![
+            Box::new(Transport),
+            Box::new(Liveness::new()),
+            Box::new(counter),
+        ];
+        let stack = Stack::new(discovery, services)
+            .event_settings(settings)
+            .management(Management::new());
+        Self {
+            stack,
+            now: Instant::now(),
+            number,
+        }
+    }
+
+    fn hear<M: Message>(&mut self, source: JausId, message: &M) -> Vec<(JausId, Bytes)> {
+        let received = Received {
+            source,
+            destination: US,
+            to: US,
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            payload: message.encode().unwrap(),
+            path: None,
+        };
+        self.stack.handle_message(self.now, &received);
+        self.said()
+    }
+
+    fn said(&mut self) -> Vec<(JausId, Bytes)> {
+        std::iter::from_fn(|| self.stack.poll_transmit())
+            .map(|message| (message.destination, message.payload))
+            .collect()
+    }
+
+    /// Lets time pass from wake-up to wake-up; what was said, and when.
+    fn run(&mut self, time: Duration) -> Vec<(Duration, JausId, Bytes)> {
+        let (start, end) = (self.now, self.now + time);
+        let mut said = Vec::new();
+        while let Some(wake) = self.stack.poll_timeout()
+            && wake <= end
+        {
+            self.now = self.now.max(wake);
+            self.stack.handle_timeout(self.now);
+            let at = self.now - start;
+            said.extend(self.said().into_iter().map(|(to, it)| (at, to, it)));
+        }
+        self.now = end;
+        said
+    }
+
+    fn set(&mut self, number: u16) -> Vec<(JausId, Bytes)> {
+        self.number.store(number, Ordering::Relaxed);
+        self.stack.announce(self.now, QueryElement::CODE);
+        self.said()
+    }
+
+    fn create(&mut self, client: JausId, create: &CreateEvent) -> Vec<(JausId, Bytes)> {
+        self.hear(client, create)
+    }
+}
+
+fn periodic<Q: Message>(request_id: u8, hertz: f64, query: &Q) -> CreateEvent {
+    let mut create = CreateEvent {
+        request_id,
+        event_type: EventType(0),
+        query_message: query.encode().unwrap(),
+        ..CreateEvent::default()
+    };
+    create.set_requested_periodic_rate_hz(hertz).unwrap();
+    create
+}
+
+fn on_change(request_id: u8) -> CreateEvent {
+    CreateEvent {
+        request_id,
+        event_type: EventType(1),
+        query_message: QueryElement { element_uid: 7 }.encode().unwrap(),
+        ..CreateEvent::default()
+    }
+}
+
+/// The first answer of that type.
+fn answer<M: Message>(said: &[(JausId, Bytes)]) -> M {
+    said.iter()
+        .find_map(|(_, octets)| M::decode(octets).ok())
+        .unwrap_or_else(|| panic!("no {} among {said:?}", M::NAME))
+}
+
+fn events(said: &[(JausId, Bytes)]) -> Vec<Event> {
+    said.iter()
+        .filter_map(|(_, octets)| Event::decode(octets).ok())
+        .collect()
+}
+
+fn count_in(event: &Event) -> u16 {
+    let report = ReportElementCount::decode(&event.report_message).unwrap();
+    report.element_count
+}
+
+#[test]
+fn a_periodic_event_is_confirmed_and_keeps_its_rate() {
+    let mut rig = Rig::new();
+    let said = rig.create(CLIENT, &periodic(1, 10.0, &QueryHeartbeatPulse));
+    let confirm: ConfirmEventRequest = answer(&said);
+    assert_eq!((confirm.request_id, confirm.event_id), (1, 1));
+    assert!((confirm.confirmed_periodic_rate_hz() - 10.0).abs() < 0.01);
+    let first = &events(&said)[0];
+    assert_eq!((first.event_id, first.sequence_number), (1, 0));
+    let report = ReportHeartbeatPulse.encode().unwrap();
+    assert_eq!(first.report_message, report);
+    let said = rig.run(60 * SECOND);
+    assert!(said.len().abs_diff(600) <= 1, "{} in a minute", said.len());
+    for (i, (at, to, octets)) in said.iter().enumerate() {
+        let event = Event::decode(octets).unwrap();
+        assert_eq!((*to, event.sequence_number), (CLIENT, (i + 1) as u8));
+        let expected = (i + 1) as f64 / confirm.confirmed_periodic_rate_hz();
+        assert!(
+            (at.as_secs_f64() - expected).abs() < 1e-6,
+            "beat {i} at {at:?}"
+        );
+    }
+}
+
+#[test]
+fn a_late_wake_up_leaves_beats_out_and_keeps_to_the_others() {
+    let mut rig = Rig::new();
+    rig.create(CLIENT, &periodic(1, 10.0, &QueryHeartbeatPulse));
+    rig.now += Duration::from_millis(1050);
+    rig.stack.handle_timeout(rig.now);
+    assert_eq!(rig.said().len(), 1, "ten beats were missed");
+    let said = rig.run(Duration::from_millis(100));
+    assert_eq!(said.len(), 1);
+    assert!(
+        (said[0].0.as_secs_f64() - 0.05).abs() < 0.01,
+        "{:?}",
+        said[0].0
+    );
+}
+
+#[test]
+fn creating_the_same_again_changes_the_rate_and_not_the_number_of_streams() {
+    let mut rig = Rig::new();
+    for (request, hertz) in [(1, 1.0), (2, 5.0), (3, 5.0)] {
+        let said = rig.create(CLIENT, &periodic(request, hertz, &QueryHeartbeatPulse));
+        let confirm: ConfirmEventRequest = answer(&said);
+        assert_eq!((confirm.request_id, confirm.event_id), (request, 1));
+    }
+    assert!(rig.run(10 * SECOND).len().abs_diff(50) <= 1);
+    let said = rig.create(CLIENT, &periodic(4, 1.0, &QueryStatus));
+    assert_eq!(
+        answer::<ConfirmEventRequest>(&said).event_id,
+        2,
+        "another query"
+    );
+    let said = rig.create(OTHER, &periodic(1, 1.0, &QueryHeartbeatPulse));
+    assert_eq!(
+        answer::<ConfirmEventRequest>(&said).event_id,
+        1,
+        "another client"
+    );
+}
+
+#[test]
+fn what_nobody_could_answer_is_refused() {
+    let rate = |create: CreateEvent, hertz| {
+        let mut create = create;
+        create.set_requested_periodic_rate_hz(hertz).unwrap();
+        create
+    };
+    let query = |octets: &'static [u8]| CreateEvent {
+        query_message: Bytes::from_static(octets),
+        ..periodic(9, 1.0, &QueryStatus)
+    };
+    let kind = |kind| CreateEvent {
+        event_type: EventType(kind),
+        ..periodic(9, 1.0, &QueryStatus)
+    };
+    for (what, create, why) in [
+        (
+            "a report",
+            query(&[0x02, 0x44, 0, 0]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "a command",
+            query(&[0x02, 0x00]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "an unknown query",
+            query(&[0xFF, 0x2F]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "half a query",
+            query(&[0x1A, 0x24]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "events",
+            query(&[0xF0, 0x21, 3, 0]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        ("nothing", query(&[]), ResponseCode::INVALID_EVENT_SETUP),
+        (
+            "an unknown type",
+            kind(2),
+            ResponseCode::INVALID_EVENT_SETUP,
+        ),
+        (
+            "no rate",
+            rate(periodic(9, 1.0, &QueryStatus), 0.0),
+            ResponseCode::INVALID_EVENT_SETUP,
+        ),
+    ] {
+        let mut rig = Rig::new();
+        let said = rig.create(CLIENT, &create);
+        let reject: RejectEventRequest = answer(&said);
+        assert_eq!(
+            (reject.request_id, reject.response_code),
+            (9, Some(why)),
+            "{what}"
+        );
+        assert_eq!((said.len(), rig.stack.event_count()), (1, 0), "{what}");
+    }
+}
+
+#[test]
+fn a_change_is_told_once_and_only_if_it_is_one() {
+    let mut rig = Rig::new();
+    let said = rig.create(CLIENT, &on_change(1));
+    assert_eq!(events(&said).iter().map(count_in).collect::<Vec<_>>(), [0]);
+    rig.now += SECOND;
+    assert_eq!(
+        events(&rig.set(5)).iter().map(count_in).collect::<Vec<_>>(),
+        [5]
+    );
+    rig.now += SECOND;
+    assert!(rig.set(5).is_empty(), "announced, and the same");
+    assert!(rig.run(60 * SECOND).is_empty());
+}
+
+#[test]
+fn changes_that_follow_fast_are_told_together_and_the_last_is_not_lost() {
+    let mut rig = Rig::with(EventSettings {
+        fastest: 10.0,
+        ..EventSettings::default()
+    });
+    rig.create(CLIENT, &on_change(1));
+    let mut told = Vec::new();
+    for number in 1..=1000 {
+        rig.now += Duration::from_millis(1);
+        rig.stack.handle_timeout(rig.now);
+        told.extend(events(&rig.set(number)));
+    }
+    told.extend(events(
+        &rig.run(SECOND)
+            .into_iter()
+            .map(|(_, to, it)| (to, it))
+            .collect::<Vec<_>>(),
+    ));
+    assert!(
+        (10..=11).contains(&told.len()),
+        "{} in a second",
+        told.len()
+    );
+    assert_eq!(told.last().map(count_in), Some(1000));
+}
+
+#[test]
+fn management_announces_its_own_changes() {
+    let mut rig = Rig::new();
+    let status = CreateEvent {
+        event_type: EventType(1),
+        ..periodic(1, 0.0, &QueryStatus)
+    };
+    rig.create(CLIENT, &status);
+    rig.now += SECOND;
+    let emergency = SetEmergency {
+        emergency_code: set_emergency::EmergencyCode(1),
+    };
+    let said = rig.hear(OTHER, &emergency);
+    let event = &events(&said)[0];
+    let report = ReportStatus::decode(&event.report_message).unwrap();
+    assert_eq!(report.status.0, 5);
+}
+
+#[test]
+fn an_update_changes_the_rate_of_the_event_that_it_names() {
+    let mut rig = Rig::new();
+    rig.create(CLIENT, &periodic(1, 1.0, &QueryHeartbeatPulse));
+    let mut update = UpdateEvent {
+        request_id: 4,
+        event_id: 1,
+        query_message: QueryHeartbeatPulse.encode().unwrap(),
+        ..UpdateEvent::default()
+    };
+    update.set_requested_periodic_rate_hz(0.5).unwrap();
+    let said = rig.hear(CLIENT, &update);
+    let confirm: ConfirmEventRequest = answer(&said);
+    assert_eq!((confirm.request_id, confirm.event_id), (4, 1));
+    assert!((confirm.confirmed_periodic_rate_hz() - 0.5).abs() < 0.01);
+    assert!(rig.run(20 * SECOND).len().abs_diff(10) <= 1);
+    let said = rig.hear(OTHER, &update);
+    let reject: RejectEventRequest = answer(&said);
+    assert_eq!(
+        reject.response_code,
+        Some(super::INVALID_EVENT),
+        "not its event"
+    );
+}
+
+#[test]
+fn a_cancelled_event_ends_and_others_go_on() {
+    let mut rig = Rig::new();
+    rig.create(CLIENT, &periodic(1, 1.0, &QueryHeartbeatPulse));
+    rig.create(CLIENT, &periodic(2, 1.0, &QueryStatus));
+    let cancel = CancelEvent {
+        request_id: 7,
+        event_id: 1,
+    };
+    let confirm: ConfirmEventRequest = answer(&rig.hear(CLIENT, &cancel));
+    assert_eq!((confirm.request_id, confirm.event_id), (7, 1));
+    let said = rig.run(10 * SECOND);
+    assert!(said.len().abs_diff(10) <= 1);
+    assert!(
+        said.iter()
+            .all(|(_, _, it)| Event::decode(it).unwrap().event_id == 2)
+    );
+    let reject: RejectEventRequest = answer(&rig.hear(CLIENT, &cancel));
+    assert_eq!(reject.response_code, Some(super::INVALID_EVENT));
+}
+
+#[test]
+fn a_client_is_told_of_its_own_events_by_each_question() {
+    let mut rig = Rig::new();
+    rig.create(CLIENT, &periodic(1, 1.0, &QueryHeartbeatPulse));
+    rig.create(CLIENT, &on_change(2));
+    rig.create(OTHER, &periodic(3, 1.0, &QueryHeartbeatPulse));
+    for (question, expected) in [
+        ([0, 0x02, 0x22].as_slice(), vec![1]),
+        (&[1, 0], vec![1]),
+        (&[1, 1], vec![2]),
+        (&[2, 2], vec![2]),
+        (&[2, 9], vec![]),
+        (&[3, 0], vec![1, 2]),
+    ] {
+        let octets = Bytes::from([&[0xF0, 0x21], question].concat());
+        let query = QueryEvents::decode(&octets).unwrap();
+        let report: ReportEvents = answer(&rig.hear(CLIENT, &query));
+        let ids: Vec<u8> = report
+            .event_list
+            .iter()
+            .map(|event| event.event_id)
+            .collect();
+        assert_eq!(ids, expected, "{question:?}");
+    }
+}
+
+#[test]
+fn what_is_too_fast_is_confirmed_slower() {
+    let mut rig = Rig::new();
+    let said = rig.create(CLIENT, &periodic(1, 1092.0, &QueryHeartbeatPulse));
+    let confirm: ConfirmEventRequest = answer(&said);
+    assert!((confirm.confirmed_periodic_rate_hz() - 250.0).abs() < 0.01);
+    assert!(rig.run(SECOND).len().abs_diff(250) <= 1);
+}
+
+#[test]
+fn ten_thousand_subscriptions_are_bounded_for_one_client_and_for_all() {
+    let mut rig = Rig::new();
+    let refused = |said: &[(JausId, Bytes)]| {
+        said.iter()
+            .filter_map(|(_, octets)| RejectEventRequest::decode(octets).ok())
+            .filter(|it| it.response_code == Some(ResponseCode::CONNECTION_REFUSED))
+            .count()
+    };
+    let element = |i: u16| QueryElement { element_uid: i };
+    let mut count = 0;
+    for i in 0..1000 {
+        count += refused(&rig.create(CLIENT, &periodic(1, 1.0, &element(i))));
+    }
+    assert_eq!((rig.stack.event_count(), count), (256, 744));
+    for i in 0..10_000 {
+        let client = JausId::new(1000 + i / 100, 1, 1 + (i % 100) as u8);
+        count += refused(&rig.create(client, &periodic(1, 1.0, &QueryStatus)));
+    }
+    assert_eq!((rig.stack.event_count(), count), (4096, 744 + 6160));
+    let said = rig.create(OTHER, &periodic(1, 1.0, &QueryStatus));
+    assert_eq!(refused(&said), 1);
+}
+
+#[test]
+fn the_sum_of_all_rates_is_bounded() {
+    let mut rig = Rig::with(EventSettings {
+        reports_per_second: 500.0,
+        ..EventSettings::default()
+    });
+    rig.create(CLIENT, &periodic(1, 250.0, &QueryStatus));
+    rig.create(CLIENT, &periodic(2, 240.0, &QueryControl));
+    let said = rig.create(OTHER, &periodic(3, 20.0, &QueryStatus));
+    let reject: RejectEventRequest = answer(&said);
+    assert_eq!(reject.response_code, Some(ResponseCode::CONNECTION_REFUSED));
+    rig.create(CLIENT, &periodic(4, 1.0, &QueryStatus));
+    let said = rig.create(OTHER, &periodic(5, 20.0, &QueryStatus));
+    assert_eq!(
+        answer::<ConfirmEventRequest>(&said).request_id,
+        5,
+        "there is room again"
+    );
+}
+
+#[test]
+fn events_that_nobody_renews_expire_if_so_wanted() {
+    let mut rig = Rig::with(EventSettings {
+        timeout: 1,
+        ..EventSettings::default()
+    });
+    let timeout: ReportEventTimeout = answer(&rig.hear(CLIENT, &QueryEventTimeout));
+    assert_eq!(timeout.timeout.0, 1);
+    rig.create(CLIENT, &periodic(1, 1.0, &QueryStatus));
+    rig.run(50 * SECOND);
+    let all = QueryEvents::decode(&Bytes::from_static(&[0xF0, 0x21, 3, 0])).unwrap();
+    rig.hear(CLIENT, &all);
+    let said = rig.run(120 * SECOND);
+    let told: Vec<_> = said.iter().map(|(_, to, it)| (*to, it.clone())).collect();
+    assert!(
+        events(&told).len().abs_diff(60) <= 1,
+        "renewed by asking for it"
+    );
+    let confirm: ConfirmEventRequest = answer(&told);
+    assert_eq!(
+        (confirm.request_id, confirm.event_id),
+        (1, 1),
+        "its end is told"
+    );
+}
