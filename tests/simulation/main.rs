@@ -11,10 +11,12 @@
 
 mod large;
 mod ledger;
+mod producer;
 mod scenario;
 mod seeds;
 #[path = "../sim/mod.rs"]
 mod sim;
+mod streams;
 
 use seeds::for_each_seed;
 
@@ -22,6 +24,8 @@ use seeds::for_each_seed;
 const SEEDS: u64 = 2000;
 /// So many of them send a large message: it has 736 fragments.
 const LARGE_SEEDS: u64 = 1000;
+/// So many of them have clients subscribe to reports for three minutes.
+const STREAM_SEEDS: u64 = 40;
 
 #[test]
 fn every_seed_keeps_the_promises() {
@@ -36,6 +40,15 @@ fn one_mib_acknowledged_arrives_over_loss_and_reordering() {
         "one_mib_acknowledged_arrives_over_loss_and_reordering",
         LARGE_SEEDS,
         large::run,
+    );
+}
+
+#[test]
+fn a_stream_runs_at_its_rate_or_its_client_knows_that_it_is_down() {
+    for_each_seed(
+        "a_stream_runs_at_its_rate_or_its_client_knows_that_it_is_down",
+        STREAM_SEEDS,
+        streams::run,
     );
 }
 

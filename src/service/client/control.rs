@@ -97,6 +97,8 @@ struct Control {
     /// Requests since the last answer, and when the first of them was sent.
     asked: u32,
     first_asked: Instant,
+    /// Whether the peer has refused to renew it.
+    denied: bool,
     /// When the peer had to begin to count the lifetime, at the latest known.
     confirmed: Instant,
     next: Instant,
@@ -138,6 +140,7 @@ impl Controls {
             lifetime_asked: 0,
             asked: 0,
             first_asked: now,
+            denied: false,
             confirmed: now,
             next: now,
         };
@@ -298,6 +301,7 @@ impl Control {
                 // Which request it answers is not said: it may be the first, and the others lost.
                 self.confirmed = self.first_asked;
                 self.asked = 0;
+                self.denied = false;
                 let granted = self.state == State::Asking;
                 self.state = State::Held;
                 self.next = now + self.renewal();
@@ -308,10 +312,17 @@ impl Control {
                 2 => ControlRefused::InsufficientAuthority(self.authority),
                 code => ControlRefused::Code(code),
             })),
-            (State::Held, code) => self.lose(match code {
-                2 => ControlLost::Outranked,
-                _ => ControlLost::NotAvailable,
-            }),
+            (State::Held, 2) => self.lose(ControlLost::Outranked),
+            // An emergency, for instance: control is not renewed, and not taken back either, which
+            // the peer would say. It ends with its lifetime, if it has one.
+            (State::Held, _) => {
+                self.denied = true;
+                self.asked = 0;
+                if self.lifetime == Some(Duration::ZERO) {
+                    self.confirmed = now;
+                }
+                None
+            }
             // A renewal was on its way when control was lost, and has brought it back behind the
             // application's back.
             (State::Lost(_), 0) => {
@@ -365,7 +376,10 @@ impl Control {
             }
             State::Held if now >= self.confirmed + self.lifetime() => {
                 let since = now.saturating_duration_since(self.confirmed);
-                self.lose(ControlLost::Silent(since))
+                self.lose(match self.denied {
+                    true => ControlLost::NotAvailable,
+                    false => ControlLost::Silent(since),
+                })
             }
             State::Asking | State::Held => {
                 self.ask(now, peer, out);

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use super::Rejection;
-use super::subscriptions::SubscriptionEnd;
+use super::subscriptions::{SubscriptionEnd, Topic};
 use crate::address::JausId;
 use crate::messages::core::{ConfirmEventRequest, Event};
 use crate::service::{NoAnswer, Outbox, Patience, code_of};
@@ -114,7 +114,7 @@ pub(super) struct Subscription {
     /// The Create Event, always the same, so that a peer can tell a repetition.
     create: Bytes,
     pub(super) request: u8,
-    query: u16,
+    query: Bytes,
     state: State,
     /// The number that the peer gave to the event.
     pub(super) event: Option<u8>,
@@ -122,6 +122,7 @@ pub(super) struct Subscription {
     first_asked: Instant,
     /// Requests without an answer so far.
     asked: u32,
+    last_asked: Instant,
     next_ask: Instant,
     /// When the last sign of the event came.
     heard: Instant,
@@ -139,7 +140,7 @@ pub(super) struct Order {
     pub(super) patience: Patience,
     pub(super) create: Bytes,
     pub(super) request: u8,
-    pub(super) query: u16,
+    pub(super) query: Bytes,
 }
 
 impl Subscription {
@@ -168,6 +169,7 @@ impl Subscription {
             hz: None,
             first_asked: now,
             asked: 0,
+            last_asked: now,
             next_ask: now,
             heard: now,
             sequence: None,
@@ -189,11 +191,20 @@ impl Subscription {
         self.event == Some(event.event_id) && code_of(&event.report_message) == Some(self.report)
     }
 
-    /// Whether this subscription's event and one that `other` was just told cannot both be there.
+    /// Whether a peer that tells its events apart would take the two for the same.
+    pub(super) fn equals(&self, topic: &Topic) -> bool {
+        let same_type = matches!(
+            (self.when, topic.when),
+            (When::OnChange, When::OnChange) | (When::Periodic { .. }, When::Periodic { .. })
+        );
+        same_type && self.peer == topic.peer && self.query == topic.query
+    }
+
+    /// Whether this subscription's event and the one that `other` was just told cannot both be
+    /// there.
     pub(super) fn is_displaced_by(&self, other: &Self) -> bool {
         self.peer == other.peer
-            && self.query == other.query
-            && self.request != other.request
+            && code_of(&self.query) == code_of(&other.query)
             && self.event.is_some()
             && self.event == other.event
     }
@@ -201,7 +212,8 @@ impl Subscription {
     /// The peer has given this event's number to another one, or may have cancelled it with that.
     pub(super) fn doubt(&mut self, now: Instant) {
         self.event = None;
-        self.next_ask = now;
+        // A peer that gives everything the same number is not to be asked without end.
+        self.next_ask = now.max(self.last_asked + self.patience.interval);
     }
 
     pub(super) fn handle_confirm(
@@ -232,10 +244,8 @@ impl Subscription {
         if is_news {
             news.push(SubscriptionNews::Up { hz: confirmed });
         }
-        if let Some(early) = self
-            .early
-            .take_if(|early| early.event_id == confirm.event_id)
-        {
+        let early = self.early.take();
+        if let Some(early) = early.filter(|early| early.event_id == confirm.event_id) {
             self.handle_event(now, early, news);
         }
     }
@@ -274,11 +284,12 @@ impl Subscription {
         let ahead = self
             .sequence
             .map(|last| event.sequence_number.wrapping_sub(last));
-        self.heard = now;
         if ahead.is_some_and(|ahead| ahead == 0 || ahead > u8::MAX / 2) {
-            // It was sent twice, or overtaken by a newer one.
+            // It was sent twice, or overtaken by a newer one; or it is another event's that a
+            // restarted peer gives the number to, and is no sign of this one.
             return;
         }
+        self.heard = now;
         self.sequence = Some(event.sequence_number);
         if self.state == State::Down {
             // It was only the network.
@@ -382,6 +393,7 @@ impl Subscription {
                 .min(Self::LONGEST_PAUSE),
         };
         self.asked = self.asked.saturating_add(1);
+        self.last_asked = now;
         self.next_ask = now + pause;
     }
 }

@@ -50,6 +50,9 @@ pub enum CannotSubscribe {
     /// The wire cannot carry the query.
     #[error(transparent)]
     Encode(#[from] EncodeError),
+    /// The peer would take both for one event.
+    #[error("this component subscribes to it already: use that subscription, or drop it first")]
+    Already,
     /// There is no room.
     #[error("there are {0} subscriptions already, and no more are possible: drop some")]
     TooMany(usize),
@@ -127,6 +130,9 @@ impl Subscriptions {
         if !peer.is_unicast() {
             return Err(CannotSubscribe::NotOneComponent(peer));
         }
+        if self.alive.values().any(|it| it.equals(topic)) {
+            return Err(CannotSubscribe::Already);
+        }
         let request = self.free_request(peer)?;
         let order = Order {
             peer,
@@ -135,7 +141,7 @@ impl Subscriptions {
             patience,
             create: create_event(topic, request)?.encode()?,
             request,
-            query: code_of(&topic.query).unwrap_or_default(),
+            query: topic.query.clone(),
         };
         self.last += 1;
         let id = SubscriptionId(self.last);
@@ -251,14 +257,10 @@ impl Subscriptions {
             waiting.keep(event);
             return;
         }
-        let number_is_used = self
-            .alive
-            .values()
-            .any(|it| it.peer == source && it.event == Some(event.event_id));
         let leaving = |it: &Leaving| it.peer == source && it.event == event.event_id;
         let may = self.next_stray.is_none_or(|next| next <= now);
-        // Cancelling a number that two events share might hit the wrong one.
-        if may && !number_is_used && !self.leaving.iter().any(leaving) {
+        // Where two events share the number, this may hit the wrong one: see `has_left`.
+        if may && !self.leaving.iter().any(leaving) {
             self.next_stray = Some(now + Self::STRAY_PAUSE);
             tracing::debug!(%source, event = event.event_id, "event that nobody subscribed to");
             self.leave(now, source, event.event_id, out);
@@ -282,6 +284,12 @@ impl Subscriptions {
         };
         confirmed.handle_confirm(now, confirm, &mut news);
         self.doubt_the_displaced(now, id);
+        let same = |it: &&mut Leaving| it.peer == source && it.event == confirm.event_id;
+        // The number is wanted again. A cancellation that is on its way is noticed yet.
+        self.leaving
+            .iter_mut()
+            .filter(same)
+            .for_each(|it| it.tries = Self::CANCEL_TRIES);
         self.settle(now, id, news, out);
         Handled::Yes
     }

@@ -188,6 +188,37 @@ fn an_emergency_takes_control() {
     );
 }
 
+/// Refuses renewals for a while.
+fn deny_for(bench: &mut Bench, duration: Duration) {
+    let end = bench.now + duration;
+    while bench.now < end {
+        bench.run_ms(10);
+        for _ in bench.sent::<RequestControl>() {
+            bench.hear(PEER, &confirm(1));
+        }
+    }
+}
+
+#[test]
+fn control_that_cannot_be_renewed_ends_with_its_lifetime() {
+    let (mut bench, _) = held(5);
+    deny_for(&mut bench, Duration::from_millis(4900));
+    assert_eq!(news(&mut bench), []);
+    deny_for(&mut bench, Duration::from_millis(200));
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::NotAvailable)]
+    );
+}
+
+#[test]
+fn control_that_lasts_for_ever_outlasts_an_emergency() {
+    let (mut bench, _) = held(0);
+    deny_for(&mut bench, Duration::from_secs(60));
+    renew_for(&mut bench, Duration::from_secs(60));
+    assert_eq!(news(&mut bench), []);
+}
+
 #[test]
 fn a_lost_reject_is_noticed_with_the_next_renewal() {
     let (mut bench, _) = held(5);

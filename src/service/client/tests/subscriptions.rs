@@ -298,7 +298,7 @@ fn a_number_that_is_given_twice_means_that_the_first_owner_must_ask_again() {
     let (mut bench, _) = up(When::OnChange);
     subscribe(&mut bench, &status(When::hz(1.0)));
     assert_eq!(confirm_all(&mut bench, 7, 1.0), 1);
-    bench.run_ms(0);
+    bench.run_ms(500);
     let asked = bench.sent::<CreateEvent>();
     assert_eq!(asked.len(), 1);
     assert_eq!(asked[0].event_type, EventType::EVERY_CHANGE);
@@ -384,7 +384,7 @@ fn a_cancellation_that_may_have_hit_another_event_has_that_one_renewed() {
     bench.collect();
     let request = bench.sent::<CancelEvent>()[0].request_id;
     confirm(&mut bench, request, 7, 0.0);
-    bench.run_ms(0);
+    bench.run_ms(500);
     assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
 }
 
@@ -410,10 +410,50 @@ fn what_cannot_be_asked_for_is_refused_at_once() {
 }
 
 #[test]
+fn a_peer_that_gives_every_event_the_same_number_is_asked_in_measure() {
+    let (mut bench, _) = up(When::OnChange);
+    subscribe(&mut bench, &status(When::hz(1.0)));
+    let mut asked = 0;
+    for _ in 0..10_000 {
+        asked += confirm_all(&mut bench, 7, 1.0);
+        bench.run_ms(1);
+    }
+    assert!(asked < 50, "{asked}");
+}
+
+#[test]
+fn what_is_subscribed_to_already_is_refused() {
+    let (mut bench, id) = up(When::hz(1.0));
+    let again = |bench: &mut Bench| {
+        let topic = status(When::hz(2.0));
+        bench
+            .stack
+            .subscribe(bench.now, &topic, Patience::default())
+    };
+    assert_eq!(again(&mut bench), Err(CannotSubscribe::Already));
+    bench.stack.unsubscribe(bench.now, id);
+    assert!(again(&mut bench).is_ok());
+}
+
+#[test]
+fn a_number_that_is_wanted_again_is_cancelled_no_more() {
+    let (mut bench, id) = up(When::hz(1.0));
+    bench.stack.unsubscribe(bench.now, id);
+    subscribe(&mut bench, &status(When::hz(2.0)));
+    confirm_all(&mut bench, 7, 2.0);
+    bench.run_ms(60_000);
+    assert_eq!(bench.sent::<CancelEvent>(), []);
+}
+
+#[test]
 fn there_is_room_for_two_hundred_subscriptions_to_one_peer() {
     let mut bench = Bench::new();
-    for _ in 0..200 {
-        subscribe(&mut bench, &status(When::OnChange));
+    let numbered = |number: u8| Topic {
+        query: [0x02, 0x24, number, 0].to_vec().into(),
+        ..status(When::OnChange)
+    };
+    for number in 0..200 {
+        subscribe(&mut bench, &numbered(number));
     }
     let mut requests: Vec<_> = bench
         .sent::<CreateEvent>()
@@ -423,10 +463,9 @@ fn there_is_room_for_two_hundred_subscriptions_to_one_peer() {
     requests.sort_unstable();
     requests.dedup();
     assert_eq!(requests.len(), 200);
-    let topic = status(When::OnChange);
     let one_more = bench
         .stack
-        .subscribe(bench.now, &topic, Patience::default());
+        .subscribe(bench.now, &numbered(200), Patience::default());
     assert_eq!(one_more, Err(CannotSubscribe::TooMany(200)));
 }
 

@@ -1,0 +1,223 @@
+//! A producer of events in the ways of known peers: some number their events for each query anew,
+//! some create a second event where one is, some forget an event that nobody renews.
+
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::endpoint::{Endpoint, Event as EndpointEvent, Outgoing, Received};
+use jaus::messages::core::{
+    CancelEvent, ConfirmEventRequest, CreateEvent, Event, RejectEventRequest, create_event,
+};
+
+use crate::sim::{Owner, Random};
+
+/// How a peer treats events.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Habits {
+    /// It numbers events for each query anew, like JAUS++.
+    numbers_by_query: bool,
+    /// It takes a repeated Create Event for a new one.
+    pub(crate) multiplies: bool,
+    /// It forgets events that nobody renews for a minute, as version 1.1 does.
+    forgets: bool,
+}
+
+impl Habits {
+    pub(crate) fn choose(random: &mut Random) -> Self {
+        // No known peer does both: who has an event cancelled whose number is another's as well,
+        // and creates that one again, would begin anew for ever.
+        let numbers_by_query = random.happens(300);
+        Self {
+            numbers_by_query,
+            multiplies: !numbers_by_query && random.happens(300),
+            forgets: random.happens(500),
+        }
+    }
+}
+
+pub(crate) struct Producer {
+    id: JausId,
+    habits: Habits,
+    running: Vec<Running>,
+}
+
+struct Running {
+    client: JausId,
+    query: Bytes,
+    number: u8,
+    sequence: u8,
+    kind: create_event::EventType,
+    period: Duration,
+    next: Instant,
+    renewed: Instant,
+}
+
+impl Producer {
+    /// How long a forgetful producer keeps an event.
+    const LIFETIME: Duration = Duration::from_secs(60);
+    /// How often what is subscribed to on change changes.
+    const CHANGE: Duration = Duration::from_secs(3);
+
+    pub(crate) const fn new(id: JausId, habits: Habits) -> Self {
+        Self {
+            id,
+            habits,
+            running: Vec::new(),
+        }
+    }
+
+    /// How many events a client has.
+    pub(crate) fn events_of(&self, client: JausId) -> usize {
+        self.running.iter().filter(|it| it.client == client).count()
+    }
+
+    fn say<M: Message>(&self, endpoint: &mut Endpoint, now: Instant, to: JausId, message: &M) {
+        let payload = message.encode().expect("a message");
+        // The client may have gone, or there may be no way to it yet.
+        let _ = endpoint.send(now, Outgoing::new(self.id, to, payload));
+    }
+
+    fn create(
+        &mut self,
+        now: Instant,
+        endpoint: &mut Endpoint,
+        from: JausId,
+        create: &CreateEvent,
+    ) {
+        let same = |it: &&mut Running| {
+            it.client == from && it.kind == create.event_type && it.query == create.query_message
+        };
+        let known = self.running.iter_mut().find(same);
+        let number = match known.filter(|_| !self.habits.multiplies) {
+            Some(known) => {
+                known.renewed = now;
+                known.period = period(create);
+                known.number
+            }
+            None => self.begin(now, from, create),
+        };
+        let mut confirm = ConfirmEventRequest {
+            request_id: create.request_id,
+            event_id: number,
+            ..ConfirmEventRequest::default()
+        };
+        let hz = create.requested_periodic_rate_hz();
+        let set = confirm.set_confirmed_periodic_rate_hz(hz);
+        set.expect("a rate that was asked for");
+        self.say(endpoint, now, from, &confirm);
+    }
+
+    fn begin(&mut self, now: Instant, client: JausId, create: &CreateEvent) -> u8 {
+        let rival = |it: &&Running| {
+            !self.habits.numbers_by_query || it.query[..2] == create.query_message[..2]
+        };
+        let taken = |number: &u8| {
+            self.running
+                .iter()
+                .filter(rival)
+                .any(|it| it.number == *number)
+        };
+        let number = (0..=u8::MAX)
+            .find(|number| !taken(number))
+            .unwrap_or(u8::MAX);
+        self.running.push(Running {
+            client,
+            query: create.query_message.clone(),
+            number,
+            sequence: 0,
+            kind: create.event_type,
+            period: period(create),
+            next: now,
+            renewed: now,
+        });
+        number
+    }
+
+    fn cancel(
+        &mut self,
+        now: Instant,
+        endpoint: &mut Endpoint,
+        from: JausId,
+        cancel: &CancelEvent,
+    ) {
+        let same = |it: &Running| it.client == from && it.number == cancel.event_id;
+        let request_id = cancel.request_id;
+        match self.running.iter().position(same) {
+            Some(found) => {
+                self.running.remove(found);
+                let confirm = ConfirmEventRequest {
+                    request_id,
+                    event_id: cancel.event_id,
+                    ..ConfirmEventRequest::default()
+                };
+                self.say(endpoint, now, from, &confirm);
+            }
+            None => {
+                let reject = RejectEventRequest {
+                    request_id,
+                    response_code: Some(6.into()),
+                    error_message: None,
+                };
+                self.say(endpoint, now, from, &reject);
+            }
+        }
+    }
+}
+
+fn period(create: &CreateEvent) -> Duration {
+    match create.event_type {
+        create_event::EventType::PERIODIC_SC => {
+            Duration::from_secs_f64(1.0 / create.requested_periodic_rate_hz())
+        }
+        _ => Producer::CHANGE,
+    }
+}
+
+impl Owner for Producer {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+        let EndpointEvent::Received(Received {
+            source, payload, ..
+        }) = event
+        else {
+            return;
+        };
+        if let Ok(create) = CreateEvent::decode(&payload) {
+            self.create(now, endpoint, source, &create);
+        } else if let Ok(cancel) = CancelEvent::decode(&payload) {
+            self.cancel(now, endpoint, source, &cancel);
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        let forgets = self.habits.forgets;
+        self.running
+            .retain(|it| !forgets || now < it.renewed + Self::LIFETIME);
+        let mut due = Vec::new();
+        for running in self.running.iter_mut().filter(|it| it.next <= now) {
+            running.next += running.period;
+            let mut report = running.query.to_vec();
+            // From a query to its report: 2402h to 4402h.
+            report[1] += 0x20;
+            let event = Event {
+                event_id: running.number,
+                sequence_number: running.sequence,
+                report_message: report.into(),
+            };
+            running.sequence = running.sequence.wrapping_add(1);
+            due.push((running.client, event));
+        }
+        for (client, event) in due {
+            self.say(endpoint, now, client, &event);
+        }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let next = |it: &Running| match self.habits.forgets {
+            true => it.next.min(it.renewed + Self::LIFETIME),
+            false => it.next,
+        };
+        self.running.iter().map(next).min()
+    }
+}
