@@ -8,12 +8,14 @@
 //! |---|---|
 //! | [`Transport`] | is listed; the endpoint does its work |
 //! | [`Liveness`] | answers Query Heartbeat Pulse, sends a heartbeat if asked to |
+//! | [`Time`] | tells the time, and lets the client in control set it |
 //! | [`ListManager`] | keeps a list of elements that drivers work off |
 //! | [`Discovery`] | says who we are, finds out who the others are, keeps the [`Directory`] |
 //! | Events ([`EventSettings`]) | sends the answer to any query of the component, at a rate or on every change |
 //! | [`AccessControl`], [`Management`] | say who may command, and stop everything in an emergency |
 //! | [`Handlers`] | whatever an application offers, one function per message |
 
+mod calendar;
 mod client;
 mod context;
 mod control;
@@ -31,6 +33,7 @@ mod outbox;
 mod rig;
 mod stack;
 mod standing;
+mod time;
 mod transport;
 
 use std::time::Instant;
@@ -54,6 +57,7 @@ pub use liveness::Liveness;
 pub use outbox::Outbox;
 pub use stack::{Event, Stack};
 pub use standing::{Controller, Standing, State};
+pub use time::Time;
 pub use transport::Transport;
 
 /// One service of a component.

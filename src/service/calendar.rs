@@ -1,0 +1,103 @@
+//! Dates and numbers of days, both ways: messages tell dates, clocks count.
+
+/// A day of the Gregorian calendar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Date {
+    pub(super) year: u64,
+    /// 1 to 12.
+    pub(super) month: u64,
+    /// 1 to 31.
+    pub(super) day: u64,
+}
+
+/// From the first of March of the year 0 to the first of January 1970.
+const DAYS_BEFORE_1970: u64 = 719_468;
+/// The calendar repeats itself after 400 years.
+const DAYS_OF_ERA: u64 = 146_097;
+
+impl Date {
+    /// The date so many days after the first of January 1970.
+    ///
+    /// Counted in years that begin in March, so that the leap day is the last one.
+    pub(super) const fn after_1970(days: u64) -> Self {
+        let days = days + DAYS_BEFORE_1970;
+        let of_era = days % DAYS_OF_ERA;
+        let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+        let of_year = of_era - (365 * year + year / 4 - year / 100);
+        let month = (5 * of_year + 2) / 153;
+        let day = of_year - (153 * month + 2) / 5 + 1;
+        let next_year = month >= 10;
+        Self {
+            year: 400 * (days / DAYS_OF_ERA) + year + next_year as u64,
+            month: if next_year { month - 9 } else { month + 3 },
+            day,
+        }
+    }
+
+    /// How many days after the first of January 1970 this is; `None` if there is no such day, or
+    /// it is earlier.
+    pub(super) fn days_after_1970(self) -> Option<u64> {
+        if !(1..=12).contains(&self.month) || !(1..=31).contains(&self.day) || self.year > 9999 {
+            return None;
+        }
+        let (year, month) = if self.month > 2 {
+            (self.year, self.month - 3)
+        } else {
+            (self.year.checked_sub(1)?, self.month + 9)
+        };
+        let of_year = (153 * month + 2) / 5 + self.day - 1;
+        let days = 365 * year + year / 4 - year / 100 + year / 400 + of_year;
+        let days = days.checked_sub(DAYS_BEFORE_1970)?;
+        // The thirtieth of February would be the first or second of March.
+        (Self::after_1970(days) == self).then_some(days)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn date(year: u64, month: u64, day: u64) -> Date {
+        Date { year, month, day }
+    }
+
+    #[test]
+    fn days_and_dates_agree_around_leap_days_and_new_years() {
+        for (days, expected) in [
+            (0, date(1970, 1, 1)),
+            (58, date(1970, 2, 28)),
+            (59, date(1970, 3, 1)),
+            (364, date(1970, 12, 31)),
+            (365, date(1971, 1, 1)),
+            (10_957, date(2000, 1, 1)),
+            (11_016, date(2000, 2, 29)),
+            (11_017, date(2000, 3, 1)),
+            (20_513, date(2026, 3, 1)),
+        ] {
+            assert_eq!(Date::after_1970(days), expected);
+            assert_eq!(expected.days_after_1970(), Some(days));
+        }
+    }
+
+    #[test]
+    fn every_day_of_two_centuries_is_found_again() {
+        for days in 0..73_049 {
+            assert_eq!(Date::after_1970(days).days_after_1970(), Some(days));
+        }
+    }
+
+    #[test]
+    fn there_is_no_thirtieth_of_february() {
+        for none in [
+            date(2026, 2, 29),
+            date(2024, 2, 30),
+            date(2026, 13, 1),
+            date(2026, 4, 31),
+            date(2026, 0, 1),
+            date(2026, 1, 0),
+            date(1969, 12, 31),
+        ] {
+            assert_eq!(none.days_after_1970(), None, "{none:?}");
+        }
+    }
+}

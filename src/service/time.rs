@@ -1,0 +1,320 @@
+//! The Time service: tells a component's time, and lets the client in control set it.
+//!
+//! The time is that of a clock which the application gives, moved by what Set Time asked for: the
+//! host's own clock is not touched, because other programs go by it too.
+//!
+//! # What Set Time may leave out
+//!
+//! * Without a date stamp, the time stamp's day of the month is the nearest such day: a time just
+//!   after midnight, told to a clock just before, is tomorrow's, also on the last of a month.
+//! * Without a time stamp, the time of day stays.
+//! * A day of the month that contradicts the date stamp, or is no day at all (some peers leave it
+//!   0), counts for nothing. Any other field out of its range makes the message void.
+
+use std::time::{Duration, Instant};
+
+use super::calendar::Date;
+use super::{Context, Handled, Service, code_of, read};
+use crate::codec::{Message, ServiceId};
+use crate::endpoint::Received;
+use crate::messages::core::report_time::{DateStamp, TimeStamp};
+use crate::messages::core::{self, QueryTime, ReportTime, SetTime};
+
+const DAY: i64 = 86_400_000;
+
+/// Answers Query Time (2011h), and obeys Set Time (0011h) of the client in control, in whatever
+/// state the component is.
+///
+/// ```
+/// use std::time::{SystemTime, UNIX_EPOCH};
+/// use jaus::service::Time;
+///
+/// let time = Time::new(|| SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default());
+/// ```
+pub struct Time {
+    clock: Box<dyn FnMut() -> Duration + Send>,
+    /// By how many milliseconds this time is ahead of the clock.
+    ahead: i64,
+}
+
+impl Time {
+    /// Bits of the presence vector of Query Time.
+    const TIME_STAMP: u8 = 1;
+    const DATE_STAMP: u8 = 2;
+
+    /// Goes by `clock`, which tells the time since the beginning of 1970 (UTC).
+    #[must_use]
+    pub fn new(clock: impl FnMut() -> Duration + Send + 'static) -> Self {
+        Self {
+            clock: Box::new(clock),
+            ahead: 0,
+        }
+    }
+
+    /// Milliseconds since the beginning of 1970; the message fields end in 2127.
+    fn now(&mut self) -> i64 {
+        self.by_the_clock().saturating_add(self.ahead)
+    }
+
+    fn by_the_clock(&mut self) -> i64 {
+        i64::try_from((self.clock)().as_millis()).unwrap_or(i64::MAX)
+    }
+
+    fn report(&mut self, presence: u8) -> ReportTime {
+        let now = self.now();
+        ReportTime {
+            time_stamp: time_stamp(now).filter(|_| presence & Self::TIME_STAMP != 0),
+            date_stamp: date_stamp(now).filter(|_| presence & Self::DATE_STAMP != 0),
+        }
+    }
+
+    /// Says whether there is such a time.
+    fn set(&mut self, set: &SetTime) -> bool {
+        let Some(wanted) = wanted(self.now(), set) else {
+            return false;
+        };
+        self.ahead = wanted.saturating_sub(self.by_the_clock());
+        true
+    }
+}
+
+impl std::fmt::Debug for Time {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Time")
+            .field("ahead", &self.ahead)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Service for Time {
+    fn offers(&self) -> Vec<ServiceId> {
+        vec![core::time::V1_1, core::time::V1_0]
+    }
+
+    fn handle_message(
+        &mut self,
+        _: Instant,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Handled {
+        match code_of(&message.payload) {
+            Some(QueryTime::CODE) => {
+                if let Some(query) = read::<QueryTime>(message) {
+                    context.reply(message, &self.report(query.presence_vector));
+                }
+            }
+            Some(SetTime::CODE) => {
+                let source = message.source;
+                if !context.standing().obeys(source) {
+                    tracing::debug!(%source, "not in control, so the time stays");
+                } else if let Some(set) = read::<SetTime>(message) {
+                    if self.set(&set) {
+                        context.changed::<QueryTime>();
+                    } else {
+                        tracing::debug!(%source, ?set, "there is no such time");
+                    }
+                }
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+}
+
+/// The time that a message asks for.
+fn wanted(now: i64, set: &SetTime) -> Option<i64> {
+    let of_day = match set.time_stamp {
+        Some(stamp) => milliseconds_of_day(stamp)?,
+        None => now.rem_euclid(DAY),
+    };
+    let day = match (set.date_stamp, set.time_stamp) {
+        (Some(date), _) => day_of(date)?,
+        (None, Some(stamp)) => nearest_day(now, of_day, stamp.day()),
+        (None, None) => now.div_euclid(DAY),
+    };
+    Some(day * DAY + of_day)
+}
+
+fn milliseconds_of_day(stamp: TimeStamp) -> Option<i64> {
+    let [hour, minutes, seconds] = [stamp.hour(), stamp.minutes(), stamp.seconds()].map(i64::from);
+    let milliseconds = i64::from(stamp.milliseconds());
+    let real = hour < 24 && minutes < 60 && seconds < 60 && milliseconds < 1000;
+    real.then_some(((hour * 60 + minutes) * 60 + seconds) * 1000 + milliseconds)
+}
+
+/// Days after the first of January 1970.
+fn day_of(stamp: DateStamp) -> Option<i64> {
+    let date = Date {
+        year: 2000 + u64::from(stamp.year()),
+        month: stamp.month().into(),
+        day: stamp.day().into(),
+    };
+    date.days_after_1970()
+        .and_then(|days| i64::try_from(days).ok())
+}
+
+/// The day closest to now with this number within its month; today if there is none.
+fn nearest_day(now: i64, of_day: i64, number: u8) -> i64 {
+    let today = now.div_euclid(DAY);
+    // No number is missing in two months on end, so that it is among these.
+    (today - 61..=today + 61)
+        .filter(|&day| date_on(day).is_some_and(|date| date.day == u64::from(number)))
+        .min_by_key(|&day| (day * DAY + of_day).abs_diff(now))
+        .unwrap_or(today)
+}
+
+fn date_on(day: i64) -> Option<Date> {
+    u64::try_from(day).ok().map(Date::after_1970)
+}
+
+fn time_stamp(now: i64) -> Option<TimeStamp> {
+    let of_day = now.rem_euclid(DAY);
+    let part = |value: i64| u8::try_from(value).ok();
+    let day = date_on(now.div_euclid(DAY))?.day;
+    let stamp = TimeStamp::default()
+        .with_day(u8::try_from(day).ok()?)
+        .ok()?;
+    let stamp = stamp.with_hour(part(of_day / 3_600_000)?).ok()?;
+    let stamp = stamp.with_minutes(part(of_day / 60_000 % 60)?).ok()?;
+    let stamp = stamp.with_seconds(part(of_day / 1000 % 60)?).ok()?;
+    let milliseconds = u16::try_from(of_day % 1000).ok()?;
+    stamp.with_milliseconds(milliseconds).ok()
+}
+
+/// `None` before 2000 and after 2127, which the field cannot say.
+fn date_stamp(now: i64) -> Option<DateStamp> {
+    let date = date_on(now.div_euclid(DAY))?;
+    let stamp = DateStamp::default();
+    let stamp = stamp.with_day(u8::try_from(date.day).ok()?).ok()?;
+    let stamp = stamp.with_month(u8::try_from(date.month).ok()?).ok()?;
+    let year = u8::try_from(date.year.checked_sub(2000)?).ok()?;
+    stamp.with_year(year).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use super::*;
+    use crate::service::State;
+    use crate::service::rig::{CLIENT, Rig, STRANGER};
+
+    /// 2024-02-28 23:59:58.250.
+    const BEFORE_MIDNIGHT: u64 = 1_709_164_798_250;
+
+    /// A component whose clock shows so many milliseconds.
+    fn rig(milliseconds: u64) -> (Rig, Arc<AtomicU64>) {
+        let clock = Arc::new(AtomicU64::new(milliseconds));
+        let read = clock.clone();
+        let time = Time::new(move || Duration::from_millis(read.load(Ordering::Relaxed)));
+        (Rig::new(vec![Box::new(time)]), clock)
+    }
+
+    fn at(day: u8, hour: u8, minutes: u8) -> TimeStamp {
+        let stamp = TimeStamp::default().with_day(day).unwrap_or_default();
+        let stamp = stamp.with_hour(hour).unwrap();
+        stamp.with_minutes(minutes).unwrap()
+    }
+
+    fn on(year: u8, month: u8, day: u8) -> DateStamp {
+        let stamp = DateStamp::default().with_year(year).unwrap();
+        stamp.with_month(month).unwrap().with_day(day).unwrap()
+    }
+
+    fn set(time_stamp: Option<TimeStamp>, date_stamp: Option<DateStamp>) -> SetTime {
+        SetTime {
+            time_stamp,
+            date_stamp,
+        }
+    }
+
+    fn shown(rig: &mut Rig) -> (DateStamp, TimeStamp) {
+        let query = QueryTime { presence_vector: 3 };
+        let report: ReportTime = rig.ask(&query).unwrap();
+        (report.date_stamp.unwrap(), report.time_stamp.unwrap())
+    }
+
+    #[test]
+    fn the_time_is_the_clocks() {
+        let (mut rig, clock) = rig(BEFORE_MIDNIGHT);
+        let (date, time) = shown(&mut rig);
+        assert_eq!(date, on(24, 2, 28));
+        assert_eq!((time.day(), time.hour(), time.minutes()), (28, 23, 59));
+        assert_eq!((time.seconds(), time.milliseconds()), (58, 250));
+        clock.fetch_add(2000, Ordering::Relaxed);
+        let (date, time) = shown(&mut rig);
+        assert_eq!((date, time.day(), time.hour()), (on(24, 2, 29), 29, 0));
+    }
+
+    #[test]
+    fn a_report_has_what_was_asked_for_and_nothing_else() {
+        let (mut rig, _) = rig(BEFORE_MIDNIGHT);
+        for presence_vector in 0..=4 {
+            let report: ReportTime = rig.ask(&QueryTime { presence_vector }).unwrap();
+            assert_eq!(report.time_stamp.is_some(), presence_vector & 1 != 0);
+            assert_eq!(report.date_stamp.is_some(), presence_vector & 2 != 0);
+        }
+    }
+
+    #[test]
+    fn the_client_in_control_sets_the_time_and_it_goes_on_from_there() {
+        let (mut rig, clock) = rig(BEFORE_MIDNIGHT);
+        rig.stand(State::Standby, Some(CLIENT));
+        rig.send(CLIENT, &set(Some(at(1, 12, 30)), Some(on(30, 12, 1))));
+        assert!(rig.changed.contains(&QueryTime::CODE));
+        assert_eq!(shown(&mut rig), (on(30, 12, 1), at(1, 12, 30)));
+        clock.fetch_add(60_000, Ordering::Relaxed);
+        assert_eq!(shown(&mut rig), (on(30, 12, 1), at(1, 12, 31)));
+    }
+
+    #[test]
+    fn nobody_else_sets_it() {
+        let (mut rig, _) = rig(BEFORE_MIDNIGHT);
+        let before = shown(&mut rig);
+        rig.send(STRANGER, &set(None, Some(on(30, 12, 1))));
+        rig.stand(State::Ready, None);
+        rig.send(CLIENT, &set(None, Some(on(30, 12, 1))));
+        assert_eq!(shown(&mut rig), before);
+        assert!(rig.changed.is_empty());
+    }
+
+    #[test]
+    fn a_time_without_a_date_is_on_the_nearest_such_day() {
+        for (stamp, date) in [
+            (at(29, 0, 0), on(24, 2, 29)),
+            (at(28, 0, 0), on(24, 2, 28)),
+            (at(1, 0, 0), on(24, 3, 1)),
+            (at(31, 0, 0), on(24, 1, 31)),
+            // No day at all: today.
+            (at(0, 0, 0), on(24, 2, 28)),
+        ] {
+            let (mut rig, _) = rig(BEFORE_MIDNIGHT);
+            rig.send(CLIENT, &set(Some(stamp), None));
+            assert_eq!(shown(&mut rig).0, date, "{stamp:?}");
+        }
+    }
+
+    #[test]
+    fn a_date_without_a_time_leaves_the_time_of_day() {
+        let (mut rig, _) = rig(BEFORE_MIDNIGHT);
+        rig.send(CLIENT, &set(None, Some(on(127, 12, 31))));
+        let (date, time) = shown(&mut rig);
+        assert_eq!((date, time.hour()), (on(127, 12, 31), 23));
+    }
+
+    #[test]
+    fn what_is_no_time_is_ignored() {
+        let (mut rig, _) = rig(BEFORE_MIDNIGHT);
+        let before = shown(&mut rig);
+        for void in [
+            set(None, Some(on(23, 2, 29))),
+            set(None, Some(DateStamp(0))),
+            set(Some(TimeStamp(u32::MAX)), Some(on(30, 1, 1))),
+            set(None, None),
+        ] {
+            rig.send(CLIENT, &void);
+            assert_eq!(shown(&mut rig), before, "{void:?}");
+        }
+    }
+}
