@@ -1,24 +1,30 @@
-//! An operator that finds whoever tells a speed, and asks once. Start `cargo run --example rover`
-//! in another terminal, before or after.
+//! Takes control of `cargo run --example driver`, makes it ready, drives for a moment, and gives
+//! control back, which stops it.
+
+use std::time::Duration;
 
 use jaus::component::{Component, Kind};
-use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
 use jaus::node::{Config, Node};
 
 #[tokio::main(flavor = "current_thread")]
 async fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let node = Node::start(Config::loopback(42, 1))?;
+    let node = Node::start(Config::loopback(43, 1))?;
     let operator = Component::builder(Kind::OperatorControlUnit, "Operator").attach(&node, 1)?;
 
-    let sensor = operator.find(velocity_state_sensor::URN).await?;
-    let query = QueryVelocityState {
-        presence_vector: 0xFFFF,
-    };
-    let report: ReportVelocityState = operator.query(sensor, &query).await?;
-    match report.velocity_x_m_per_s() {
-        Some(speed) => println!("{sensor} drives at {speed:.2} m/s"),
-        None => println!("{sensor} does not know its speed"),
+    let rover = operator.find_version(primitive_driver::LATEST).await?;
+    let control = operator.control(rover, 127).await?;
+    control.resume().await?;
+    println!("{rover} is ready");
+
+    let mut ahead = SetWrenchEffort::default();
+    ahead.set_propulsive_linear_effort_x_percent(40.0)?;
+    let mut beat = tokio::time::interval(Duration::from_millis(100));
+    for _ in 0..10 {
+        beat.tick().await;
+        control.send(&ahead)?; // which fails once control is lost
     }
-    node.shutdown().await;
+    control.release().await;
+    println!("{rover} is free again");
     Ok(())
 }

@@ -364,11 +364,14 @@ async fn a_version_that_nobody_offers_is_told_with_the_versions_that_are_there()
         .attach(&start(43), 1)
         .unwrap();
     let older = ServiceId { minor: 1, ..CAMERA };
-    let found = within_limit(operator.find_version(older, LIMIT)).await;
+    let found = within_limit(operator.find_version(older)).await;
     assert_eq!(found, Ok(rover.id()));
     let newer = ServiceId { minor: 3, ..CAMERA };
     let limit = Duration::from_millis(50);
-    let error = operator.find_version(newer, limit).await.unwrap_err();
+    let error = operator
+        .find_version_within(newer, limit)
+        .await
+        .unwrap_err();
     assert!(matches!(&error, FindError::NotFound { instead, .. } if instead.len() == 1));
     let told = error.to_string();
     assert!(
@@ -377,7 +380,7 @@ async fn a_version_that_nobody_offers_is_told_with_the_versions_that_are_there()
     );
     assert!(told.ends_with("(102.1.1 offers version 1.2)"), "{told}");
     assert!(
-        within_limit(operator.find_version(discovery::LATEST, LIMIT))
+        within_limit(operator.find_version(discovery::LATEST))
             .await
             .is_ok()
     );

@@ -269,7 +269,15 @@ impl Component {
     ///
     /// # Errors
     /// [`FindError`] says how long it was looked for, and who offers other versions.
-    pub async fn find_version(
+    pub async fn find_version(&self, wanted: ServiceId) -> Result<JausId, FindError> {
+        self.find_version_within(wanted, Self::FIND_LIMIT).await
+    }
+
+    /// The same as [`find_version`](Self::find_version), with another limit.
+    ///
+    /// # Errors
+    /// Those of [`find_version`](Self::find_version).
+    pub async fn find_version_within(
         &self,
         wanted: ServiceId,
         limit: Duration,

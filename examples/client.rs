@@ -1,0 +1,26 @@
+//! Finds whoever tells a speed, subscribes to it, and notices when it goes and comes back: end
+//! `cargo run --example sensor`, and start it again.
+
+use jaus::component::{Component, Kind, Update, When};
+use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::node::{Config, Node};
+
+#[tokio::main(flavor = "current_thread")]
+async fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let node = Node::start(Config::loopback(42, 1))?;
+    let client = Component::builder(Kind::OperatorControlUnit, "Client").attach(&node, 1)?;
+
+    let sensor = client.find(velocity_state_sensor::URN).await?;
+    let query = QueryVelocityState { presence_vector: 1 };
+    let mut speeds = client
+        .subscribe::<ReportVelocityState, _>(sensor, &query, When::hz(5.0))
+        .await?;
+    while let Some(update) = speeds.next().await {
+        match update {
+            Update::Up => println!("{sensor} reports its speed at {:.1?} Hz", speeds.hz()),
+            Update::Report(report) => println!("{:.2?} m/s", report.velocity_x_m_per_s()),
+            Update::Down { why, .. } => println!("{sensor} is down: {why}"),
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,40 @@
+//! A vehicle that can be driven: it obeys the client in control while it is ready, and stops
+//! whenever it may not act. `cargo run --example operator` drives it.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI32, Ordering::Relaxed};
+
+use jaus::component::{Component, Handlers, Kind, Management};
+use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
+use jaus::node::{Config, Node};
+
+#[tokio::main(flavor = "current_thread")]
+async fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let node = Node::start(Config::loopback(102, 1))?;
+    // What the motor is driven with, in percent.
+    let motor = Arc::new(AtomicI32::new(0));
+    let throttle = motor.clone();
+    let driver = Handlers::new(primitive_driver::LATEST).command(
+        move |effort: SetWrenchEffort, from, _context| {
+            let ahead = effort.propulsive_linear_effort_x_percent().unwrap_or(0.0);
+            println!("{} drives with {ahead:.0} %", from.source);
+            throttle.store(ahead as i32, Relaxed);
+        },
+    );
+
+    let rover = Component::builder(Kind::Vehicle, "Rover")
+        .offer(driver)
+        .management(Management::new())
+        .attach(&node, 33)?;
+    println!("{} is up; Ctrl-C ends it", rover.id());
+
+    let mut standing = rover.watch_standing();
+    while standing.changed().await.is_ok() {
+        let now = rover.standing();
+        if !now.may_act() {
+            motor.store(0, Relaxed);
+        }
+        println!("{} now, controlled by {:?}", now.state, now.controller);
+    }
+    Ok(())
+}

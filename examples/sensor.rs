@@ -1,0 +1,29 @@
+//! A vehicle that tells its speed to whoever asks or subscribes, until Ctrl-C.
+//! `cargo run --example client` listens to it.
+
+use jaus::component::{Component, Handlers, Kind};
+use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState};
+use jaus::messages::mobility::{report_velocity_state::VelocityX, velocity_state_sensor};
+use jaus::node::{Config, Node};
+
+#[tokio::main(flavor = "current_thread")]
+async fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let node = Node::start(Config::loopback(101, 1))?;
+
+    let mut time = 0.0_f64;
+    let speedometer =
+        Handlers::new(velocity_state_sensor::LATEST).answer(move |_: QueryVelocityState| {
+            // Here a real one would read its sensor.
+            time += 0.1;
+            ReportVelocityState {
+                velocity_x: VelocityX::new(1.5 + time.sin()).ok(),
+                ..ReportVelocityState::default()
+            }
+        });
+
+    let rover = Component::builder(Kind::Vehicle, "Rover")
+        .offer(speedometer)
+        .attach(&node, 33)?;
+    println!("{} is up; Ctrl-C ends it", rover.id());
+    Ok(tokio::signal::ctrl_c().await?)
+}
