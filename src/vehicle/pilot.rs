@@ -133,7 +133,7 @@ impl Pilot {
         self.tickets += 1;
         let ticket = Ticket(self.tickets);
         let ahead = match &goal {
-            Goal::Path { curve, .. } => curve.points(),
+            Goal::Path { curve, .. } => self.ahead_on(curve),
             _ => Vec::new(),
         };
         self.course = Some(Course {
@@ -145,6 +145,19 @@ impl Pilot {
             straight: self.motion().pose.yaw,
         });
         ticket
+    }
+
+    /// The points of a curve from the one on that is nearest.
+    fn ahead_on(&self, curve: &Curve) -> Vec<(f64, f64)> {
+        let pose = self.motion().pose;
+        let distance = |&(x, y): &(f64, f64)| pose.distance(x, y);
+        let mut points = curve.points();
+        let nearest = points.iter().enumerate();
+        let nearest = nearest.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
+        if let Some((index, _)) = nearest {
+            points.drain(..index);
+        }
+        points
     }
 
     /// Gives up whatever goal there is, and stops.
@@ -238,6 +251,12 @@ impl Pilot {
     /// Narrows the limits; the platform's own hold in any case.
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits = limits.and(&self.platform.limits());
+        self.platform.set_limits(self.limits);
+    }
+
+    /// Goes back to the platform's own limits.
+    pub fn reset_limits(&mut self) {
+        self.set_limits(self.platform.limits());
     }
 
     /// Whether it stands still, and wants to.

@@ -25,6 +25,9 @@ pub trait Platform: Send {
 
     /// What it can do at most.
     fn limits(&self) -> Limits;
+
+    /// From now on it keeps these limits, none of which is wider than its own.
+    fn set_limits(&mut self, limits: Limits);
 }
 
 /// What a platform is to do.

@@ -34,6 +34,8 @@ impl Default for SkidSteerConfig {
 #[derive(Debug, Clone)]
 pub struct SkidSteer {
     config: SkidSteerConfig,
+    /// What it keeps to; at most what the configuration allows.
+    limits: Limits,
     command: Drive,
     motion: Motion,
     /// Speed and yaw rate of the wheels; the vehicle's own are these and the slip.
@@ -56,6 +58,7 @@ impl SkidSteer {
     pub fn new(config: SkidSteerConfig) -> Self {
         Self {
             config,
+            limits: config.limits,
             command: Drive::Stop,
             motion: Motion::default(),
             wheels: (0.0, 0.0),
@@ -66,7 +69,7 @@ impl SkidSteer {
     }
 
     fn step(&mut self, seconds: f64) {
-        let limits = &self.config.limits;
+        let limits = &self.limits;
         let (speed, turn) = self.wheels;
         let (speed, turn) = match self.command {
             Drive::Stop => (
@@ -89,7 +92,7 @@ impl SkidSteer {
 
     /// A speed closer to the one that is wanted; slowing down is quicker than getting faster.
     fn towards(&self, speed: f64, wanted: f64, seconds: f64) -> f64 {
-        let limits = &self.config.limits;
+        let limits = &self.limits;
         let slows = wanted.abs() < speed.abs() || wanted * speed < 0.0;
         let (goal, rate) = if slows {
             let goal = if wanted * speed < 0.0 { 0.0 } else { wanted };
@@ -102,16 +105,17 @@ impl SkidSteer {
 
     /// Speed and yaw rate after a moment of effort, drag and brakes.
     fn push(&self, effort: Effort, seconds: f64) -> (f64, f64) {
-        let limits = &self.config.limits;
+        let limits = &self.limits;
         let (speed, turn) = self.wheels;
         let top = if speed < 0.0 {
             limits.reverse
         } else {
             limits.speed
         };
+        // Narrowed limits may be 0.
+        let (top, fastest) = (top.max(LEAST), limits.yaw_rate.max(LEAST));
         let drive = limits.acceleration * (effort.forward.clamp(-1.0, 1.0) - speed / top);
-        let twist =
-            limits.yaw_acceleration * (effort.turn.clamp(-1.0, 1.0) - turn / limits.yaw_rate);
+        let twist = limits.yaw_acceleration * (effort.turn.clamp(-1.0, 1.0) - turn / fastest);
         let brake = limits.deceleration * effort.brake.clamp(0.0, 1.0);
         let turn_brake = limits.yaw_acceleration * effort.turn_brake.clamp(0.0, 1.0);
         let pushed = limits.clamp(Velocity::forward(
@@ -137,6 +141,7 @@ impl SkidSteer {
     }
 
     fn integrate(&mut self, seconds: f64) {
+        // Not the narrowed ones, which a moving vehicle only comes down to.
         let limits = &self.config.limits;
         let before = self.motion.velocity;
         let (speed, turn) = self.wheels;
@@ -191,7 +196,14 @@ impl Platform for SkidSteer {
     fn limits(&self) -> Limits {
         self.config.limits
     }
+
+    fn set_limits(&mut self, limits: Limits) {
+        self.limits = limits.and(&self.config.limits);
+    }
 }
+
+/// A velocity next to none.
+const LEAST: f64 = 1e-6;
 
 /// A value closer to a goal by at most `most`.
 fn approach(value: f64, goal: f64, most: f64) -> f64 {

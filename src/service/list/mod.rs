@@ -69,7 +69,16 @@ impl Elements {
             Ok(_) => Err(ResponseCode::UNSPECIFIED_ERROR),
             Err(_) => Err(ResponseCode::UNSUPPORTED_ELEMENT_TYPE),
         };
-        self.lock().kinds.insert(M::CODE, Box::new(check));
+        self.accept_code(M::CODE, check);
+    }
+
+    /// Elements that hold a message with this code are welcome if the check of its octets says so.
+    pub fn accept_code(
+        &self,
+        code: u16,
+        check: impl Fn(&Bytes) -> Result<(), ResponseCode> + Send + 'static,
+    ) {
+        self.lock().kinds.insert(code, Box::new(check));
     }
 
     /// The element with a number, if it is in the list; 0 stands for the first one.

@@ -27,12 +27,16 @@ mod global_pose_sensor;
 mod global_waypoint;
 mod local_pose_sensor;
 mod local_waypoint;
+mod path_segment;
+mod path_segment_driver;
 mod place;
 mod primitive_driver;
 #[cfg(test)]
 mod tests;
 mod travel;
+mod vector_driver;
 mod vehicle;
+mod velocity_state_driver;
 mod velocity_state_sensor;
 mod wanted;
 mod waypoint_driver;

@@ -7,6 +7,7 @@ use bytes::Bytes;
 use super::exchange::Exchange;
 use super::global_waypoint::{Global, GlobalWaypoint};
 use super::local_waypoint::{Local, LocalWaypoint};
+use super::path_segment::{self, PathSegment};
 use crate::codec::{Message, ServiceId};
 use crate::messages::core::set_element::ElementRec;
 use crate::service::{Handled, code_of};
@@ -17,6 +18,8 @@ use crate::vehicle::{Frame, Goal, Pose, Waypoint};
 pub(super) enum Place {
     Local(LocalWaypoint),
     Global(GlobalWaypoint),
+    LocalPath(PathSegment),
+    GlobalPath(PathSegment),
 }
 
 /// One kind of waypoints, and the services that drive to them.
@@ -53,7 +56,9 @@ impl Place {
     pub(super) fn of(element: &ElementRec) -> Option<Self> {
         let octets = &element.element_data.data;
         let code = code_of(octets)?;
-        Local::place(code, octets).or_else(|| Global::place(code, octets))
+        Local::place(code, octets)
+            .or_else(|| Global::place(code, octets))
+            .or_else(|| path_segment::place(code, octets))
     }
 
     /// Whether it can be reached, as far as it can be told without knowing where on the globe the
@@ -61,17 +66,49 @@ impl Place {
     pub(super) fn is_in_reach(&self) -> bool {
         match self {
             Self::Local(waypoint) => in_reach(&waypoint.waypoint()),
-            Self::Global(_) => true,
+            Self::LocalPath(path) => in_reach(&path.waypoint()),
+            Self::Global(_) | Self::GlobalPath(_) => true,
         }
     }
 
-    /// What to pursue to get there; `None` if it is out of reach.
-    pub(super) fn goal(&self, frame: &Frame, speed: f64, goes_on: bool) -> Option<Goal> {
-        let to = match self {
+    /// What to pursue to get there from a start; `None` if it is out of reach.
+    pub(super) fn goal(
+        &self,
+        frame: &Frame,
+        start: (f64, f64),
+        speed: f64,
+        goes_on: bool,
+    ) -> Option<Goal> {
+        let to = self.waypoint(frame);
+        let goal = match self.path(frame) {
+            Some(path) => Goal::Path {
+                curve: path.curve(start),
+                speed,
+                tolerance: to.tolerance,
+                goes_on,
+            },
+            None => Goal::Waypoint { to, speed, goes_on },
+        };
+        in_reach(&to).then_some(goal)
+    }
+
+    /// Where it is in the local frame, or where it ends.
+    pub(super) fn waypoint(&self, frame: &Frame) -> Waypoint {
+        match self {
             Self::Local(waypoint) => waypoint.waypoint(),
             Self::Global(waypoint) => waypoint.waypoint(frame),
-        };
-        in_reach(&to).then_some(Goal::Waypoint { to, speed, goes_on })
+            Self::LocalPath(path) => path.waypoint(),
+            Self::GlobalPath(path) => path.in_frame(frame).waypoint(),
+        }
+    }
+
+    /// The way to it in the local frame, if that is given.
+    fn path(&self, frame: &Frame) -> Option<PathSegment> {
+        match self {
+            Self::LocalPath(path) => Some(*path),
+            Self::GlobalPath(path) => Some(path.in_frame(frame)),
+            Self::Local(_) | Self::Global(_) => None,
+        }
     }
 }
 

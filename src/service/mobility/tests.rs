@@ -1,7 +1,9 @@
 //! The mobility services on a simulated vehicle, under virtual time.
 
 mod lists;
+mod paths;
 mod sensors;
+mod velocities;
 mod waypoints;
 
 use std::time::Duration;
@@ -37,6 +39,11 @@ fn rig() -> (Rig, Vehicle) {
         Box::new(vehicle.list_manager()),
         Box::new(vehicle.local_waypoint_list_driver()),
         Box::new(vehicle.global_waypoint_list_driver()),
+        Box::new(vehicle.velocity_state_driver()),
+        Box::new(vehicle.local_vector_driver()),
+        Box::new(vehicle.global_vector_driver()),
+        Box::new(vehicle.local_path_segment_driver()),
+        Box::new(vehicle.global_path_segment_driver()),
     ];
     let rig = Rig::new(services);
     // 2015-06-08 01:02:03.004 UTC.

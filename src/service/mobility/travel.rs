@@ -7,12 +7,14 @@ use super::exchange::Exchange;
 use super::place::Place;
 use super::vehicle::Cockpit;
 use crate::codec::Message;
+use crate::messages::core::set_element::ElementRec;
 use crate::messages::mobility::set_travel_speed_ext::{Speed, SpeedSpeedOverGround};
 use crate::messages::mobility::{
-    ExecuteList, ExecuteListExt, QueryActiveElement, QueryGlobalWaypoint, QueryGlobalWaypointExt,
-    QueryLocalWaypoint, QueryLocalWaypointExt, QueryTravelSpeed, QueryTravelSpeedExt,
-    ReportActiveElement, ReportTravelSpeed, ReportTravelSpeedExt, SetTravelSpeed,
-    SetTravelSpeedExt,
+    ExecuteList, ExecuteListExt, QueryActiveElement, QueryGlobalPathSegment,
+    QueryGlobalPathSegmentExt, QueryGlobalWaypoint, QueryGlobalWaypointExt, QueryLocalPathSegment,
+    QueryLocalPathSegmentExt, QueryLocalWaypoint, QueryLocalWaypointExt, QueryTravelSpeed,
+    QueryTravelSpeedExt, ReportActiveElement, ReportTravelSpeed, ReportTravelSpeedExt,
+    SetTravelSpeed, SetTravelSpeedExt,
 };
 use crate::service::{Context, Handled, State};
 use crate::vehicle::Ticket;
@@ -23,6 +25,8 @@ pub(super) struct Travel {
     /// Metres per second, as a client wants it; what the vehicle cannot do it does not.
     speed: f64,
     place: Option<Place>,
+    /// Where the way to the place begins, in the local frame.
+    start: (f64, f64),
     /// The element that is driven to, if a list is worked off.
     active: Option<u16>,
     /// The element after it, 0 if it is the last.
@@ -37,9 +41,17 @@ impl Cockpit {
         self.travel.place.or_else(first)
     }
 
+    /// Whether a place is close enough to be driven to.
+    pub(super) fn can_reach(&self, place: &Place) -> bool {
+        place
+            .goal(self.pilot.frame(), (0.0, 0.0), 0.0, false)
+            .is_some()
+    }
+
     /// Sets the place to drive to, and sets out if there is a speed.
     pub(super) fn set_place(&mut self, place: Place) {
         self.travel.place = Some(place);
+        self.travel.start = self.here();
         self.travel.active = None;
         self.travel.next = 0;
         self.set_out();
@@ -60,19 +72,33 @@ impl Cockpit {
         let Some(element) = self.elements.get(uid) else {
             return false;
         };
-        self.travel.place = Place::of(&element);
+        self.travel.start = self.here();
+        self.begin(&element, speed);
+        true
+    }
+
+    /// Drives to an element of the list.
+    fn begin(&mut self, element: &ElementRec, speed: f64) {
+        self.travel.place = Place::of(element);
         self.travel.active = Some(element.element_uid);
         self.travel.next = element.next_uid;
         self.travel.speed = speed;
         self.set_out();
-        true
+    }
+
+    /// Where the vehicle is, in the local frame.
+    fn here(&self) -> (f64, f64) {
+        let pose = self.pilot.motion().pose;
+        (pose.x, pose.y)
     }
 
     /// Drives to the place if there is a speed, and stops otherwise.
     fn set_out(&mut self) {
-        let Travel { speed, next, .. } = self.travel;
+        let Travel {
+            speed, next, start, ..
+        } = self.travel;
         let place = self.travel.place.filter(|_| speed > 0.0);
-        let goal = place.and_then(|place| place.goal(self.pilot.frame(), speed, next != 0));
+        let goal = place.and_then(|place| place.goal(self.pilot.frame(), start, speed, next != 0));
         if let Some(goal) = goal {
             self.travel.ticket = Some(self.pilot.pursue(goal));
             return;
@@ -111,8 +137,15 @@ impl Cockpit {
             self.set_out();
         } else if self.pilot.has_arrived(ticket) {
             tracing::info!(element = active, next = element.next_uid, "element reached");
-            if element.next_uid == 0 || !self.execute(element.next_uid, self.travel.speed) {
-                self.travel.active = None;
+            // The next way begins where this one should have ended.
+            if let Some(place) = self.travel.place {
+                let end = place.waypoint(self.pilot.frame());
+                self.travel.start = (end.x, end.y);
+            }
+            let next = self.elements.get(element.next_uid);
+            match next.filter(|_| element.next_uid != 0) {
+                Some(next) => self.begin(&next, self.travel.speed),
+                None => self.travel.active = None,
             }
             changed(context);
         }
@@ -139,6 +172,10 @@ pub(super) fn changed(context: &mut Context<'_>) {
     context.changed::<QueryLocalWaypointExt>();
     context.changed::<QueryGlobalWaypoint>();
     context.changed::<QueryGlobalWaypointExt>();
+    context.changed::<QueryLocalPathSegment>();
+    context.changed::<QueryLocalPathSegmentExt>();
+    context.changed::<QueryGlobalPathSegment>();
+    context.changed::<QueryGlobalPathSegmentExt>();
 }
 
 /// What drivers to a single place do with messages about the travel speed.
@@ -234,7 +271,7 @@ fn execute(uid: Option<u16>, speed: f64, exchange: &mut Exchange<'_, '_>) {
 
 /// A speed over ground. Through still air that is also the one relative to the medium; rotations
 /// are no speed of this vehicle, and it does not travel backwards.
-fn metres_per_second(speed: Speed) -> Option<f64> {
+pub(super) fn metres_per_second(speed: Speed) -> Option<f64> {
     let speed = match speed {
         Speed::SpeedOverGround(speed) => speed.value(),
         Speed::SpeedRelativeToMedium(speed) => speed.value(),

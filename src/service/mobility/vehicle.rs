@@ -10,8 +10,11 @@ use super::global_pose_sensor::GlobalPoseSensor;
 use super::global_waypoint::Global;
 use super::local_pose_sensor::LocalPoseSensor;
 use super::local_waypoint::Local;
+use super::path_segment_driver::{GlobalPathSegmentDriver, LocalPathSegmentDriver};
 use super::primitive_driver::PrimitiveDriver;
 use super::travel::Travel;
+use super::vector_driver::{GlobalVectorDriver, LocalVectorDriver};
+use super::velocity_state_driver::VelocityStateDriver;
 use super::velocity_state_sensor::VelocityStateSensor;
 use super::waypoint_driver::WaypointDriver;
 use super::waypoint_list_driver::WaypointListDriver;
@@ -136,6 +139,38 @@ impl Vehicle {
     #[must_use]
     pub fn global_waypoint_list_driver(&self) -> OnVehicle {
         self.service(WaypointListDriver::<Global>::on(&self.elements()))
+    }
+
+    /// Velocity State Driver: keeps a velocity.
+    #[must_use]
+    pub fn velocity_state_driver(&self) -> OnVehicle {
+        self.service(VelocityStateDriver::default())
+    }
+
+    /// Local Vector Driver: keeps a speed and a heading in the local frame.
+    #[must_use]
+    pub fn local_vector_driver(&self) -> OnVehicle {
+        self.service(LocalVectorDriver::default())
+    }
+
+    /// Global Vector Driver: keeps a speed and a heading on the globe.
+    #[must_use]
+    pub fn global_vector_driver(&self) -> OnVehicle {
+        self.service(GlobalVectorDriver::default())
+    }
+
+    /// Local Path Segment Driver: drives along curves in the local frame, one after the other.
+    /// Needs the [`list_manager`](Self::list_manager) beside it.
+    #[must_use]
+    pub fn local_path_segment_driver(&self) -> OnVehicle {
+        self.service(LocalPathSegmentDriver::on(&self.elements()))
+    }
+
+    /// Global Path Segment Driver: drives along curves on the globe, one after the other. Needs
+    /// the [`list_manager`](Self::list_manager) beside it.
+    #[must_use]
+    pub fn global_path_segment_driver(&self) -> OnVehicle {
+        self.service(GlobalPathSegmentDriver::on(&self.elements()))
     }
 
     fn elements(&self) -> Elements {

@@ -50,8 +50,7 @@ fn set(place: Option<Place>, exchange: &mut Exchange<'_, '_>) {
         return;
     };
     let source = exchange.message.source;
-    let frame = exchange.cockpit.pilot.frame();
-    if place.goal(frame, 0.0, false).is_none() {
+    if !exchange.cockpit.can_reach(&place) {
         tracing::warn!(%source, ?place, "waypoint ignored: it is out of reach");
         return;
     }
