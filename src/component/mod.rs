@@ -49,8 +49,9 @@ mod watch;
 
 pub use crate::service::{
     AccessControl, CannotSubscribe, Change, Condition, ControlLost, ControlRefused, Directory,
-    Handlers, Identification, Kind, Level, Liveness, Loss, Management, Offer, Outage, Patience,
-    Rejection, Scope, Service, Standing, State, SubscriptionEnd, Time, Timing, When,
+    EventSettings, Handlers, Identification, Kind, Level, Liveness, Loss, Management, Offer,
+    Outage, Patience, Rejection, Scope, Service, Standing, State, SubscriptionEnd, Time, Timing,
+    When,
 };
 pub use builder::{AttachError, Builder};
 pub use control::Control;
