@@ -162,8 +162,8 @@ fn a_wrong_flag_is_refused_with_what_would_be_right() {
         (&["judge"][..], "ADDRESS"),
         (&["judge", "105.1.255"], "only one component"),
         (
-            &["judge", "105.1.1", "--only", "C1"],
-            "write A1 to A6 or B1 to B36",
+            &["judge", "105.1.1", "--only", "D1"],
+            "write A1 to A6, B1 to B36 or C1 to C5",
         ),
         (
             &["judge", "105.1.1", "--service", "Livness"],
@@ -215,7 +215,7 @@ fn a_service_is_walked_through_by_its_definition() {
 #[test]
 fn the_steps_can_be_listed_without_a_network() {
     let run = run(&["judge", "--list"], b"");
-    assert_eq!(run.stdout.lines().count(), 42);
+    assert_eq!(run.stdout.lines().count(), 47);
     assert!(
         run.stdout
             .starts_with("A1   Transport discovery  (Discovery)\n"),

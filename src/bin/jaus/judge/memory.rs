@@ -24,6 +24,8 @@ pub(super) struct Memory {
     pub(super) time: Option<u32>,
     /// What the service that is walked through reported last, by code.
     pub(super) reports: BTreeMap<u16, Json>,
+    /// The last velocity along X, in metres a second.
+    pub(super) speed: Option<f64>,
     /// How many waypoints of the drive have been reached, in their order.
     pub(super) reached: usize,
 }
@@ -38,6 +40,7 @@ impl Memory {
             position: None,
             time: None,
             reports: BTreeMap::new(),
+            speed: None,
             reached: 0,
         }
     }

@@ -40,13 +40,15 @@ const MAIN: JausId = JausId::new(42, 1, 1);
 /// Judge whether a component does what the public JAUS contests ask of it
 ///
 /// Part A are the six tasks of the 2010 challenge, part B the 36 steps of the interface tasks since
-/// 2014, as their judging tool was seen to ask them. Five components of the judge ask, subscribe,
+/// 2014, as their judging tool was seen to ask them, and part C what their judges look for besides:
+/// that a vehicle moves for nobody but who is in control, and stops. Five components of the judge ask, subscribe,
 /// take control from one another and declare emergencies; --id moves the first of them, and the
 /// other four, 1 to 4, are on the node beside it. Every step is judged by the answers that the
 /// standard requires, within the time limit. Steps that need a service which the component does not
 /// list are skipped, and counted. What is said by multicast goes to all components of the node.
 ///
-/// THE COMPONENT IS COMMANDED, AND A VEHICLE DRIVES: in task A6 some 9 metres along its X axis.
+/// THE COMPONENT IS COMMANDED, AND A VEHICLE DRIVES: in task A6 some 9 metres along its X axis, and
+/// in part C, which sees to it that it stops, a few more.
 ///
 /// Exit status 1 means that a step failed, that none applied, or that nobody answered.
 #[derive(Args)]
@@ -132,7 +134,9 @@ impl FromStr for Span {
         let is_there = |name| script::steps().iter().any(|step| step.name == name);
         for name in [first, last] {
             if !is_there(name) {
-                return Err(format!("there is no step {name}: A1 to A6, B1 to B36"));
+                return Err(format!(
+                    "there is no step {name}: A1 to A6, B1 to B36, C1 to C5"
+                ));
             }
         }
         if first > last {

@@ -45,6 +45,8 @@ pub(super) enum Part {
     A,
     /// The interface tasks of the challenges since 2014.
     B,
+    /// What the judges look at besides answers: safety.
+    C,
     /// One service's definition.
     S,
 }
@@ -61,6 +63,7 @@ impl fmt::Display for Name {
         let part = match self.part {
             Part::A => 'A',
             Part::B => 'B',
+            Part::C => 'C',
             Part::S => 'S',
         };
         f.pad(&format!("{part}{}", self.number))
@@ -71,11 +74,12 @@ impl FromStr for Name {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no step: write A1 to A6 or B1 to B36");
+        let wrong = || format!("`{text}` is no step: write A1 to A6, B1 to B36 or C1 to C5");
         let (part, number) = text.split_at_checked(1).ok_or_else(wrong)?;
         let part = match part {
             "A" | "a" => Part::A,
             "B" | "b" => Part::B,
+            "C" | "c" => Part::C,
             _ => return Err(wrong()),
         };
         let number = number.parse().map_err(|_| wrong())?;
@@ -276,7 +280,14 @@ impl Step {
         self
     }
 
-    /// Adds something to be said at the end in any case.
+    /// Adds something that is not answered, to be said at the end in any case, before everything
+    /// else that is.
+    pub(super) fn finally(mut self, exchange: Exchange) -> Self {
+        self.afterwards.insert(0, exchange);
+        self
+    }
+
+    /// Adds something that is answered, to be said at the end in any case.
     pub(super) fn afterwards<R: Message>(mut self, from: Speaker, message: impl Message) -> Self {
         let exchange = Exchange::new(from, message);
         let exchange = exchange.expect(from, "", |_: &R, _| Ok(()));

@@ -1,4 +1,4 @@
-//! The script: every step of the two rule books, in order.
+//! The script: every step of the two rule books, in order, and what their judges look at besides.
 //!
 //! The requests and their order are those of the public rules of the 2010 challenge (part A) and
 //! those seen from the judging tool of the 2015 one (part B), whose octets the tests replay. The
@@ -10,6 +10,7 @@ mod control;
 mod drive;
 mod events;
 mod mobility;
+mod safety;
 pub(super) mod service;
 mod specimen;
 
@@ -24,6 +25,7 @@ const LIVENESS: &str = core::liveness::URN;
 const ACCESS_CONTROL: &str = core::access_control::URN;
 const MANAGEMENT: &str = core::management::URN;
 const VELOCITY_STATE_SENSOR: &str = jss::velocity_state_sensor::URN;
+const PRIMITIVE_DRIVER: &str = jss::primitive_driver::URN;
 const LOCAL_POSE_SENSOR: &str = jss::local_pose_sensor::URN;
 const LOCAL_WAYPOINT_DRIVER: &str = jss::local_waypoint_driver::URN;
 const LOCAL_WAYPOINT_LIST_DRIVER: &str = jss::local_waypoint_list_driver::URN;
@@ -42,6 +44,7 @@ pub(super) fn steps() -> Vec<Step> {
         control::steps(),
         mobility::steps(),
         events::observer(),
+        safety::steps(),
     ];
     parts.into_iter().flatten().collect()
 }
@@ -71,7 +74,8 @@ mod tests {
         let names: Vec<_> = steps().iter().map(|step| step.name).collect();
         let a = (1..=6).map(|number| (Part::A, number));
         let b = (1..=36).map(|number| (Part::B, number));
-        let all: Vec<_> = a.chain(b).collect();
+        let c = (1..=5).map(|number| (Part::C, number));
+        let all: Vec<_> = a.chain(b).chain(c).collect();
         assert_eq!(
             names.iter().map(|n| (n.part, n.number)).collect::<Vec<_>>(),
             all
