@@ -43,8 +43,6 @@ pub(super) fn steps() -> Vec<Step> {
 /// Steps 27 to 32.
 fn waypoints() -> Vec<Step> {
     let driver = |number, title| step(Part::B, number, title).needs(&[LOCAL_WAYPOINT_DRIVER]);
-    let list_driver =
-        |number, title| step(Part::B, number, title).needs(&[LOCAL_WAYPOINT_LIST_DRIVER]);
     vec![
         driver(27, "Query Travel Speed before anything is set").ask(
             Main,
@@ -83,7 +81,8 @@ fn waypoints() -> Vec<Step> {
                     equal("the request id", report.request_id, REQUEST)
                 },
             ),
-        list_driver(31, "What is in the list")
+        step(Part::B, 31, "What is in the list")
+            .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_LIST_DRIVER])
             .rests_on(&[30])
             .ask(
                 Main,
