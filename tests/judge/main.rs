@@ -14,4 +14,5 @@ mod cli_support;
 mod papers;
 mod peer;
 mod right;
+mod vehicle;
 mod wrong;

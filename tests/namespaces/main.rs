@@ -13,6 +13,8 @@
 )]
 
 mod hosts;
+#[cfg(feature = "cli")]
+mod judge;
 mod links;
 mod roles;
 

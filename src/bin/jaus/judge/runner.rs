@@ -131,12 +131,20 @@ impl Runner {
             .say(exchange.from, exchange.reach, octets, &self.step)?;
         let expected = exchange.expects.iter().map(|one| self.in_words(one));
         let mut proceeding = Proceeding::of(Some(said), expected.collect());
-        let deadline = start + self.limit;
+        let is_optional = exchange.expects.iter().all(|one| one.is_optional);
+        let patience = if is_optional {
+            OPTIONAL.min(self.limit)
+        } else {
+            self.limit
+        };
+        let deadline = start + patience;
         let mut missing: Vec<&Expectation> = exchange.expects.iter().collect();
         let mut check = Ok(());
         while check.is_ok() && !missing.is_empty() {
             let Some(heard) = self.panel.hear(deadline, &self.step).await? else {
-                check = Err(self.silence(missing[0], &proceeding));
+                if !is_optional {
+                    check = Err(self.silence(missing[0], &proceeding));
+                }
                 break;
             };
             let is_it = |one: &&Expectation| heard.code() == Some(one.code) && heard.to == one.to;
@@ -335,6 +343,8 @@ impl Runner {
     }
 }
 
+/// How long something is waited for that need not come.
+const OPTIONAL: Duration = Duration::from_millis(300);
 /// How long the last commands are given to arrive.
 const TIDYING: Duration = Duration::from_millis(100);
 

@@ -182,6 +182,8 @@ pub(super) struct Expectation {
     /// What it must say, in words.
     pub(super) words: Cow<'static, str>,
     pub(super) check: Look,
+    /// Whether the step goes on if it does not come, which then is waited for less long.
+    pub(super) is_optional: bool,
 }
 
 /// Which event streams are meant: their ids and the codes of the reports in them, as remembered.
@@ -365,6 +367,7 @@ impl Expectation {
             name: R::NAME,
             words: words.into(),
             check: Box::new(check),
+            is_optional: false,
         }
     }
 }

@@ -134,18 +134,29 @@ fn set_elements() -> Exchange {
     )
 }
 
-fn element(uid: u16, [x, y]: [f64; 2]) -> Result<ElementRec, String> {
-    let mut waypoint = SetLocalWaypoint::default();
-    let set = waypoint.set_x_m(x).and_then(|()| waypoint.set_y_m(y));
-    set.map_err(|error| error.to_string())?;
-    let octets = waypoint.encode().map_err(|error| error.to_string())?;
+fn element(uid: u16, position: [f64; 2]) -> Result<ElementRec, String> {
     let is_last = usize::from(uid) == WAYPOINTS.len();
     Ok(ElementRec {
         element_uid: uid,
         previous_uid: uid - 1,
         next_uid: if is_last { 0 } else { uid + 1 },
-        element_data: FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, octets),
+        element_data: element_data(position)?,
     })
+}
+
+/// A waypoint at X and Y, in metres.
+pub(super) fn waypoint([x, y]: [f64; 2]) -> Result<SetLocalWaypoint, String> {
+    let mut waypoint = SetLocalWaypoint::default();
+    let set = waypoint.set_x_m(x).and_then(|()| waypoint.set_y_m(y));
+    set.map_err(|error| error.to_string())?;
+    Ok(waypoint)
+}
+
+/// The same as it stands in a list.
+pub(super) fn element_data(position: [f64; 2]) -> Result<FormattedBlob<ElementDataFormat>, String> {
+    let octets = waypoint(position)?.encode();
+    let octets = octets.map_err(|error| error.to_string())?;
+    Ok(FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, octets))
 }
 
 /// Sets off, from the first element.

@@ -1,8 +1,6 @@
 //! Part B, steps 27 to 35: waypoints, velocity and pose.
 
-use bytes::Bytes;
-use jaus::codec::FormattedBlob;
-use jaus::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
+use jaus::messages::core::set_element::{ElementRec, RequestIdRec};
 use jaus::messages::core::{
     ConfirmElementRequest, QueryElementCount, QueryElementList, ReleaseControl, ReportElementCount,
     ReportElementList, SetElement,
@@ -10,21 +8,19 @@ use jaus::messages::core::{
 use jaus::messages::mobility::{
     QueryActiveElement, QueryLocalWaypoint, QueryTravelSpeed, QueryVelocityState,
     ReportActiveElement, ReportLocalPose, ReportLocalWaypoint, ReportTravelSpeed,
-    ReportVelocityState, SetLocalPose, SetLocalWaypoint,
+    ReportVelocityState, SetLocalPose,
 };
 
 use super::super::memory::Memory;
 use super::super::step::{Check, Exchange, Part, Speaker::Main, Step, equal, near, present, step};
 use super::challenge::{accepted, query_pose, released, request_control};
-use super::drive::{is_waypoint, list_is};
+use super::drive::{element_data, is_waypoint, list_is, waypoint};
 use super::{ACCESS_CONTROL, LOCAL_POSE_SENSOR, LOCAL_WAYPOINT_DRIVER};
 use super::{LOCAL_WAYPOINT_LIST_DRIVER, VELOCITY_STATE_SENSOR};
 
-/// The judging tool's waypoint element: a Set Local Waypoint with X and Y, as it was captured.
-const ELEMENT: [u8; 11] = [
-    0x0D, 0x04, 0x00, 0xFF, 0xFF, 0xFF, 0x0F, 0xFF, 0xFF, 0xFF, 0x0F,
-];
-/// The request id of that element.
+/// The waypoint that is set, X and Y in metres.
+const WAYPOINT: [f64; 2] = [1.0, 1.0];
+/// The request id of the element.
 const REQUEST: u8 = 0x2C;
 /// Where the pose is set to, on both axes, in metres.
 const FAR_AWAY: f64 = -1000.0;
@@ -58,7 +54,7 @@ fn waypoints() -> Vec<Step> {
                 Main,
                 QueryLocalWaypoint { presence_vector: 0 },
                 "X = Y = 1 m",
-                |report: &ReportLocalWaypoint, _| is_waypoint(report, [1.0, 1.0]),
+                |report: &ReportLocalWaypoint, _| is_waypoint(report, WAYPOINT),
             ),
         step(Part::B, 29, "Release Control, and Query Travel Speed")
             .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_DRIVER])
@@ -73,14 +69,7 @@ fn waypoints() -> Vec<Step> {
         step(Part::B, 30, "Set Element")
             .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_LIST_DRIVER])
             .ask(Main, request_control(), "control accepted", accepted)
-            .ask(
-                Main,
-                set_element(),
-                "request 44",
-                |report: &ConfirmElementRequest, _| {
-                    equal("the request id", report.request_id, REQUEST)
-                },
-            ),
+            .act(set_element().into()),
         step(Part::B, 31, "What is in the list")
             .needs(&[ACCESS_CONTROL, LOCAL_WAYPOINT_LIST_DRIVER])
             .rests_on(&[30])
@@ -202,29 +191,25 @@ const fn query_velocity(presence_vector: u16) -> QueryVelocityState {
 }
 
 fn set_waypoint() -> Exchange {
-    Exchange::with(Main, |_| {
-        let mut message = SetLocalWaypoint::default();
-        let set = message.set_x_m(1.0).and_then(|()| message.set_y_m(1.0));
-        set.map_err(|error| error.to_string())?;
-        Ok(message)
-    })
+    Exchange::with(Main, |_| waypoint(WAYPOINT))
 }
 
-fn set_element() -> SetElement {
-    let element = ElementRec {
-        element_uid: 1,
-        element_data: FormattedBlob::new(
-            ElementDataFormat::JAUS_MESSAGE,
-            Bytes::from_static(&ELEMENT),
-        ),
-        ..ElementRec::default()
+fn set_element() -> Exchange {
+    let message = |_: &Memory| {
+        Ok(SetElement {
+            request_id_rec: RequestIdRec {
+                request_id: REQUEST,
+            },
+            element_list: vec![ElementRec {
+                element_uid: 1,
+                element_data: element_data(WAYPOINT)?,
+                ..ElementRec::default()
+            }],
+        })
     };
-    SetElement {
-        request_id_rec: RequestIdRec {
-            request_id: REQUEST,
-        },
-        element_list: vec![element],
-    }
+    Exchange::with(Main, message).expect(Main, "request 44", |report: &ConfirmElementRequest, _| {
+        equal("the request id", report.request_id, REQUEST)
+    })
 }
 
 fn set_far_away() -> Exchange {

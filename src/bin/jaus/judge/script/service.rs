@@ -135,7 +135,20 @@ fn report_of(query: &MessageInfo) -> Option<&'static MessageInfo> {
 }
 
 /// Asks a query in its shortest form.
-fn ask(query: &MessageInfo, check: fn(u16, &Json, &mut Memory) -> Check) -> Option<Act> {
+fn ask(query: &MessageInfo, look: fn(u16, &Json, &mut Memory) -> Check) -> Option<Act> {
+    asked(query, look, false).map(Act::Exchange)
+}
+
+/// The same, but it need not be answered: that is another step's business.
+fn perhaps(query: &MessageInfo, look: fn(u16, &Json, &mut Memory) -> Check) -> Option<Act> {
+    asked(query, look, true).map(Act::Exchange)
+}
+
+fn asked(
+    query: &MessageInfo,
+    look: fn(u16, &Json, &mut Memory) -> Check,
+    is_optional: bool,
+) -> Option<Exchange> {
     let report = report_of(query)?;
     let mut exchange = Exchange::octets(Main, specimen::shortest(query)?);
     exchange.expects.push(Expectation {
@@ -143,9 +156,10 @@ fn ask(query: &MessageInfo, check: fn(u16, &Json, &mut Memory) -> Check) -> Opti
         code: report.code,
         name: report.name,
         words: "as its definition has it".into(),
-        check: Box::new(move |octets, memory| check(report.code, &read(octets)?, memory)),
+        check: Box::new(move |octets, memory| look(report.code, &read(octets)?, memory)),
+        is_optional,
     });
-    Some(exchange.into())
+    Some(exchange)
 }
 
 /// Asks a query without its last octet, if it has a body; and then the whole query, which must be
@@ -164,7 +178,9 @@ fn cut(query: &MessageInfo) -> Vec<Act> {
 
 /// Gives a command without control. The reports before and after must be the same.
 fn without_control(command: &MessageInfo, queries: &[&MessageInfo]) -> Vec<Act> {
-    let before = queries.iter().filter_map(|query| ask(query, takes_report));
+    let before = queries
+        .iter()
+        .filter_map(|query| perhaps(query, takes_report));
     let mut acts: Vec<Act> = before.collect();
     if let Some(octets) = specimen::telling(command) {
         acts.push(Act::Ignored {
@@ -172,7 +188,11 @@ fn without_control(command: &MessageInfo, queries: &[&MessageInfo]) -> Vec<Act> 
             lasting: IGNORED,
         });
     }
-    acts.extend(queries.iter().filter_map(|query| ask(query, is_unchanged)));
+    acts.extend(
+        queries
+            .iter()
+            .filter_map(|query| perhaps(query, is_unchanged)),
+    );
     acts
 }
 
@@ -189,7 +209,8 @@ fn takes_report(code: u16, report: &Json, memory: &mut Memory) -> Check {
 }
 
 fn is_unchanged(code: u16, report: &Json, memory: &mut Memory) -> Check {
-    let before = memory.reports.get(&code).unwrap_or(&Json::Null);
+    // Without a report before there is nothing to compare with.
+    let before = memory.reports.get(&code).unwrap_or(report);
     if is_same(before, report) {
         return Ok(());
     }
