@@ -14,7 +14,7 @@ use jaus::component::{Builder, Component, Kind, Service};
 use jaus::endpoint::Received;
 use jaus::node::Node;
 use jaus::service::mobility::Vehicle;
-use jaus::service::{Context, Handled, Standing};
+use jaus::service::{Context, Handled, Management, Standing};
 use jaus::vehicle::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{MissedTickBehavior, interval};
@@ -201,6 +201,7 @@ impl Simulation {
 /// A component with all that it takes to be driven.
 fn drivable(builder: Builder, vehicle: &Vehicle, news: UnboundedSender<String>) -> Builder {
     builder
+        .management(Management::new())
         .offer(vehicle.list_manager())
         .offer(vehicle.velocity_state_sensor())
         .offer(vehicle.acceleration_state_sensor())
