@@ -19,6 +19,20 @@ use crate::vehicle::{VEHICLE, Vehicle};
 const JUDGED: u16 = 105;
 /// The judge's.
 const JUDGE: u16 = 42;
+/// The services that the contest asked for.
+const CONTEST: [&str; 11] = [
+    "Transport",
+    "Events",
+    "AccessControl",
+    "Management",
+    "Liveness",
+    "Discovery",
+    "LocalWaypointDriver",
+    "LocalWaypointListDriver",
+    "VelocityStateSensor",
+    "LocalPoseSensor",
+    "PrimitiveDriver",
+];
 /// Set to write the files anew, which then are to be read.
 const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
 /// Long enough for a reset, during which the tool waited 1.5 s.
@@ -85,25 +99,39 @@ fn message(dictionary: &Dictionary, frame: &Frame, role: &str) -> Json {
     let mut shown = json!({ role: who.to_string(), "message": line["message"] });
     for key in ["body", "octets", "error"] {
         if let Some(value) = line.get(key) {
-            shown[key] = without_times(value);
+            shown[key] = what_matters(value);
         }
     }
     shown
 }
 
-/// The same without the time of day, which is another one each time.
-fn without_times(value: &Json) -> Json {
+/// The same without the time of day, which is another one each time, and without services that
+/// the contest did not ask for.
+fn what_matters(value: &Json) -> Json {
     match value {
         Json::Object(object) => {
             let member = |(key, value): (&String, &Json)| match key.as_str() {
                 "TimeStamp" => (key.clone(), "…".into()),
-                _ => (key.clone(), without_times(value)),
+                "ServiceList" => (key.clone(), of_the_contest(value)),
+                _ => (key.clone(), what_matters(value)),
             };
             Json::Object(object.iter().map(member).collect())
         }
-        Json::Array(items) => items.iter().map(without_times).collect(),
+        Json::Array(items) => items.iter().map(what_matters).collect(),
         other => other.clone(),
     }
+}
+
+/// A list of services, with those alone that the contest asked for.
+fn of_the_contest(services: &Json) -> Json {
+    let is_asked_for = |service: &&Json| {
+        let name = service["URI"]
+            .as_str()
+            .and_then(|uri| uri.rsplit(':').next());
+        name.is_some_and(|name| CONTEST.contains(&name))
+    };
+    let services = services.as_array().into_iter().flatten();
+    services.filter(is_asked_for).cloned().collect()
 }
 
 #[test]
