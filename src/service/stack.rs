@@ -211,7 +211,7 @@ impl Stack {
         // What is said meanwhile is the answer and goes nowhere; a query changes nothing.
         let out = std::mem::replace(&mut self.out, Outbox::new(id));
         let changed = std::mem::take(&mut self.changed);
-        let discovered = self.discovery.handle_message(now, &message, &mut self.out);
+        let discovered = self.discovery.handle_quoted(now, &message, &mut self.out);
         if discovered == Handled::No
             && self.control.handle_message(now, &message, &mut self.out) == Handled::No
         {
@@ -396,6 +396,7 @@ impl Stack {
                 self.control.forget(id, &mut self.out);
                 self.subscribers.forget(id);
             }
+            self.changed.extend(Discovery::QUERIES);
             self.events.push_back(Event::Change(change));
         }
         self.follow_control(now);

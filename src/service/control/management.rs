@@ -14,6 +14,16 @@ use crate::service::{Handled, Outbox, State};
 /// cleared.
 const MOST_EMERGENCIES: usize = 64;
 
+impl Condition {
+    const fn leads_from(self, state: State) -> State {
+        match (self, state) {
+            (Self::Initialized, State::Initialize | State::Failure) => State::Standby,
+            (Self::Failed, State::Shutdown) | (Self::Initialized, _) => state,
+            (Self::Failed, _) => State::Failure,
+        }
+    }
+}
+
 impl Control {
     pub(super) fn handle_management(
         &mut self,
@@ -41,16 +51,14 @@ impl Control {
         if self.management.is_none() {
             return;
         }
-        match (condition, self.standing.state) {
-            (Condition::Initialized, State::Initialize) => self.standing.state = State::Standby,
-            // Told during an emergency, it still counts afterwards.
-            (Condition::Initialized, State::Emergency) => self.resting = State::Standby,
-            (Condition::Initialized, _)
-            | (Condition::Failed, State::Emergency | State::Shutdown) => {}
-            (Condition::Failed, _) => {
-                self.drop_controller(out);
-                self.standing.state = State::Failure;
-            }
+        // Told during an emergency, it counts afterwards.
+        let state = match &mut self.standing.state {
+            State::Emergency => &mut self.resting,
+            state => state,
+        };
+        *state = condition.leads_from(*state);
+        if *state == State::Failure {
+            self.drop_controller(out);
         }
     }
 

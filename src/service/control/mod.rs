@@ -14,6 +14,8 @@
 //!
 //! # Where sources disagree
 //!
+//! * **During an emergency** the published machines forget that the application has become fit or
+//!   has failed. Here it counts when the emergency is over, for nobody would tell it again.
 //! * **After an emergency** the published machines of 1.1 go back to where they were, so that
 //!   clearing sets a vehicle in motion; others (fkie) go to Standby. We go to Standby: whoever is in
 //!   control must say Resume. Control itself is kept, as 1.1 has it.
@@ -118,9 +120,10 @@ impl Management {
 /// What the application tells about its own state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Condition {
-    /// It has become fit to work; without effect but in [`State::Initialize`].
+    /// It has become fit to work: has done what [`State::Initialize`] is for, or mended what had
+    /// led to [`State::Failure`]. Without effect in other states.
     Initialized,
-    /// Something is broken; without effect in an emergency and while shutting down.
+    /// Something is broken; without effect while shutting down.
     Failed,
 }
 

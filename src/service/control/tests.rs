@@ -82,6 +82,26 @@ impl Rig {
         rig
     }
 
+    /// In a state, under the control of `FIRST` where that can be, with an emergency of `THIRD`
+    /// where one is meant.
+    fn brought_to(state: State) -> Self {
+        let mut rig = Self::new(|stack| stack.management(Management::new().initializes()));
+        if state != State::Initialize {
+            rig.stack.set_condition(rig.now, Condition::Initialized);
+            rig.request(FIRST, 100);
+        }
+        match state {
+            State::Initialize | State::Standby => {}
+            State::Ready => _ = rig.hear(FIRST, &Resume),
+            State::Shutdown => _ = rig.hear(FIRST, &Shutdown),
+            State::Failure => rig.stack.set_condition(rig.now, Condition::Failed),
+            State::Emergency => _ = rig.hear(THIRD, &STOP),
+        }
+        rig.said();
+        assert_eq!(rig.state(), state);
+        rig
+    }
+
     fn state(&self) -> State {
         self.stack.standing().state
     }
@@ -284,6 +304,101 @@ fn shutdown_and_failure_end_control_for_good() {
         assert_eq!(rig.request(FIRST, 255), [refused]);
         rig.hear(FIRST, &Resume);
         assert_eq!(rig.state(), state);
+    }
+}
+
+#[test]
+fn what_the_application_tells_during_an_emergency_counts_afterwards() {
+    for (told, before, after) in [
+        (Condition::Initialized, State::Initialize, State::Standby),
+        (Condition::Failed, State::Initialize, State::Failure),
+        (Condition::Failed, State::Ready, State::Failure),
+        (Condition::Initialized, State::Shutdown, State::Shutdown),
+        (Condition::Failed, State::Shutdown, State::Shutdown),
+        (Condition::Initialized, State::Failure, State::Standby),
+        (Condition::Initialized, State::Ready, State::Standby),
+    ] {
+        let mut rig = Rig::brought_to(before);
+        rig.hear(THIRD, &STOP);
+        rig.stack.set_condition(rig.now, told);
+        assert_eq!(rig.state(), State::Emergency);
+        rig.hear(THIRD, &CLEAR);
+        assert_eq!(rig.state(), after, "{told:?} after {before}");
+    }
+}
+
+#[test]
+fn a_failure_that_is_mended_leads_to_standby() {
+    let mut rig = Rig::brought_to(State::Failure);
+    rig.stack.set_condition(rig.now, Condition::Initialized);
+    assert_eq!(rig.state(), State::Standby);
+    let granted = confirmed(FIRST, Confirmation::CONTROL_ACCEPTED);
+    assert_eq!(rig.request(FIRST, 100), [granted]);
+}
+
+/// What each message of a client leads to, in each state, by who sends it.
+#[test]
+fn every_message_in_every_state_leads_where_the_clause_says_and_nowhere_else() {
+    use State::{Emergency, Failure, Initialize, Ready, Shutdown as Down, Standby as Idle};
+    const ALL: [State; 6] = [Initialize, Ready, Idle, Down, Failure, Emergency];
+    type Send = fn(&mut Rig, JausId);
+    type Leads = fn(State) -> State;
+    let messages: [(&str, Send, Leads, Leads); 6] = [
+        (
+            "Resume",
+            |rig, client| _ = rig.hear(client, &Resume),
+            |state| if state == Idle { Ready } else { state },
+            |state| state,
+        ),
+        (
+            "Standby",
+            |rig, client| _ = rig.hear(client, &Standby),
+            |state| if state == Ready { Idle } else { state },
+            |state| state,
+        ),
+        (
+            "Reset",
+            |rig, client| _ = rig.hear(client, &Reset),
+            |state| match state {
+                Ready | Idle => Initialize,
+                other => other,
+            },
+            |state| state,
+        ),
+        (
+            "Shutdown",
+            |rig, client| _ = rig.hear(client, &Shutdown),
+            |state| match state {
+                Ready | Idle => Down,
+                other => other,
+            },
+            |state| state,
+        ),
+        (
+            "Set Emergency",
+            |rig, client| _ = rig.hear(client, &STOP),
+            |_| Emergency,
+            |_| Emergency,
+        ),
+        (
+            "Clear Emergency",
+            |rig, client| _ = rig.hear(client, &CLEAR),
+            |state| state,
+            |state| state,
+        ),
+    ];
+    for before in ALL {
+        for (message, send, for_controller, for_others) in messages {
+            for (client, leads) in [(FIRST, for_controller), (SECOND, for_others)] {
+                let mut rig = Rig::brought_to(before);
+                send(&mut rig, client);
+                assert_eq!(
+                    rig.state(),
+                    leads(before),
+                    "{message} of {client}, {before}"
+                );
+            }
+        }
     }
 }
 

@@ -21,6 +21,9 @@ const REPORT_LIMIT: usize = 1300;
 impl Discovery {
     /// Whether there is something left of the answers that we may give.
     fn may_answer(&mut self, now: Instant, received: &Received) -> bool {
+        if self.quoted {
+            return true;
+        }
         let source = received.source;
         let may = source.is_unicast() && source != self.own && self.answers.take(now);
         if !may {
@@ -38,8 +41,10 @@ impl Discovery {
         let Some(query) = read::<QueryIdentification>(received) else {
             return;
         };
-        // A call is also news about the caller.
-        self.admit(now, received.source, None);
+        if !self.quoted {
+            // A call is also news about the caller.
+            self.admit(now, received.source, None);
+        }
         let told = match query.query_type.0 {
             1 => self.profile.system(),
             2 => self.profile.identification(Level::Subsystem),

@@ -63,6 +63,8 @@ pub struct Discovery {
     directory: Directory,
     search: Search,
     answers: Budget,
+    /// Whether the query in hand was not sent now, but subscribed to before.
+    quoted: bool,
     changes: VecDeque<Change>,
 }
 
@@ -100,6 +102,15 @@ impl Discovery {
     /// … and then to one in this time.
     const ANSWER_REFILL: std::time::Duration = std::time::Duration::from_millis(10);
 
+    /// The queries whose answers are others when the directory has changed.
+    pub(super) const QUERIES: [u16; 5] = [
+        QueryIdentification::CODE,
+        QueryConfiguration::CODE,
+        QuerySubsystemList::CODE,
+        QueryServices::CODE,
+        QueryServiceList::CODE,
+    ];
+
     /// The discovery of the component `own`, which presents itself as `profile` says.
     #[must_use]
     pub fn new(own: JausId, profile: Profile, scope: Scope, timing: Timing, seed: u64) -> Self {
@@ -114,6 +125,7 @@ impl Discovery {
             directory,
             search: Search::new(scope, timing, seed),
             answers: Budget::new(Self::ANSWER_BURST, Self::ANSWER_REFILL),
+            quoted: false,
             changes: VecDeque::new(),
         }
     }
@@ -173,6 +185,20 @@ impl Discovery {
             _ => return Handled::No,
         }
         Handled::Yes
+    }
+
+    /// A query that a client has subscribed to: it shows nothing about the client now, and has its
+    /// own limits.
+    pub(super) fn handle_quoted(
+        &mut self,
+        now: Instant,
+        query: &Received,
+        out: &mut Outbox,
+    ) -> Handled {
+        self.quoted = true;
+        let handled = self.handle_message(now, query, out);
+        self.quoted = false;
+        handled
     }
 
     pub(super) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {

@@ -13,7 +13,11 @@
 //!   things stand, and need not ask beside.
 //! * Creating what is there already (same client, type and query) changes its rate and confirms the
 //!   same number, so that a client that repeats itself, because an answer got lost or it was
-//!   restarted, does not multiply streams.
+//!   restarted, does not multiply streams. At the same rate a periodic event keeps its beat, and
+//!   nothing comes beside it; an event on change is told again, because a report may have got lost.
+//! * Query Events by number lists that event first, and then the others of the client. JAUS++ looks
+//!   after each of its events with such a query, and takes all that are not in the answer for lost:
+//!   it would create them anew every five seconds, at 1 Hz.
 //! * Events do not expire unless [`EventSettings::timeout`] is set: clients of version 1.0 do not
 //!   know that they could. What is sent to a client that discovery finds gone ends.
 //! * Command events (1.1) are refused as unsupported: no service here tells when a command ends.
@@ -42,6 +46,12 @@ use table::{Kind, Name, Subscription, Table};
 
 const PERIODIC: u8 = 0;
 const EVERY_CHANGE: u8 = 1;
+
+/// The rates that the field of Create Event can say, in hertz.
+const RATES: std::ops::RangeInclusive<f64> = 0.01..=1092.0;
+/// The longest query that can be subscribed to, in octets: each subscription keeps its query, and
+/// the queries of the standards have some dozens.
+const LONGEST_QUERY: usize = 1024;
 
 /// What the component can take on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -179,7 +189,7 @@ impl Events {
             event_id: Some(update.event_id),
             kind: update.event_type.0,
             hertz: update.requested_periodic_rate_hz(),
-            query: update.query_message.clone(),
+            query: own(&update.query_message),
         };
         check(trial, out)
     }
@@ -204,6 +214,16 @@ impl Events {
             QueryEventsVar::AllEventsRec(_) => true,
         };
         let listed = self.table.of(client).filter(|&(id, it)| wanted(id, it));
+        // See "Choices" above.
+        let beside = match which {
+            QueryEventsVar::EventIdRec(one) if self.table.get((client, one.event_id)).is_some() => {
+                Some(one.event_id)
+            }
+            _ => None,
+        };
+        let others = self.table.of(client);
+        let others = others.filter(|&(id, _)| beside.is_some_and(|listed| id != listed));
+        let listed = listed.chain(others);
         let entry = |(event_id, subscription): (u8, &Subscription)| report_events::ReportEventRec {
             event_type: report_events::EventType(type_of(subscription)),
             event_id,
@@ -252,24 +272,29 @@ impl Events {
         };
         let name = (client, id);
         confirm(&trial.request, trial.request_id, name, &subscription, out);
-        send(now, &mut subscription, name, report, out);
-        subscription.next = match kind {
-            Kind::Periodic { period, .. } => Some(now + period),
-            Kind::EveryChange { .. } => None,
-        };
+        let beat = before.filter(|before| is_the_same(before, &subscription));
+        match (kind, beat.and_then(|before| before.next)) {
+            (Kind::Periodic { .. }, Some(next)) => subscription.next = Some(next),
+            (kind, _) => {
+                send(now, &mut subscription, name, report, out);
+                if let Kind::Periodic { period, .. } = kind {
+                    subscription.next = Some(now + period);
+                }
+            }
+        }
         self.table.insert(name, subscription);
     }
 
     /// What the client gets of what it wants.
     fn kind(&self, trial: &Trial) -> Kind {
-        let fastest = self.settings.fastest.max(0.1);
+        let fastest = self.settings.fastest.clamp(*RATES.start(), *RATES.end());
         if trial.kind == EVERY_CHANGE {
             return Kind::EveryChange {
                 pause: Duration::from_secs_f64(1.0 / fastest),
             };
         }
         // At least the smallest step of the field, which `check` has made sure of.
-        let hertz = trial.hertz.clamp(0.01, fastest);
+        let hertz = trial.hertz.clamp(*RATES.start(), fastest);
         Kind::Periodic {
             hertz,
             period: Duration::from_secs_f64(1.0 / hertz),
@@ -365,15 +390,27 @@ fn create(message: &Received, create: &CreateEvent, out: &mut Outbox) -> Outcome
         event_id: None,
         kind: create.event_type.0,
         hertz: create.requested_periodic_rate_hz(),
-        query: create.query_message.clone(),
+        query: own(&create.query_message),
     };
     check(trial, out)
+}
+
+/// A query without the rest of the datagram that it came in. What is too long is cut, and
+/// [refused](check).
+fn own(query: &Bytes) -> Bytes {
+    Bytes::copy_from_slice(&query[..query.len().min(LONGEST_QUERY + 1)])
+}
+
+/// Whether two subscriptions differ only in what the client does not see.
+fn is_the_same(one: &Subscription, other: &Subscription) -> bool {
+    one.kind == other.kind && one.query == other.query
 }
 
 /// Refuses what cannot be, whoever might answer the query.
 fn check(trial: Trial, out: &mut Outbox) -> Outcome {
     let why = match code_of(&trial.query) {
         Some(code) if !is_query(code) => ResponseCode::MESSAGE_NOT_SUPPORTED,
+        Some(_) if trial.query.len() > LONGEST_QUERY => ResponseCode::INVALID_EVENT_SETUP,
         // Nothing comes of events about events.
         Some(QueryEvents::CODE | QueryEventTimeout::CODE) => ResponseCode::MESSAGE_NOT_SUPPORTED,
         Some(_) if trial.kind == EVERY_CHANGE || (trial.kind == PERIODIC && trial.hertz > 0.0) => {

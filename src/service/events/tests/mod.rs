@@ -4,18 +4,19 @@
     reason = "a test begins at some time, and all that follows is virtual"
 )]
 
+mod bounds;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use super::EventSettings;
+use super::{EventSettings, INVALID_EVENT};
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::messages::core::create_event::EventType;
-use crate::messages::core::reject_event_request::ResponseCode;
 use crate::messages::core::*;
 use crate::service::{
     Discovery, Handlers, Kind, Liveness, Management, Profile, Scope, Stack, Timing, Transport,
@@ -217,68 +218,28 @@ fn creating_the_same_again_changes_the_rate_and_not_the_number_of_streams() {
 }
 
 #[test]
-fn what_nobody_could_answer_is_refused() {
-    let rate = |create: CreateEvent, hertz| {
-        let mut create = create;
-        create.set_requested_periodic_rate_hz(hertz).unwrap();
-        create
-    };
-    let query = |octets: &'static [u8]| CreateEvent {
-        query_message: Bytes::from_static(octets),
-        ..periodic(9, 1.0, &QueryStatus)
-    };
-    let kind = |kind| CreateEvent {
-        event_type: EventType(kind),
-        ..periodic(9, 1.0, &QueryStatus)
-    };
-    for (what, create, why) in [
-        (
-            "a report",
-            query(&[0x02, 0x44, 0, 0]),
-            ResponseCode::MESSAGE_NOT_SUPPORTED,
-        ),
-        (
-            "a command",
-            query(&[0x02, 0x00]),
-            ResponseCode::MESSAGE_NOT_SUPPORTED,
-        ),
-        (
-            "an unknown query",
-            query(&[0xFF, 0x2F]),
-            ResponseCode::MESSAGE_NOT_SUPPORTED,
-        ),
-        (
-            "half a query",
-            query(&[0x1A, 0x24]),
-            ResponseCode::MESSAGE_NOT_SUPPORTED,
-        ),
-        (
-            "events",
-            query(&[0xF0, 0x21, 3, 0]),
-            ResponseCode::MESSAGE_NOT_SUPPORTED,
-        ),
-        ("nothing", query(&[]), ResponseCode::INVALID_EVENT_SETUP),
-        (
-            "an unknown type",
-            kind(2),
-            ResponseCode::INVALID_EVENT_SETUP,
-        ),
-        (
-            "no rate",
-            rate(periodic(9, 1.0, &QueryStatus), 0.0),
-            ResponseCode::INVALID_EVENT_SETUP,
-        ),
-    ] {
-        let mut rig = Rig::new();
-        let said = rig.create(CLIENT, &create);
-        let reject: RejectEventRequest = answer(&said);
-        assert_eq!(
-            (reject.request_id, reject.response_code),
-            (9, Some(why)),
-            "{what}"
-        );
-        assert_eq!((said.len(), rig.stack.event_count()), (1, 0), "{what}");
+fn a_renewal_keeps_the_beat_of_a_periodic_event() {
+    let mut rig = Rig::new();
+    rig.create(CLIENT, &periodic(1, 1.0, &QueryHeartbeatPulse));
+    for _renewal in 0..10 {
+        rig.run(Duration::from_millis(300));
+        let said = rig.create(CLIENT, &periodic(1, 1.0, &QueryHeartbeatPulse));
+        assert_eq!(said.len(), 1, "only the confirmation: {said:?}");
+        answer::<ConfirmEventRequest>(&said);
     }
+    let said = rig.run(10 * SECOND);
+    assert!(said.len().abs_diff(10) <= 1, "{} in 10 s", said.len());
+    let event = Event::decode(&said[0].2).unwrap();
+    assert!((2..=3).contains(&event.sequence_number), "{event:?}");
+}
+
+#[test]
+fn a_renewal_tells_again_what_has_not_changed_because_it_may_have_got_lost() {
+    let mut rig = Rig::new();
+    rig.create(CLIENT, &on_change(1));
+    rig.now += SECOND;
+    let said = rig.create(CLIENT, &on_change(1));
+    assert_eq!(events(&said).iter().map(count_in).collect::<Vec<_>>(), [0]);
 }
 
 #[test]
@@ -342,6 +303,26 @@ fn management_announces_its_own_changes() {
 }
 
 #[test]
+fn discovery_announces_what_it_learns() {
+    let mut rig = Rig::new();
+    let services = QueryServices {
+        node_list: Vec::new(),
+    };
+    let services = CreateEvent {
+        event_type: EventType(1),
+        ..periodic(1, 0.0, &services)
+    };
+    rig.create(CLIENT, &services);
+    rig.now += SECOND;
+    rig.stack
+        .offer(rig.now, Box::new(Handlers::new(time::LATEST)));
+    let told = events(&rig.said());
+    let report = ReportServices::decode(&told[0].report_message).unwrap();
+    let text = format!("{report:?}");
+    assert!(text.contains(time::URN), "{text}");
+}
+
+#[test]
 fn an_update_changes_the_rate_of_the_event_that_it_names() {
     let mut rig = Rig::new();
     rig.create(CLIENT, &periodic(1, 1.0, &QueryHeartbeatPulse));
@@ -359,11 +340,7 @@ fn an_update_changes_the_rate_of_the_event_that_it_names() {
     assert!(rig.run(20 * SECOND).len().abs_diff(10) <= 1);
     let said = rig.hear(OTHER, &update);
     let reject: RejectEventRequest = answer(&said);
-    assert_eq!(
-        reject.response_code,
-        Some(super::INVALID_EVENT),
-        "not its event"
-    );
+    assert_eq!(reject.response_code, Some(INVALID_EVENT), "not its event");
 }
 
 #[test]
@@ -384,7 +361,7 @@ fn a_cancelled_event_ends_and_others_go_on() {
             .all(|(_, _, it)| Event::decode(it).unwrap().event_id == 2)
     );
     let reject: RejectEventRequest = answer(&rig.hear(CLIENT, &cancel));
-    assert_eq!(reject.response_code, Some(super::INVALID_EVENT));
+    assert_eq!(reject.response_code, Some(INVALID_EVENT));
 }
 
 #[test]
@@ -397,7 +374,8 @@ fn a_client_is_told_of_its_own_events_by_each_question() {
         ([0, 0x02, 0x22].as_slice(), vec![1]),
         (&[1, 0], vec![1]),
         (&[1, 1], vec![2]),
-        (&[2, 2], vec![2]),
+        // That one, and then the others.
+        (&[2, 2], vec![2, 1]),
         (&[2, 9], vec![]),
         (&[3, 0], vec![1, 2]),
     ] {
@@ -411,83 +389,4 @@ fn a_client_is_told_of_its_own_events_by_each_question() {
             .collect();
         assert_eq!(ids, expected, "{question:?}");
     }
-}
-
-#[test]
-fn what_is_too_fast_is_confirmed_slower() {
-    let mut rig = Rig::new();
-    let said = rig.create(CLIENT, &periodic(1, 1092.0, &QueryHeartbeatPulse));
-    let confirm: ConfirmEventRequest = answer(&said);
-    assert!((confirm.confirmed_periodic_rate_hz() - 250.0).abs() < 0.01);
-    assert!(rig.run(SECOND).len().abs_diff(250) <= 1);
-}
-
-#[test]
-fn ten_thousand_subscriptions_are_bounded_for_one_client_and_for_all() {
-    let mut rig = Rig::new();
-    let refused = |said: &[(JausId, Bytes)]| {
-        said.iter()
-            .filter_map(|(_, octets)| RejectEventRequest::decode(octets).ok())
-            .filter(|it| it.response_code == Some(ResponseCode::CONNECTION_REFUSED))
-            .count()
-    };
-    let element = |i: u16| QueryElement { element_uid: i };
-    let mut count = 0;
-    for i in 0..1000 {
-        count += refused(&rig.create(CLIENT, &periodic(1, 1.0, &element(i))));
-    }
-    assert_eq!((rig.stack.event_count(), count), (256, 744));
-    for i in 0..10_000 {
-        let client = JausId::new(1000 + i / 100, 1, 1 + (i % 100) as u8);
-        count += refused(&rig.create(client, &periodic(1, 1.0, &QueryStatus)));
-    }
-    assert_eq!((rig.stack.event_count(), count), (4096, 744 + 6160));
-    let said = rig.create(OTHER, &periodic(1, 1.0, &QueryStatus));
-    assert_eq!(refused(&said), 1);
-}
-
-#[test]
-fn the_sum_of_all_rates_is_bounded() {
-    let mut rig = Rig::with(EventSettings {
-        reports_per_second: 500.0,
-        ..EventSettings::default()
-    });
-    rig.create(CLIENT, &periodic(1, 250.0, &QueryStatus));
-    rig.create(CLIENT, &periodic(2, 240.0, &QueryControl));
-    let said = rig.create(OTHER, &periodic(3, 20.0, &QueryStatus));
-    let reject: RejectEventRequest = answer(&said);
-    assert_eq!(reject.response_code, Some(ResponseCode::CONNECTION_REFUSED));
-    rig.create(CLIENT, &periodic(4, 1.0, &QueryStatus));
-    let said = rig.create(OTHER, &periodic(5, 20.0, &QueryStatus));
-    assert_eq!(
-        answer::<ConfirmEventRequest>(&said).request_id,
-        5,
-        "there is room again"
-    );
-}
-
-#[test]
-fn events_that_nobody_renews_expire_if_so_wanted() {
-    let mut rig = Rig::with(EventSettings {
-        timeout: 1,
-        ..EventSettings::default()
-    });
-    let timeout: ReportEventTimeout = answer(&rig.hear(CLIENT, &QueryEventTimeout));
-    assert_eq!(timeout.timeout.0, 1);
-    rig.create(CLIENT, &periodic(1, 1.0, &QueryStatus));
-    rig.run(50 * SECOND);
-    let all = QueryEvents::decode(&Bytes::from_static(&[0xF0, 0x21, 3, 0])).unwrap();
-    rig.hear(CLIENT, &all);
-    let said = rig.run(120 * SECOND);
-    let told: Vec<_> = said.iter().map(|(_, to, it)| (*to, it.clone())).collect();
-    assert!(
-        events(&told).len().abs_diff(60) <= 1,
-        "renewed by asking for it"
-    );
-    let confirm: ConfirmEventRequest = answer(&told);
-    assert_eq!(
-        (confirm.request_id, confirm.event_id),
-        (1, 1),
-        "its end is told"
-    );
 }

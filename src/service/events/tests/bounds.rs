@@ -1,0 +1,196 @@
+//! What is refused, and what is limited.
+
+use bytes::Bytes;
+
+use super::{CLIENT, OTHER, Rig, SECOND, answer, events, periodic};
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::messages::core::create_event::EventType;
+use crate::messages::core::reject_event_request::ResponseCode;
+use crate::messages::core::*;
+use crate::service::EventSettings;
+
+#[test]
+fn what_nobody_could_answer_is_refused() {
+    let rate = |create: CreateEvent, hertz| {
+        let mut create = create;
+        create.set_requested_periodic_rate_hz(hertz).unwrap();
+        create
+    };
+    let query = |octets: &'static [u8]| CreateEvent {
+        query_message: Bytes::from_static(octets),
+        ..periodic(9, 1.0, &QueryStatus)
+    };
+    let kind = |kind| CreateEvent {
+        event_type: EventType(kind),
+        ..periodic(9, 1.0, &QueryStatus)
+    };
+    for (what, create, why) in [
+        (
+            "a report",
+            query(&[0x02, 0x44, 0, 0]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "a command",
+            query(&[0x02, 0x00]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "an unknown query",
+            query(&[0xFF, 0x2F]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "half a query",
+            query(&[0x1A, 0x24]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "events",
+            query(&[0xF0, 0x21, 3, 0]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        ("nothing", query(&[]), ResponseCode::INVALID_EVENT_SETUP),
+        (
+            "a query without an end",
+            query(&[0x02; 0x2000]),
+            ResponseCode::MESSAGE_NOT_SUPPORTED,
+        ),
+        (
+            "a long query",
+            query(&[0x22; 0x2000]),
+            ResponseCode::INVALID_EVENT_SETUP,
+        ),
+        (
+            "an unknown type",
+            kind(2),
+            ResponseCode::INVALID_EVENT_SETUP,
+        ),
+        (
+            "no rate",
+            rate(periodic(9, 1.0, &QueryStatus), 0.0),
+            ResponseCode::INVALID_EVENT_SETUP,
+        ),
+    ] {
+        let mut rig = Rig::new();
+        let said = rig.create(CLIENT, &create);
+        let reject: RejectEventRequest = answer(&said);
+        assert_eq!(
+            (reject.request_id, reject.response_code),
+            (9, Some(why)),
+            "{what}"
+        );
+        assert_eq!((said.len(), rig.stack.event_count()), (1, 0), "{what}");
+    }
+}
+
+#[test]
+fn events_on_discovery_do_not_use_up_the_answers_of_others() {
+    let mut rig = Rig::new();
+    let who = QueryIdentification {
+        query_type: 4.into(),
+    };
+    for client in 0..4 {
+        let client = JausId::new(200 + client, 1, 1);
+        rig.create(client, &periodic(1, 250.0, &who));
+    }
+    let said = rig.run(10 * SECOND);
+    assert!(said.len().abs_diff(10_000) <= 10, "{}", said.len());
+    answer::<ReportIdentification>(&rig.hear(OTHER, &who));
+}
+
+#[test]
+fn settings_out_of_all_reason_are_kept_within_what_can_be_told() {
+    for (fastest, expected) in [(f64::INFINITY, 1092.0), (0.0, 0.01)] {
+        let mut rig = Rig::with(EventSettings {
+            fastest,
+            reports_per_second: f64::INFINITY,
+            ..EventSettings::default()
+        });
+        let said = rig.create(CLIENT, &periodic(1, 1092.0, &QueryHeartbeatPulse));
+        let confirm: ConfirmEventRequest = answer(&said);
+        let confirmed = confirm.confirmed_periodic_rate_hz();
+        assert!((confirmed - expected).abs() < 0.01, "{fastest}");
+        rig.run(SECOND);
+    }
+}
+
+#[test]
+fn what_is_too_fast_is_confirmed_slower() {
+    let mut rig = Rig::new();
+    let said = rig.create(CLIENT, &periodic(1, 1092.0, &QueryHeartbeatPulse));
+    let confirm: ConfirmEventRequest = answer(&said);
+    assert!((confirm.confirmed_periodic_rate_hz() - 250.0).abs() < 0.01);
+    assert!(rig.run(SECOND).len().abs_diff(250) <= 1);
+}
+
+#[test]
+fn ten_thousand_subscriptions_are_bounded_for_one_client_and_for_all() {
+    let mut rig = Rig::new();
+    let refused = |said: &[(JausId, Bytes)]| {
+        said.iter()
+            .filter_map(|(_, octets)| RejectEventRequest::decode(octets).ok())
+            .filter(|it| it.response_code == Some(ResponseCode::CONNECTION_REFUSED))
+            .count()
+    };
+    let element = |i: u16| QueryElement { element_uid: i };
+    let mut count = 0;
+    for i in 0..1000 {
+        count += refused(&rig.create(CLIENT, &periodic(1, 1.0, &element(i))));
+    }
+    assert_eq!((rig.stack.event_count(), count), (256, 744));
+    for i in 0..10_000 {
+        let client = JausId::new(1000 + i / 100, 1, 1 + (i % 100) as u8);
+        count += refused(&rig.create(client, &periodic(1, 1.0, &QueryStatus)));
+    }
+    assert_eq!((rig.stack.event_count(), count), (4096, 744 + 6160));
+    let said = rig.create(OTHER, &periodic(1, 1.0, &QueryStatus));
+    assert_eq!(refused(&said), 1);
+}
+
+#[test]
+fn the_sum_of_all_rates_is_bounded() {
+    let mut rig = Rig::with(EventSettings {
+        reports_per_second: 500.0,
+        ..EventSettings::default()
+    });
+    rig.create(CLIENT, &periodic(1, 250.0, &QueryStatus));
+    rig.create(CLIENT, &periodic(2, 240.0, &QueryControl));
+    let said = rig.create(OTHER, &periodic(3, 20.0, &QueryStatus));
+    let reject: RejectEventRequest = answer(&said);
+    assert_eq!(reject.response_code, Some(ResponseCode::CONNECTION_REFUSED));
+    rig.create(CLIENT, &periodic(4, 1.0, &QueryStatus));
+    let said = rig.create(OTHER, &periodic(5, 20.0, &QueryStatus));
+    assert_eq!(
+        answer::<ConfirmEventRequest>(&said).request_id,
+        5,
+        "there is room again"
+    );
+}
+
+#[test]
+fn events_that_nobody_renews_expire_if_so_wanted() {
+    let mut rig = Rig::with(EventSettings {
+        timeout: 1,
+        ..EventSettings::default()
+    });
+    let timeout: ReportEventTimeout = answer(&rig.hear(CLIENT, &QueryEventTimeout));
+    assert_eq!(timeout.timeout.0, 1);
+    rig.create(CLIENT, &periodic(1, 1.0, &QueryStatus));
+    rig.run(50 * SECOND);
+    let all = QueryEvents::decode(&Bytes::from_static(&[0xF0, 0x21, 3, 0])).unwrap();
+    rig.hear(CLIENT, &all);
+    let said = rig.run(120 * SECOND);
+    let told: Vec<_> = said.iter().map(|(_, to, it)| (*to, it.clone())).collect();
+    assert!(
+        events(&told).len().abs_diff(60) <= 1,
+        "renewed by asking for it"
+    );
+    let confirm: ConfirmEventRequest = answer(&told);
+    assert_eq!(
+        (confirm.request_id, confirm.event_id),
+        (1, 1),
+        "its end is told"
+    );
+}
