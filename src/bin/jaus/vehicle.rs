@@ -9,14 +9,12 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::codec::ServiceId;
-use jaus::component::{Builder, Component, Kind, Service};
-use jaus::endpoint::Received;
+use jaus::component::{
+    AccessControl, Builder, Component, Condition, Kind, Management, Standing, State, Time,
+};
 use jaus::node::Node;
 use jaus::service::mobility::Vehicle;
-use jaus::service::{Context, Handled, Management, Standing};
 use jaus::vehicle::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
-use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::failure::{Failure, Outcome};
@@ -50,6 +48,14 @@ pub(crate) struct VehicleCommand {
     /// the next one, which alone can be controlled and driven
     #[arg(long)]
     split: bool,
+
+    /// The least authority that a client needs to control the vehicle
+    #[arg(long, value_name = "CODE", default_value = "1")]
+    authority: u8,
+
+    /// After how many seconds control ends unless its client requests it again; 0 for never
+    #[arg(long, value_name = "SECONDS", default_value = "0")]
+    timeout: u8,
 
     #[command(flatten)]
     simulation: Simulation,
@@ -100,10 +106,12 @@ impl VehicleCommand {
         runtime::run(async {
             let node = Node::start(config).map_err(Failure::of)?;
             let vehicle = self.simulation.vehicle();
-            let (news, standings) = unbounded_channel();
-            let manager = Component::builder(Kind::Vehicle, name.clone());
+            let control = AccessControl::new()
+                .authority(self.authority)
+                .timeout(self.timeout);
+            let manager = Component::builder(Kind::Vehicle, name.clone()).access_control(control);
             let driver = Component::builder(Kind::Vehicle, name).component_name("Navigation");
-            let driver = drivable(driver, &vehicle, news);
+            let driver = drivable(driver, &vehicle, control);
             let attach = |builder: Builder, id: JausId| {
                 builder.attach(&node, id.component()).map_err(Failure::of)
             };
@@ -121,7 +129,7 @@ impl VehicleCommand {
                 ))?;
             }
             node::introduce(&node, &driver, &mut output)?;
-            let outcome = self.watch(&driver, &vehicle, standings, &mut output).await;
+            let outcome = self.watch(&driver, &vehicle, &mut output).await;
             drop((manager, driver));
             node.shutdown().await;
             outcome
@@ -146,10 +154,12 @@ impl VehicleCommand {
         &self,
         component: &Component,
         vehicle: &Vehicle,
-        mut standings: UnboundedReceiver<String>,
         output: &mut Output,
     ) -> Result<Outcome, Failure> {
         let mut changes = component.watch();
+        let mut standings = component.watch_standing();
+        let mut standing = Standing::default();
+        standings.mark_changed();
         let end = runtime::end(self.seconds);
         tokio::pin!(end);
         let clock = Clock::start();
@@ -160,7 +170,14 @@ impl VehicleCommand {
             let words = tokio::select! {
                 () = &mut end => return Ok(Outcome::Done),
                 Some(change) = changes.next() => tree::in_words(change, &component.directory()),
-                Some(standing) = standings.recv() => Some(standing),
+                Ok(()) = standings.changed() => {
+                    let now = *standings.borrow_and_update();
+                    if now.state == State::Initialize {
+                        component.set_condition(Condition::Initialized).await;
+                    }
+                    let before = std::mem::replace(&mut standing, now);
+                    standing_in_words(&before, &now)
+                }
                 _ = looks.tick() => {
                     let motion = vehicle.motion();
                     let is_news = motion.pose != told.pose;
@@ -191,58 +208,51 @@ impl Simulation {
             noise: self.noise,
             seed: self.seed,
         });
-        // A computer whose clock is before 1970 does not know what time it is.
-        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
-        Vehicle::new(Pilot::new(platform, self.at))
-            .with_time(Instant::now(), since_1970.unwrap_or_default())
+        Vehicle::new(Pilot::new(platform, self.at)).with_time(Instant::now(), time_of_day())
     }
 }
 
 /// A component with all that it takes to be driven.
-fn drivable(builder: Builder, vehicle: &Vehicle, news: UnboundedSender<String>) -> Builder {
+fn drivable(builder: Builder, vehicle: &Vehicle, control: AccessControl) -> Builder {
     builder
-        .management(Management::new())
+        .management(Management::new().access_control(control).initializes())
+        .offer(Time::new(time_of_day))
         .offer(vehicle.list_manager())
         .offer(vehicle.velocity_state_sensor())
+        .offer(vehicle.velocity_state_driver())
         .offer(vehicle.acceleration_state_sensor())
         .offer(vehicle.local_pose_sensor())
         .offer(vehicle.global_pose_sensor())
         .offer(vehicle.primitive_driver())
+        .offer(vehicle.local_vector_driver())
         .offer(vehicle.local_waypoint_driver())
         .offer(vehicle.local_waypoint_list_driver())
+        .offer(vehicle.local_path_segment_driver())
+        .offer(vehicle.global_vector_driver())
         .offer(vehicle.global_waypoint_driver())
         .offer(vehicle.global_waypoint_list_driver())
-        .offer(Reporter(news))
+        .offer(vehicle.global_path_segment_driver())
 }
 
-/// Tells who controls the component and what state it is in. It is no service to others.
-struct Reporter(UnboundedSender<String>);
+/// The time since the beginning of 1970; 0 on a computer whose clock is before that.
+fn time_of_day() -> Duration {
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+    since_1970.unwrap_or_default()
+}
 
-impl Service for Reporter {
-    fn offers(&self) -> Vec<ServiceId> {
-        Vec::new()
-    }
-
-    fn handle_message(&mut self, _: Instant, _: &Received, _: &mut Context<'_>) -> Handled {
-        Handled::No
-    }
-
-    fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {
-        let now = context.standing();
-        if now.controller != before.controller {
-            let words = match now.controller {
-                Some(client) => format!(
-                    "{} is in control, authority {}",
-                    client.id, client.authority
-                ),
-                None => "nobody is in control".to_owned(),
-            };
-            // Whoever prints may have ended.
-            let _ = self.0.send(words);
-        }
-        if now.state != before.state {
-            let _ = self.0.send(format!("the state is {}", now.state));
-        }
+/// What is new about the component's state and who controls it.
+fn standing_in_words(before: &Standing, now: &Standing) -> Option<String> {
+    let client = (now.controller != before.controller).then(|| match now.controller {
+        Some(client) => format!(
+            "{} is in control, authority {}",
+            client.id, client.authority
+        ),
+        None => "nobody is in control".to_owned(),
+    });
+    let state = (now.state != before.state).then(|| format!("the state is {}", now.state));
+    match (client, state) {
+        (Some(client), Some(state)) => Some(format!("{client}; {state}")),
+        (client, state) => client.or(state),
     }
 }
 
@@ -252,7 +262,7 @@ fn in_words(motion: &Motion) -> String {
         "at x {:.1} m, y {:.1} m, heading {:.0}°, {:.1} m/s",
         pose.x,
         pose.y,
-        pose.yaw.to_degrees().rem_euclid(360.0),
+        pose.yaw.to_degrees().round().rem_euclid(360.0),
         velocity.x
     )
 }
