@@ -8,7 +8,8 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::endpoint::{Endpoint, Event as EndpointEvent, Outgoing, Received};
 use jaus::messages::core::{
-    CancelEvent, ConfirmEventRequest, CreateEvent, Event, RejectEventRequest, create_event,
+    CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryEventTimeout, RejectEventRequest,
+    ReportEventTimeout, create_event,
 };
 
 use crate::sim::{Owner, Random};
@@ -187,6 +188,9 @@ impl Owner for Producer {
             self.create(now, endpoint, source, &create);
         } else if let Ok(cancel) = CancelEvent::decode(&payload) {
             self.cancel(now, endpoint, source, &cancel);
+        } else if self.habits.forgets && QueryEventTimeout::decode(&payload).is_ok() {
+            let report = ReportEventTimeout { timeout: 1.into() };
+            self.say(endpoint, now, source, &report);
         }
     }
 
@@ -200,6 +204,8 @@ impl Owner for Producer {
             let mut report = running.query.to_vec();
             // From a query to its report: 2402h to 4402h.
             report[1] += 0x20;
+            // Each is another.
+            report.push(running.sequence);
             let event = Event {
                 event_id: running.number,
                 sequence_number: running.sequence,

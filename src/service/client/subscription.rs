@@ -9,7 +9,7 @@ use bytes::Bytes;
 use super::Rejection;
 use super::subscriptions::{SubscriptionEnd, Topic};
 use crate::address::JausId;
-use crate::messages::core::{ConfirmEventRequest, Event};
+use crate::messages::core::{ConfirmEventRequest, Event, QueryEventTimeout};
 use crate::service::{NoAnswer, Outbox, Patience, code_of};
 
 /// When a subscribed report is to come.
@@ -123,13 +123,22 @@ pub(super) struct Subscription {
     /// Requests without an answer so far.
     asked: u32,
     last_asked: Instant,
-    next_ask: Instant,
+    /// When to ask, be it for the first time, in vain, or to renew what is there.
+    next_ask: Option<Instant>,
+    /// How long the peer keeps an event that nobody renews, once it has told; zero is for ever.
+    lifetime: Option<Duration>,
+    /// How often it was asked for that.
+    lifetime_asked: u32,
     /// When the last sign of the event came.
     heard: Instant,
     /// The last report's number, since the last confirmation.
     sequence: Option<u8>,
     /// An event that came before its confirmation.
     early: Option<Event>,
+    /// The last report on change.
+    last: Option<Bytes>,
+    /// Whether the event was renewed since, which brings the last report once more.
+    renewed: bool,
 }
 
 /// What a new [`Subscription`] is made of.
@@ -144,10 +153,12 @@ pub(super) struct Order {
 }
 
 impl Subscription {
-    /// How often an event is created again while all is well. Events of version 1.1 end after a
-    /// time that is told in whole minutes, so that the shortest one bears two lost renewals; and a
-    /// peer that restarted without anybody noticing has the event again.
-    pub(super) const REFRESH: Duration = Duration::from_secs(20);
+    /// The longest time between two renewals of what is sent on change: so late a restart of the
+    /// peer is noticed that nobody else has noticed. Events of version 1.1 end after a time that is
+    /// told in whole minutes; it is a third of the shortest.
+    const REFRESH: Duration = Duration::from_secs(20);
+    /// How often a peer is asked how long its events last. Version 1.0 does not know the question.
+    const LIFETIME_TRIES: u32 = 3;
     /// A periodic event is down when so many periods have brought nothing …
     const SILENT_PERIODS: f64 = 4.0;
     /// … but not sooner than this after its last report.
@@ -170,10 +181,14 @@ impl Subscription {
             first_asked: now,
             asked: 0,
             last_asked: now,
-            next_ask: now,
+            next_ask: None,
+            lifetime: None,
+            lifetime_asked: 0,
             heard: now,
             sequence: None,
             early: None,
+            last: None,
+            renewed: false,
         };
         new.ask(now, out);
         new
@@ -213,7 +228,7 @@ impl Subscription {
     pub(super) fn doubt(&mut self, now: Instant) {
         self.event = None;
         // A peer that gives everything the same number is not to be asked without end.
-        self.next_ask = now.max(self.last_asked + self.patience.interval);
+        self.next_ask = Some(now.max(self.last_asked + self.patience.interval));
     }
 
     pub(super) fn handle_confirm(
@@ -229,14 +244,20 @@ impl Subscription {
             }
             When::OnChange => None,
         };
+        self.renewed = self.state == State::Up;
+        let unasked = self.asked == 0;
         let is_news = self.state != State::Up || self.hz != confirmed;
         self.state = State::Up;
         self.event = Some(confirm.event_id);
         self.hz = confirmed;
         self.asked = 0;
-        self.next_ask = now + Self::REFRESH;
         self.heard = now;
         self.sequence = None;
+        self.next_ask = self.refresh().map(|pause| now + pause);
+        if unasked {
+            // It was sent twice; or it says that the event has ended, because it was not renewed.
+            self.next_ask = Some(now.max(self.last_asked + self.patience.interval));
+        }
         if let Some(end) = self.too_slow() {
             news.push(SubscriptionNews::Ended(end));
             return;
@@ -247,6 +268,25 @@ impl Subscription {
         let early = self.early.take();
         if let Some(early) = early.filter(|early| early.event_id == confirm.event_id) {
             self.handle_event(now, early, news);
+        }
+    }
+
+    /// The time between two renewals. What is periodic needs none unless its peer forgets: silence
+    /// tells that it has ended, and a renewal brings a report that is out of turn.
+    fn refresh(&self) -> Option<Duration> {
+        let forgotten = self.lifetime.filter(|lifetime| !lifetime.is_zero());
+        let third = forgotten.map(|lifetime| lifetime / 3);
+        match self.when {
+            When::Periodic { .. } => third,
+            When::OnChange => Some(third.map_or(Self::REFRESH, |third| third.min(Self::REFRESH))),
+        }
+    }
+
+    /// The peer has told how long it keeps an event that nobody renews.
+    pub(super) fn handle_lifetime(&mut self, now: Instant, lifetime: Duration) {
+        self.lifetime = Some(lifetime);
+        if self.state == State::Up && self.asked == 0 {
+            self.next_ask = self.refresh().map(|pause| now + pause);
         }
     }
 
@@ -270,7 +310,7 @@ impl Subscription {
             State::Up => self.fall(now, Outage::Refused(reason), news),
             State::Down => {
                 self.asked = 0;
-                self.next_ask = now + Self::LONGEST_PAUSE;
+                self.next_ask = Some(now + Self::LONGEST_PAUSE);
             }
         }
     }
@@ -294,8 +334,15 @@ impl Subscription {
         if self.state == State::Down {
             // It was only the network.
             self.state = State::Up;
-            self.next_ask = now;
+            self.next_ask = Some(now);
             news.push(SubscriptionNews::Up { hz: self.hz });
+        }
+        if self.when == When::OnChange {
+            let last = self.last.replace(event.report_message.clone());
+            let known = last.is_some_and(|last| last == event.report_message);
+            if std::mem::take(&mut self.renewed) && known {
+                return;
+            }
         }
         news.push(SubscriptionNews::Report {
             report: event.report_message,
@@ -317,7 +364,7 @@ impl Subscription {
     pub(super) fn handle_found_peer(&mut self, now: Instant) {
         if self.state == State::Down {
             self.asked = 0;
-            self.next_ask = now;
+            self.next_ask = Some(now);
         }
     }
 
@@ -330,7 +377,7 @@ impl Subscription {
         if self.silent_at().is_some_and(|silent| silent <= now) {
             self.fall(now, Outage::Silent, news);
         }
-        if self.next_ask > now {
+        if self.next_ask.is_none_or(|next| next > now) {
             return;
         }
         let exhausted = self.asked >= self.patience.tries.max(1);
@@ -355,9 +402,8 @@ impl Subscription {
         self.ask(now, out);
     }
 
-    pub(super) fn poll_timeout(&self) -> Instant {
-        self.silent_at()
-            .map_or(self.next_ask, |silent| silent.min(self.next_ask))
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        self.silent_at().into_iter().chain(self.next_ask).min()
     }
 
     /// When a periodic event has been silent for too long.
@@ -371,17 +417,21 @@ impl Subscription {
         let refused = matches!(why, Outage::Refused(_));
         self.state = State::Down;
         self.asked = 0;
-        self.next_ask = if refused {
+        self.next_ask = Some(if refused {
             now + Self::LONGEST_PAUSE
         } else {
             now
-        };
+        });
         let since = self.heard;
         news.push(SubscriptionNews::Down { since, why });
     }
 
     /// Asks for the event; a peer that has it already takes it for a renewal.
     fn ask(&mut self, now: Instant, out: &mut Outbox) {
+        if self.lifetime.is_none() && self.lifetime_asked < Self::LIFETIME_TRIES {
+            self.lifetime_asked += 1;
+            out.send(self.peer, &QueryEventTimeout {});
+        }
         out.send_octets(self.peer, self.create.clone());
         let pause = match self.state {
             State::New => self.patience.interval,
@@ -394,6 +444,6 @@ impl Subscription {
         };
         self.asked = self.asked.saturating_add(1);
         self.last_asked = now;
-        self.next_ask = now + pause;
+        self.next_ask = Some(now + pause);
     }
 }

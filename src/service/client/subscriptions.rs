@@ -13,7 +13,7 @@ use crate::codec::{EncodeError, Message};
 use crate::endpoint::Received;
 use crate::messages::core::create_event::EventType;
 use crate::messages::core::{
-    CancelEvent, ConfirmEventRequest, CreateEvent, Event, RejectEventRequest,
+    CancelEvent, ConfirmEventRequest, CreateEvent, Event, RejectEventRequest, ReportEventTimeout,
 };
 use crate::service::{Change, Handled, NoAnswer, Outbox, Patience, code_of, read};
 
@@ -240,8 +240,29 @@ impl Subscriptions {
                     self.handle_reject(now, message.source, request, reason, out)
                 })
             }
+            Some(ReportEventTimeout::CODE) => {
+                let report = read(message);
+                report.map_or(Handled::No, |report| {
+                    self.handle_lifetime(now, message.source, &report)
+                })
+            }
             _ => Handled::No,
         }
+    }
+
+    fn handle_lifetime(
+        &mut self,
+        now: Instant,
+        source: JausId,
+        report: &ReportEventTimeout,
+    ) -> Handled {
+        let lifetime = Duration::from_secs(60) * u32::from(report.timeout.0);
+        let mut handled = Handled::No;
+        for subscription in self.alive.values_mut().filter(|it| it.peer == source) {
+            subscription.handle_lifetime(now, lifetime);
+            handled = Handled::Yes;
+        }
+        handled
     }
 
     fn handle_event(&mut self, now: Instant, source: JausId, event: Event, out: &mut Outbox) {
@@ -365,8 +386,10 @@ impl Subscriptions {
     }
 
     pub(in crate::service) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
-        let due =
-            |(&id, it): (&SubscriptionId, &Subscription)| (it.poll_timeout() <= now).then_some(id);
+        let due = |(&id, it): (&SubscriptionId, &Subscription)| {
+            let due = it.poll_timeout().is_some_and(|due| due <= now);
+            due.then_some(id)
+        };
         let due: Vec<_> = self.alive.iter().filter_map(due).collect();
         for id in due {
             let mut news = Vec::new();
@@ -382,7 +405,7 @@ impl Subscriptions {
     }
 
     pub(in crate::service) fn poll_timeout(&self) -> Option<Instant> {
-        let alive = self.alive.values().map(Subscription::poll_timeout);
+        let alive = self.alive.values().filter_map(Subscription::poll_timeout);
         alive.chain(self.leaving.iter().map(|it| it.next)).min()
     }
 

@@ -8,8 +8,8 @@ use super::{Bench, OTHER, PEER};
 use crate::codec::Message;
 use crate::messages::core::create_event::EventType;
 use crate::messages::core::{
-    CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryControl, QueryStatus,
-    RejectEventRequest, ReportControl, ReportStatus,
+    CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryControl, QueryEventTimeout,
+    QueryStatus, RejectEventRequest, ReportControl, ReportEventTimeout, ReportStatus,
 };
 use crate::service::{
     CannotSubscribe, Event as StackEvent, Outage, Patience, SubscriptionEnd, SubscriptionId,
@@ -252,15 +252,65 @@ fn a_stream_that_goes_on_by_itself_is_up_again() {
     );
 }
 
-#[test]
-fn an_event_is_renewed_three_times_in_the_shortest_lifetime() {
-    let (mut bench, _) = up(When::OnChange);
+/// Confirms what is asked for during a minute; says how often that was.
+fn renewals_in_a_minute(bench: &mut Bench, hz: f64) -> usize {
     let mut renewals = 0;
-    for _ in 0..600 {
-        bench.run_ms(100);
-        renewals += confirm_all(&mut bench, 7, 0.0);
+    // Thrice 256 steps, so that the numbers go on where they end.
+    for step in 0..768_u32 {
+        bench.run(Duration::from_micros(78_125));
+        renewals += confirm_all(bench, 7, hz);
+        if hz > 0.0 {
+            fire(bench, 7, step as u8);
+        }
     }
-    assert!((2..=3).contains(&renewals), "{renewals}");
+    renewals
+}
+
+#[test]
+fn what_is_sent_on_change_is_renewed_because_its_end_would_not_be_noticed() {
+    let (mut bench, _) = up(When::OnChange);
+    assert_eq!(renewals_in_a_minute(&mut bench, 0.0), 3);
+    assert_eq!(told(&mut bench), []);
+}
+
+#[test]
+fn a_periodic_event_is_renewed_three_times_in_its_lifetime_if_it_has_one() {
+    let (mut bench, _) = up(When::hz(10.0));
+    assert_eq!(renewals_in_a_minute(&mut bench, 10.0), 0);
+    bench.hear(PEER, &ReportEventTimeout { timeout: 1.into() });
+    assert_eq!(renewals_in_a_minute(&mut bench, 10.0), 3);
+    bench.hear(PEER, &ReportEventTimeout { timeout: 0.into() });
+    assert_eq!(renewals_in_a_minute(&mut bench, 10.0), 0);
+}
+
+#[test]
+fn a_peer_is_asked_how_long_events_last_together_with_the_event() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::hz(1.0)));
+    assert_eq!(bench.sent::<QueryEventTimeout>().len(), 1);
+    bench.run_ms(60_000);
+    assert_eq!(bench.sent::<QueryEventTimeout>().len(), 2);
+}
+
+#[test]
+fn a_renewal_brings_the_last_report_once_more_and_that_is_no_change() {
+    let (mut bench, _) = up(When::OnChange);
+    fire(&mut bench, 7, 0);
+    bench.run_ms(20_000);
+    assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
+    fire(&mut bench, 7, 1);
+    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
+    fire(&mut bench, 7, 2);
+    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
+}
+
+#[test]
+fn a_confirmation_that_nobody_asked_for_may_be_the_end_of_the_event() {
+    let (mut bench, _) = up(When::OnChange);
+    bench.run_ms(10_000);
+    confirm(&mut bench, 1, 7, 0.0);
+    bench.run_ms(400);
+    assert_eq!(confirm_all(&mut bench, 7, 0.0), 1);
     assert_eq!(told(&mut bench), []);
 }
 
