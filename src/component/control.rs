@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
 use super::clients::Ticket;
-use super::{Component, ControlError, DeliverError, ManageError};
+use super::{Component, ControlError, ManageError};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::messages::core::{
@@ -136,8 +136,8 @@ impl Control {
     }
 
     async fn manage<M: Message>(&self, command: &M, wanted: State) -> Result<(), ManageError> {
-        self.deliver(command).await?;
-        self.component.await_state(self.peer, wanted).await
+        self.check()?;
+        self.component.bring(self.peer, command, wanted).await
     }
 
     fn check(&self) -> Result<(), ControlError> {
@@ -163,44 +163,58 @@ impl Component {
         let set = SetEmergency {
             emergency_code: 1.into(),
         };
-        self.deliver(peer, &set).await.map_err(undelivered)?;
-        self.await_state(peer, State::Emergency).await
+        self.bring(peer, &set, State::Emergency).await
     }
 
-    /// Takes an emergency back that this component has set. The peer stays as it is if another
-    /// component has set one, too.
+    /// Takes an emergency back that this component has set, and waits until the peer says that it is
+    /// over, or for a second: it is not if another component has set one, too.
     ///
     /// # Errors
-    /// If the peer does not have the message.
+    /// If the peer does not say how it is.
     pub async fn clear_emergency(&self, peer: JausId) -> Result<(), ManageError> {
         let clear = ClearEmergency {
             emergency_code: 1.into(),
         };
-        self.deliver(peer, &clear).await.map_err(undelivered)
+        let over = |state: u8| state != State::Emergency as u8;
+        self.tell_until(peer, &clear, over).await.map(drop)
     }
 
-    /// Asks a peer for its status until it is the wanted one, for a second at least: what is
-    /// big takes a moment to change.
-    async fn await_state(&self, peer: JausId, wanted: State) -> Result<(), ManageError> {
+    /// Tells a peer to be in a state, until it says that it is.
+    async fn bring<M: Message>(
+        &self,
+        peer: JausId,
+        command: &M,
+        wanted: State,
+    ) -> Result<(), ManageError> {
+        let reached = |state: u8| state == wanted as u8;
+        match self.tell_until(peer, command, reached).await? {
+            found if reached(found) => Ok(()),
+            found => Err(ManageError::State {
+                peer,
+                wanted,
+                found,
+            }),
+        }
+    }
+
+    /// Gives a command again and again, for a second at least, until the status is as wanted: what
+    /// is big takes a moment to change, and some peers never acknowledge that they were told. Says
+    /// what the status is in the end.
+    async fn tell_until<M: Message>(
+        &self,
+        peer: JausId,
+        command: &M,
+        wanted: impl Fn(u8) -> bool,
+    ) -> Result<u8, ManageError> {
         let start = Instant::now();
         loop {
+            self.send(peer, command).map_err(ControlError::from)?;
             let report: ReportStatus = self.query(peer, &QueryStatus {}).await?;
-            if report.status.0 == wanted as u8 {
-                return Ok(());
-            }
-            if start.elapsed() > STATE_LIMIT {
-                let found = report.status.0;
-                return Err(ManageError::State {
-                    peer,
-                    wanted,
-                    found,
-                });
+            let found = report.status.0;
+            if wanted(found) || start.elapsed() > STATE_LIMIT {
+                return Ok(found);
             }
             tokio::time::sleep(STATE_PAUSE).await;
         }
     }
-}
-
-fn undelivered(error: DeliverError) -> ManageError {
-    ControlError::from(error).into()
 }
