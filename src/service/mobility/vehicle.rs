@@ -181,6 +181,7 @@ impl Vehicle {
         OnVehicle {
             vehicle: self.clone(),
             behaviour: Box::new(behaviour),
+            only_newest: false,
             steps: 0,
         }
     }
@@ -228,8 +229,22 @@ pub(super) trait Behaviour: Send {
 pub struct OnVehicle {
     vehicle: Vehicle,
     behaviour: Box<dyn Behaviour>,
+    only_newest: bool,
     /// The step of the vehicle that was told last.
     steps: u64,
+}
+
+impl OnVehicle {
+    /// Lists only the newest version, whose messages include those of the older ones.
+    ///
+    /// What a component tells about its services should fit into one packet, because some peers
+    /// (JAUS++) cannot read longer messages of others. A component with many services saves room
+    /// like this.
+    #[must_use]
+    pub const fn only_newest(mut self) -> Self {
+        self.only_newest = true;
+        self
+    }
 }
 
 impl std::fmt::Debug for OnVehicle {
@@ -242,7 +257,11 @@ impl std::fmt::Debug for OnVehicle {
 
 impl Service for OnVehicle {
     fn offers(&self) -> Vec<ServiceId> {
-        self.behaviour.offers()
+        let mut offers = self.behaviour.offers();
+        if self.only_newest {
+            offers.truncate(1);
+        }
+        offers
     }
 
     fn handle_message(
