@@ -61,6 +61,9 @@ fn a_split_vehicle_has_two_components_and_only_the_second_drives() {
         driver.contains("urn:jaus:jss:mobility:PrimitiveDriver"),
         "{tree}"
     );
+    let judge = ["judge", "106.1.2", "--only", "A2,B2,B11"];
+    let judged = run(&[&judge, &*network].concat(), b"");
+    assert_eq!(judged.status, 0, "{}", judged.stdout);
 }
 
 #[test]

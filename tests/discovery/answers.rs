@@ -221,6 +221,11 @@ fn a_long_list_of_services_is_cut_into_reports_of_one_packet() {
     let mut nodes: Vec<_> = nodes.map(|node| node.node_rec.node_id).collect();
     nodes.sort_unstable();
     assert_eq!(nodes, (1..=12).collect::<Vec<_>>(), "each once");
+    let last = JausId::new(101, 12, 1);
+    let reports = answers(&mut world, asker, last, &[0x03, 0x2B, 0]);
+    let report = ReportServices::decode(&reports[0].payload).unwrap();
+    let first = report.node_list[0].node_rec.node_id;
+    assert_eq!(first, 12, "whom it asked comes first");
 }
 
 #[test]

@@ -125,7 +125,10 @@ impl Discovery {
         };
         let together = received.destination.has_wildcard();
         let wanted = |id: JausId| query_services_wants(&query, id);
-        let asked: Vec<&Component> = self.speaks_for(together).filter(|c| wanted(c.id)).collect();
+        let mut asked: Vec<&Component> =
+            self.speaks_for(together).filter(|c| wanted(c.id)).collect();
+        // Who reads one report only gets that of the component it asked.
+        asked.sort_by_key(|component| component.id != self.own);
         let mut reports = Vec::new();
         for component in asked {
             add_services(&mut reports, component);
