@@ -17,6 +17,7 @@ mod seeds;
 #[path = "../sim/mod.rs"]
 mod sim;
 mod streams;
+mod vehicle;
 
 use seeds::for_each_seed;
 
@@ -25,7 +26,7 @@ const SEEDS: u64 = 2000;
 /// So many of them send a large message: it has 736 fragments.
 const LARGE_SEEDS: u64 = 1000;
 /// So many of them have clients subscribe to reports for three minutes.
-const STREAM_SEEDS: u64 = 40;
+const STREAM_SEEDS: u64 = 20;
 
 #[test]
 fn every_seed_keeps_the_promises() {
