@@ -29,6 +29,31 @@
 //! # }
 //! ```
 //!
+//! What is to be known again and again is subscribed to, and what is to be commanded is taken under
+//! control. Both look after themselves, and say when they cannot:
+//!
+//! ```no_run
+//! # use jaus::component::{Component, Update, When};
+//! # use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, SetWrenchEffort};
+//! # async fn drive(operator: Component, rover: jaus::address::JausId) -> Result<(), Box<dyn std::error::Error>> {
+//! let query = QueryVelocityState { presence_vector: 1 };
+//! let mut speeds = operator
+//!     .subscribe::<ReportVelocityState, _>(rover, &query, When::hz(10.0).at_least(5.0))
+//!     .await?;
+//! let control = operator.control(rover, 127).await?;
+//! control.resume().await?;
+//! while let Some(update) = speeds.next().await {
+//!     match update {
+//!         Update::Report(speed) if speed.velocity_x_m_per_s() > Some(2.0) => control.standby().await?,
+//!         Update::Report(_) => control.send(&SetWrenchEffort::default())?,
+//!         Update::Down { since, why } => eprintln!("no speed since {since:?}: {why}"),
+//!         Update::Up => {}
+//!     }
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! A component lives in a task of its own on the current tokio runtime until the last clone of
 //! its [`Component`] is dropped. The protocol is in [`service`](crate::service); here are only
 //! the clock, the channels and the names.

@@ -14,6 +14,10 @@
 //! | Events ([`EventSettings`]) | sends the answer to any query of the component, at a rate or on every change |
 //! | [`AccessControl`], [`Management`] | say who may command, and stop everything in an emergency |
 //! | [`Handlers`] | whatever an application offers, one function per message |
+//!
+//! Beside its services a stack is a client of others: it [asks](Stack::ask),
+//! [subscribes](Stack::subscribe) and [takes control](Stack::request_control), and keeps what it has
+//! been given until it is not wanted any more.
 
 mod calendar;
 mod client;

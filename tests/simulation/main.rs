@@ -9,6 +9,7 @@
 
 #![expect(clippy::expect_used, clippy::panic, reason = "tests")]
 
+mod control;
 mod large;
 mod ledger;
 mod producer;
@@ -25,6 +26,8 @@ use seeds::for_each_seed;
 const SEEDS: u64 = 2000;
 /// So many of them send a large message: it has 736 fragments.
 const LARGE_SEEDS: u64 = 1000;
+/// So many of them have operators contend for a vehicle for two minutes.
+const CONTROL_SEEDS: u64 = 100;
 /// So many of them have clients subscribe to reports for three minutes.
 const STREAM_SEEDS: u64 = 20;
 
@@ -50,6 +53,15 @@ fn a_stream_runs_at_its_rate_or_its_client_knows_that_it_is_down() {
         "a_stream_runs_at_its_rate_or_its_client_knows_that_it_is_down",
         STREAM_SEEDS,
         streams::run,
+    );
+}
+
+#[test]
+fn one_client_at_a_time_controls_and_an_emergency_stops_it() {
+    for_each_seed(
+        "one_client_at_a_time_controls_and_an_emergency_stops_it",
+        CONTROL_SEEDS,
+        control::run,
     );
 }
 

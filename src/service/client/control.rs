@@ -8,7 +8,8 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
 use crate::messages::core::{
-    ConfirmControl, QueryTimeout, RejectControl, ReleaseControl, ReportTimeout, RequestControl,
+    ConfirmControl, QueryControl, QueryTimeout, RejectControl, ReleaseControl, ReportControl,
+    ReportTimeout, RequestControl,
 };
 use crate::service::{Handled, NoAnswer, Outbox, Patience, code_of, read};
 
@@ -193,6 +194,10 @@ impl Controls {
                 .and_then(|it| control.handle_confirm(now, peer, it.response_code.0, out)),
             Some(RejectControl::CODE) => read::<RejectControl>(message)
                 .and_then(|it| control.handle_reject(it.response_code.0)),
+            Some(ReportControl::CODE) => read::<ReportControl>(message).and_then(|it| {
+                let controller = JausId::new(it.subsystem_id, it.node_id, it.component_id);
+                control.handle_report(now, controller == out.source())
+            }),
             Some(ReportTimeout::CODE) => {
                 if let Some(report) = read::<ReportTimeout>(message) {
                     control.handle_lifetime(now, report.timeout.0);
@@ -313,14 +318,11 @@ impl Control {
                 code => ControlRefused::Code(code),
             })),
             (State::Held, 2) => self.lose(ControlLost::Outranked),
-            // An emergency, for instance: control is not renewed, and not taken back either, which
-            // the peer would say. It ends with its lifetime, if it has one.
+            // An emergency, for instance: control is not renewed, and may yet be kept.
             (State::Held, _) => {
                 self.denied = true;
                 self.asked = 0;
-                if self.lifetime == Some(Duration::ZERO) {
-                    self.confirmed = now;
-                }
+                out.send(peer, &QueryControl {});
                 None
             }
             // A renewal was on its way when control was lost, and has brought it back behind the
@@ -331,6 +333,21 @@ impl Control {
             }
             (State::Lost(_) | State::Releasing, _) => None,
         }
+    }
+
+    /// The peer tells who controls it. What it does not renew lasts on if it lasts for ever, and
+    /// ends with its lifetime otherwise.
+    fn handle_report(&mut self, now: Instant, is_ours: bool) -> Option<ControlNews> {
+        if self.state != State::Held || !self.denied {
+            return None;
+        }
+        if !is_ours {
+            return self.lose(ControlLost::NotAvailable);
+        }
+        if self.lifetime == Some(Duration::ZERO) {
+            self.confirmed = now;
+        }
+        None
     }
 
     fn handle_reject(&mut self, code: u8) -> Option<ControlNews> {
@@ -372,6 +389,8 @@ impl Control {
                     tries: self.asked,
                     waited: now.saturating_duration_since(self.first_asked),
                 };
+                // Its answers may be what was lost.
+                out.send(peer, &ReleaseControl {});
                 Some(ControlNews::Refused(ControlRefused::NoAnswer(no_answer)))
             }
             State::Held if now >= self.confirmed + self.lifetime() => {

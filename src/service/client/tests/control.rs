@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use super::{Bench, CLIENT, OTHER, PEER};
+use crate::address::JausId;
 use crate::messages::core::{
-    ConfirmControl, QueryTimeout, RejectControl, ReleaseControl, ReportTimeout, RequestControl,
+    ConfirmControl, QueryControl, QueryTimeout, RejectControl, ReleaseControl, ReportControl,
+    ReportTimeout, RequestControl,
 };
 use crate::service::{ControlId, ControlLost, ControlNews, ControlRefused, Event, Patience};
 
@@ -188,13 +190,22 @@ fn an_emergency_takes_control() {
     );
 }
 
-/// Refuses renewals for a while.
-fn deny_for(bench: &mut Bench, duration: Duration) {
+/// Refuses renewals for a while, and tells who is in control if that is asked.
+fn deny_for(bench: &mut Bench, duration: Duration, controller: JausId) {
     let end = bench.now + duration;
     while bench.now < end {
         bench.run_ms(10);
         for _ in bench.sent::<RequestControl>() {
             bench.hear(PEER, &confirm(1));
+        }
+        for _ in bench.sent::<QueryControl>() {
+            let report = ReportControl {
+                subsystem_id: controller.subsystem(),
+                node_id: controller.node(),
+                component_id: controller.component(),
+                ..ReportControl::default()
+            };
+            bench.hear(PEER, &report);
         }
     }
 }
@@ -202,9 +213,9 @@ fn deny_for(bench: &mut Bench, duration: Duration) {
 #[test]
 fn control_that_cannot_be_renewed_ends_with_its_lifetime() {
     let (mut bench, _) = held(5);
-    deny_for(&mut bench, Duration::from_millis(4900));
+    deny_for(&mut bench, Duration::from_millis(4900), CLIENT);
     assert_eq!(news(&mut bench), []);
-    deny_for(&mut bench, Duration::from_millis(200));
+    deny_for(&mut bench, Duration::from_millis(200), CLIENT);
     assert_eq!(
         news(&mut bench),
         [ControlNews::Lost(ControlLost::NotAvailable)]
@@ -214,9 +225,19 @@ fn control_that_cannot_be_renewed_ends_with_its_lifetime() {
 #[test]
 fn control_that_lasts_for_ever_outlasts_an_emergency() {
     let (mut bench, _) = held(0);
-    deny_for(&mut bench, Duration::from_secs(60));
+    deny_for(&mut bench, Duration::from_secs(60), CLIENT);
     renew_for(&mut bench, Duration::from_secs(60));
     assert_eq!(news(&mut bench), []);
+}
+
+#[test]
+fn control_that_is_refused_and_not_ours_any_more_is_lost() {
+    let (mut bench, _) = held(0);
+    deny_for(&mut bench, Duration::from_secs(2), OTHER);
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::NotAvailable)]
+    );
 }
 
 #[test]

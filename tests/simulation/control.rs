@@ -1,0 +1,385 @@
+//! Operators that contend for a vehicle while the wire is bad and everybody restarts: there are
+//! never two controllers, only the one in control makes the vehicle act, an emergency stops it
+//! whoever is in control, and who has lost control knows it soon.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::endpoint::{Config, Endpoint, Event as EndpointEvent};
+use jaus::messages::core::{
+    ClearEmergency, ConfirmControl, DeleteElement, RejectControl, Reset, Resume, SetEmergency,
+    Standby, list_manager,
+};
+use jaus::service::{
+    AccessControl, ControlId, ControlNews, Discovery, Event, Handlers, Kind, Management, Patience,
+    Profile, Scope, Service, Stack, Timing,
+};
+
+use crate::sim::{Conditions, Host, Network, Owner, Random};
+
+const VEHICLE: JausId = JausId::new(101, 1, 1);
+const OPERATORS: [JausId; 3] = [
+    JausId::new(42, 1, 1),
+    JausId::new(43, 1, 1),
+    JausId::new(44, 1, 1),
+];
+const TROUBLE: Duration = Duration::from_secs(120);
+const ACTIONS: usize = 150;
+/// After this time with a good wire, operators and vehicle agree.
+const REST: Duration = Duration::from_secs(10);
+/// Who has lost control knows it at the latest when it has not been confirmed for five seconds; the
+/// confirmation may have been under way for a moment.
+const DELUSION: Duration = Duration::from_millis(5500);
+
+/// Runs the scenario of a seed; tells which promise was broken.
+pub(crate) fn run(seed: u64) -> Result<(), String> {
+    let mut world = World::new(seed);
+    let start = world.network.now();
+    let mut times: Vec<_> = (0..ACTIONS)
+        .map(|_| world.random.up_to_millis(TROUBLE.as_millis() as u64))
+        .collect();
+    times.sort_unstable();
+    for time in times {
+        let now = world.network.now();
+        world.run_for((start + time).saturating_duration_since(now))?;
+        world.act();
+    }
+    world.come_to_rest()
+}
+
+/// The vehicle, with what an onlooker on the wire knows of it.
+struct Vehicle {
+    stack: Stack,
+    /// Whom it has told that they are in control.
+    controller: Option<JausId>,
+    emergencies: BTreeSet<JausId>,
+    /// Whose commands it has acted on since the last look.
+    acted: Arc<Mutex<Vec<JausId>>>,
+    broken: Option<String>,
+}
+
+struct Operator {
+    stack: Stack,
+    asked: Option<ControlId>,
+    holds: bool,
+    /// Since when it has been wrong about that.
+    wrong: Option<Instant>,
+}
+
+enum Party {
+    Vehicle(Box<Vehicle>),
+    Operator(Box<Operator>),
+}
+
+fn stack(id: JausId, services: Vec<Box<dyn Service>>) -> Stack {
+    let profile = Profile::new(Kind::Vehicle, "Anybody");
+    let discovery = Discovery::new(id, profile, Scope::Nobody, Timing::default(), 1);
+    Stack::new(discovery, services)
+}
+
+impl Vehicle {
+    fn party(now: Instant, timeout: u8) -> Party {
+        let acted = Arc::new(Mutex::new(Vec::new()));
+        let acts = acted.clone();
+        // Any command will do.
+        let driver =
+            Handlers::new(list_manager::LATEST).command(move |_: DeleteElement, from, _context| {
+                acts.lock().expect("no panic").push(from.source);
+            });
+        let access = AccessControl::new().timeout(timeout);
+        let mut stack = stack(VEHICLE, vec![Box::new(driver)])
+            .management(Management::new().access_control(access));
+        stack.start(now);
+        Party::Vehicle(Box::new(Self {
+            stack,
+            controller: None,
+            emergencies: BTreeSet::new(),
+            acted,
+            broken: None,
+        }))
+    }
+
+    /// What comes in, as an onlooker understands it.
+    fn look_at(&mut self, source: JausId, payload: &bytes::Bytes) {
+        if SetEmergency::decode(payload).is_ok() {
+            self.emergencies.insert(source);
+        } else if ClearEmergency::decode(payload).is_ok() {
+            self.emergencies.remove(&source);
+        }
+    }
+
+    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        while let Some(message) = self.stack.poll_transmit() {
+            self.overhear(message.destination, &message.payload);
+            // There may be no way to the operator any more.
+            let _ = endpoint.send(now, message);
+        }
+        while self.stack.poll_event().is_some() {}
+        for who in std::mem::take(&mut *self.acted.lock().expect("no panic")) {
+            if self.controller != Some(who) {
+                self.broken = Some(format!("acts for {who} and not for {:?}", self.controller));
+            } else if !self.emergencies.is_empty() {
+                self.broken = Some(format!("acts in an emergency of {:?}", self.emergencies));
+            }
+        }
+    }
+
+    fn overhear(&mut self, to: JausId, payload: &bytes::Bytes) {
+        if let Ok(confirm) = ConfirmControl::decode(payload) {
+            if confirm.response_code.0 != 0 {
+                return;
+            }
+            if let Some(other) = self.controller.filter(|other| *other != to) {
+                self.broken = Some(format!("{to} and {other} are both in control"));
+            }
+            self.controller = Some(to);
+        } else if let Ok(reject) = RejectControl::decode(payload) {
+            // In an emergency a release is refused, and control is kept.
+            if reject.response_code.0 == 0 && self.controller == Some(to) {
+                self.controller = None;
+            }
+        }
+    }
+}
+
+impl Operator {
+    fn party(now: Instant, id: JausId) -> Party {
+        let mut stack = stack(id, Vec::new());
+        stack.start(now);
+        Party::Operator(Box::new(Self {
+            stack,
+            asked: None,
+            holds: false,
+            wrong: None,
+        }))
+    }
+
+    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        while let Some(message) = self.stack.poll_transmit() {
+            // There may be no way to the vehicle yet.
+            let _ = endpoint.send(now, message);
+        }
+        while let Some(event) = self.stack.poll_event() {
+            if let Event::Control(id, news) = event
+                && self.asked == Some(id)
+            {
+                self.holds = news == ControlNews::Granted;
+                if let ControlNews::Refused(_) | ControlNews::Released = news {
+                    self.asked = None;
+                }
+            }
+        }
+    }
+
+    fn check(&mut self, now: Instant, controller: Option<JausId>) -> Result<(), String> {
+        let id = self.stack.id();
+        if !self.holds || controller == Some(id) {
+            self.wrong = None;
+            return Ok(());
+        }
+        let wrong = now.saturating_duration_since(*self.wrong.get_or_insert(now));
+        if wrong > DELUSION {
+            return Err(format!(
+                "{id} has believed for {wrong:?} that it is in control, and {controller:?} is"
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl Owner for Party {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+        let EndpointEvent::Received(message) = event else {
+            return;
+        };
+        match self {
+            Self::Vehicle(vehicle) => {
+                vehicle.look_at(message.source, &message.payload);
+                vehicle.stack.handle_message(now, &message);
+                vehicle.settle(now, endpoint);
+            }
+            Self::Operator(operator) => {
+                operator.stack.handle_message(now, &message);
+                operator.settle(now, endpoint);
+            }
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        match self {
+            Self::Vehicle(vehicle) => {
+                vehicle.stack.handle_timeout(now);
+                vehicle.settle(now, endpoint);
+            }
+            Self::Operator(operator) => {
+                operator.stack.handle_timeout(now);
+                operator.settle(now, endpoint);
+            }
+        }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        match self {
+            Self::Vehicle(vehicle) => vehicle.stack.poll_timeout(),
+            Self::Operator(operator) => operator.stack.poll_timeout(),
+        }
+    }
+}
+
+struct World {
+    random: Random,
+    network: Network<Party>,
+    timeout: u8,
+    vehicle: Host,
+    operators: [Host; 3],
+}
+
+fn endpoint(id: JausId) -> Endpoint {
+    let mut endpoint = Endpoint::new(Config::default());
+    endpoint.attach(id).expect("a component");
+    endpoint
+}
+
+impl World {
+    fn new(seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let conditions = Conditions {
+            lost: random.choose(&[0, 50, 200]),
+            repeated: random.choose(&[0, 100]),
+            ..Conditions::poor()
+        };
+        let timeout = random.choose(&[0, 2, 5]);
+        let mut network = Network::new(random.number(), conditions);
+        if crate::seeds::is_traced() {
+            network.trace().print();
+        }
+        let now = network.now();
+        let vehicle = network.join(endpoint(VEHICLE), Vehicle::party(now, timeout));
+        let operators = OPERATORS.map(|id| network.join(endpoint(id), Operator::party(now, id)));
+        Self {
+            random,
+            network,
+            timeout,
+            vehicle,
+            operators,
+        }
+    }
+
+    fn act(&mut self) {
+        let place = self.random.below(OPERATORS.len());
+        let (host, now) = (self.operators[place], self.network.now());
+        match self.random.below(40) {
+            0..8 => self.request(host),
+            8..11 => self.with(host, |stack, now, asked| {
+                if let Some(id) = asked.take() {
+                    stack.release_control(now, id);
+                }
+            }),
+            11..26 => self.say(host, &DeleteElement::default()),
+            26..30 => self.say(host, &Resume {}),
+            30 => self.say(host, &Standby {}),
+            31 => self.say(host, &Reset {}),
+            32 => self.say(host, &SetEmergency::default()),
+            33..36 => self.say(host, &ClearEmergency::default()),
+            36 => {
+                let vehicle = Vehicle::party(now, self.timeout);
+                self.network
+                    .restart(self.vehicle, endpoint(VEHICLE), vehicle);
+            }
+            37 => {
+                let id = OPERATORS[place];
+                self.network
+                    .restart(host, endpoint(id), Operator::party(now, id));
+            }
+            cut => self.network.set_cut(self.vehicle, host, cut == 38),
+        }
+    }
+
+    fn with(&mut self, host: Host, act: impl FnOnce(&mut Stack, Instant, &mut Option<ControlId>)) {
+        self.network.act(host, |now, party, endpoint| {
+            let Party::Operator(operator) = party else {
+                return;
+            };
+            let before = operator.asked;
+            act(&mut operator.stack, now, &mut operator.asked);
+            if operator.asked != before {
+                operator.holds = false;
+            }
+            operator.settle(now, endpoint);
+        });
+    }
+
+    fn request(&mut self, host: Host) {
+        let authority = self.random.choose(&[50, 100, 200]);
+        self.with(host, |stack, now, asked| {
+            // What was lost is let go before it is asked for again.
+            if let Some(id) = *asked {
+                stack.release_control(now, id);
+            }
+            let patience = Patience::default();
+            *asked = stack
+                .request_control(now, VEHICLE, authority, patience)
+                .ok();
+        });
+    }
+
+    fn say<M: Message>(&mut self, host: Host, message: &M) {
+        self.with(host, |stack, _, _| stack.send(VEHICLE, message));
+    }
+
+    fn vehicle(&mut self) -> &mut Vehicle {
+        match self.network.owner(self.vehicle) {
+            Party::Vehicle(vehicle) => vehicle,
+            Party::Operator(_) => panic!("the vehicle is meant"),
+        }
+    }
+
+    fn operator(&mut self, host: Host) -> &mut Operator {
+        match self.network.owner(host) {
+            Party::Operator(operator) => operator,
+            Party::Vehicle(_) => panic!("an operator is meant"),
+        }
+    }
+
+    fn run_for(&mut self, time: Duration) -> Result<(), String> {
+        let step = Duration::from_millis(100);
+        let end = self.network.now() + time;
+        while self.network.now() < end {
+            let left = end.saturating_duration_since(self.network.now());
+            self.network.run_for(left.min(step));
+            let now = self.network.now();
+            let vehicle = self.vehicle();
+            let controller = vehicle.stack.standing().controller.map(|it| it.id);
+            if let Some(broken) = &vehicle.broken {
+                return Err(format!("{VEHICLE} {broken}"));
+            }
+            for host in self.operators {
+                self.operator(host).check(now, controller)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// With a good wire, whoever believes to be in control is.
+    fn come_to_rest(&mut self) -> Result<(), String> {
+        self.network.set_conditions(Conditions::good());
+        for host in self.operators {
+            self.network.set_cut(self.vehicle, host, false);
+        }
+        self.run_for(REST)?;
+        let controller = self.vehicle().stack.standing().controller;
+        for host in self.operators {
+            let operator = self.operator(host);
+            let id = operator.stack.id();
+            if operator.holds && controller.is_none_or(|it| it.id != id) {
+                return Err(format!(
+                    "{id} believes to be in control, and {controller:?} is"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
