@@ -140,11 +140,15 @@ impl Runner {
         let deadline = start + patience;
         let mut missing: Vec<&Expectation> = exchange.expects.iter().collect();
         let mut check = Ok(());
+        // Why the latest part of an answer is not the one that is looked for.
+        let mut wrong = None;
         while check.is_ok() && !missing.is_empty() {
             let Some(heard) = self.panel.hear(deadline, &self.step).await? else {
-                if !is_optional {
-                    check = Err(self.silence(missing[0], &proceeding));
-                }
+                check = match wrong {
+                    Some(reason) => Err(reason),
+                    None if is_optional => Ok(()),
+                    None => Err(self.silence(missing[0], &proceeding)),
+                };
                 break;
             };
             let is_it = |one: &&Expectation| heard.code() == Some(one.code) && heard.to == one.to;
@@ -154,10 +158,13 @@ impl Runner {
                 proceeding.came.push(self.said(&heard));
             }
             if let Some(found) = found {
-                let expectation = missing.remove(found);
+                let expectation = missing[found];
                 proceeding.latency = Some(heard.at - start);
-                check = (expectation.check)(&heard.octets, &mut self.memory)
-                    .map_err(|reason| format!("{}: {reason}", expectation.name));
+                match expectation.look_at(&heard.octets, &mut self.memory) {
+                    Ok(()) => drop(missing.remove(found)),
+                    Err(reason) if expectation.in_parts => wrong = Some(reason),
+                    Err(reason) => check = Err(reason),
+                }
             }
         }
         proceedings.push(proceeding);

@@ -184,6 +184,8 @@ pub(super) struct Expectation {
     pub(super) check: Look,
     /// Whether the step goes on if it does not come, which then is waited for less long.
     pub(super) is_optional: bool,
+    /// Whether the answer may come in several messages, of which one must be right.
+    pub(super) in_parts: bool,
 }
 
 /// Which event streams are meant: their ids and the codes of the reports in them, as remembered.
@@ -343,6 +345,14 @@ impl Exchange {
         self.expects.push(Expectation::new(to, words, check));
         self
     }
+
+    /// The answer may come in several messages: lists can be long.
+    pub(super) fn in_parts(mut self) -> Self {
+        if let Some(expectation) = self.expects.last_mut() {
+            expectation.in_parts = true;
+        }
+        self
+    }
 }
 
 impl From<Exchange> for Act {
@@ -368,7 +378,13 @@ impl Expectation {
             words: words.into(),
             check: Box::new(check),
             is_optional: false,
+            in_parts: false,
         }
+    }
+
+    /// Whether a message is as it must be; the reason begins with the message's name.
+    pub(super) fn look_at(&self, octets: &Bytes, memory: &mut Memory) -> Check {
+        (self.check)(octets, memory).map_err(|reason| format!("{}: {reason}", self.name))
     }
 }
 

@@ -111,7 +111,9 @@ fn query_services() -> Exchange {
     let query = QueryServices {
         node_list: vec![everything],
     };
-    Exchange::new(Main, query).expect(Main, "every service of the component", lists_services)
+    Exchange::new(Main, query)
+        .expect(Main, "every service of the component", lists_services)
+        .in_parts()
 }
 
 fn query_configuration(query_type: query_configuration::QueryType) -> Exchange {

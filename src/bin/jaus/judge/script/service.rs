@@ -158,6 +158,7 @@ fn asked(
         words: "as its definition has it".into(),
         check: Box::new(move |octets, memory| look(report.code, &read(octets)?, memory)),
         is_optional,
+        in_parts: false,
     });
     Some(exchange)
 }
