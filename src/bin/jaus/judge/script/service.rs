@@ -10,6 +10,10 @@ use jaus::messages::core::{
     CancelEvent, ClearEmergency, CreateCommandEvent, CreateEvent, QueryElement, RegisterServices,
     ReleaseControl, RequestControl, SetEmergency, UpdateEvent, access_control,
 };
+use jaus::messages::mobility::{
+    QueryGlobalPathSegment, QueryGlobalPathSegmentExt, QueryGlobalWaypoint, QueryGlobalWaypointExt,
+    QueryLocalPathSegment, QueryLocalPathSegmentExt, QueryLocalWaypoint, QueryLocalWaypointExt,
+};
 use jaus::messages::{registry, services};
 use serde_json::Value as Json;
 
@@ -40,8 +44,18 @@ const ANYBODYS: [u16; 9] = [
     SetEmergency::CODE,
     UpdateEvent::CODE,
 ];
-/// Queries that are answered only where there is something of the kind.
-const OF_SOMETHING: [u16; 1] = [QueryElement::CODE];
+/// Queries for something that a client must have set before it can be reported.
+const OF_SOMETHING: [u16; 9] = [
+    QueryElement::CODE,
+    QueryLocalWaypoint::CODE,
+    QueryLocalWaypointExt::CODE,
+    QueryGlobalWaypoint::CODE,
+    QueryGlobalWaypointExt::CODE,
+    QueryLocalPathSegment::CODE,
+    QueryLocalPathSegmentExt::CODE,
+    QueryGlobalPathSegment::CODE,
+    QueryGlobalPathSegmentExt::CODE,
+];
 
 /// The URN of a service, by its URN or its name.
 pub(in super::super) fn known(text: &str) -> Result<&'static str, String> {
@@ -90,15 +104,19 @@ fn walk(service: &ServiceInfo) -> Vec<(Cow<'static, str>, Vec<Act>)> {
         .filter_map(|&code| registry().in_service(service.id, code))
         .collect();
     let queries = inputs.iter().filter(|info| report_of(info).is_some());
-    let queries: Vec<_> = queries
-        .copied()
-        .filter(|info| !OF_SOMETHING.contains(&info.code))
-        .collect();
+    let queries: Vec<_> = queries.copied().collect();
     let mut steps = Vec::new();
     for query in &queries {
-        let title = format!("{} is answered", query.name).into();
-        steps.push((title, ask(query, takes_report).into_iter().collect()));
-        let cut = cut(query);
+        let is_of_something = OF_SOMETHING.contains(&query.code);
+        let condition = if is_of_something {
+            " where there is something to report"
+        } else {
+            ""
+        };
+        let title = format!("{} is answered{condition}", query.name).into();
+        let act = asked(query, takes_report, is_of_something).map(Act::Exchange);
+        steps.push((title, act.into_iter().collect()));
+        let cut = cut(query, is_of_something);
         if !cut.is_empty() {
             let title = format!("{} that ends too early is ignored", query.name).into();
             steps.push((title, cut));
@@ -134,16 +152,12 @@ fn report_of(query: &MessageInfo) -> Option<&'static MessageInfo> {
     registry().by_code(query.code + 0x2000).next()
 }
 
-/// Asks a query in its shortest form.
-fn ask(query: &MessageInfo, look: fn(u16, &Json, &mut Memory) -> Check) -> Option<Act> {
-    asked(query, look, false).map(Act::Exchange)
-}
-
-/// The same, but it need not be answered: that is another step's business.
+/// Asks a query, which need not be answered: that is another step's business.
 fn perhaps(query: &MessageInfo, look: fn(u16, &Json, &mut Memory) -> Check) -> Option<Act> {
     asked(query, look, true).map(Act::Exchange)
 }
 
+/// Asks a query in its shortest form, and looks at the report if it is readable.
 fn asked(
     query: &MessageInfo,
     look: fn(u16, &Json, &mut Memory) -> Check,
@@ -165,7 +179,7 @@ fn asked(
 
 /// Asks a query without its last octet, if it has a body; and then the whole query, which must be
 /// answered still.
-fn cut(query: &MessageInfo) -> Vec<Act> {
+fn cut(query: &MessageInfo, is_optional: bool) -> Vec<Act> {
     let Some(octets) = specimen::shortest(query).filter(|octets| octets.len() > 2) else {
         return Vec::new();
     };
@@ -173,7 +187,7 @@ fn cut(query: &MessageInfo) -> Vec<Act> {
         exchange: Exchange::octets(Main, octets.slice(..octets.len() - 1)),
         lasting: IGNORED,
     };
-    let whole = ask(query, takes_report);
+    let whole = asked(query, takes_report, is_optional).map(Act::Exchange);
     std::iter::once(ignored).chain(whole).collect()
 }
 

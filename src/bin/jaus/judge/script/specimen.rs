@@ -3,13 +3,19 @@
 use bytes::Bytes;
 use jaus::codec::{Message, MessageInfo};
 use jaus::messages::core::{QueryConfiguration, QueryIdentification};
+use jaus::messages::mobility::QueryAccelerationLimit;
 
 /// Octets of a body that are tried at most.
 const LONGEST: usize = 96;
 /// What fields are filled with: valid in most, and far from where things stand by themselves.
 const FILLING: u8 = 0x40;
-/// The subsystem, for queries in which zero means nothing.
-const SUBSYSTEM: u8 = 2;
+/// Queries whose last octet says what is meant, and may not be zero: a subsystem, and a limit for
+/// speeding up.
+const NOT_ZERO: [(u16, u8); 3] = [
+    (QueryIdentification::CODE, 2),
+    (QueryConfiguration::CODE, 2),
+    (QueryAccelerationLimit::CODE, 1),
+];
 
 /// The shortest message of this type, all zeros where that is possible.
 pub(super) fn shortest(info: &MessageInfo) -> Option<Bytes> {
@@ -20,9 +26,9 @@ pub(super) fn shortest(info: &MessageInfo) -> Option<Bytes> {
         }
         octets.push(0);
     }
-    if [QueryIdentification::CODE, QueryConfiguration::CODE].contains(&info.code) {
-        octets.truncate(2);
-        octets.push(SUBSYSTEM);
+    let meant = NOT_ZERO.iter().find(|(code, _)| *code == info.code);
+    if let (Some(&(_, meant)), Some(last)) = (meant, octets.last_mut()) {
+        *last = meant;
     }
     Some(octets.into())
 }
