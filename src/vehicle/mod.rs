@@ -5,6 +5,47 @@
 //! or knows a message; the services in [`service::mobility`](crate::service::mobility) do the
 //! talking.
 //!
+//! What it takes to make a real one drive:
+//!
+//! ```
+//! use std::time::Instant;
+//! use jaus::vehicle::{Drive, Frame, Limits, Motion, Pilot, Platform, Pose};
+//!
+//! struct Mower {
+//!     motion: Motion,
+//!     limits: Limits,
+//! }
+//!
+//! impl Platform for Mower {
+//!     fn handle_time(&mut self, _now: Instant) {
+//!         // Read odometry and compass into `self.motion`.
+//!     }
+//!     fn motion(&self) -> Motion {
+//!         self.motion
+//!     }
+//!     fn set_pose(&mut self, pose: Pose) {
+//!         self.motion.pose = pose;
+//!     }
+//!     fn drive(&mut self, command: Drive) {
+//!         match command {
+//!             Drive::Stop => { /* brake */ }
+//!             Drive::Velocity(_velocity) => { /* to the motor controller */ }
+//!             Drive::Effort(_effort) => { /* straight to the motors */ }
+//!         }
+//!     }
+//!     fn limits(&self) -> Limits {
+//!         self.limits
+//!     }
+//!     fn set_limits(&mut self, _limits: Limits) {
+//!         // To the motor controller: what a client wants to be kept.
+//!     }
+//! }
+//!
+//! let mower = Mower { motion: Motion::default(), limits: Limits::default() };
+//! let pilot = Pilot::new(mower, Frame::at(52.5, 13.4));
+//! assert!(pilot.is_at_rest());
+//! ```
+//!
 //! Axes are those of AS6009: X forward or north, Y to the right or east, Z down; angles are in
 //! radians, yaw and heading clockwise from X, seen from above.
 

@@ -118,8 +118,9 @@ impl Shared {
 
 /// Lets clients read the list, and the client in control change it.
 ///
-/// A request is carried out as a whole or refused as a whole. A reset of the component empties the
-/// list.
+/// A request is carried out as a whole or refused as a whole. The list is emptied when the component
+/// [initializes](State::Initialize), as it does at a reset if it
+/// [said so](super::Management::initializes).
 #[derive(Debug)]
 pub struct ListManager {
     elements: Elements,
