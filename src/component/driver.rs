@@ -36,6 +36,8 @@ pub(super) enum Command {
     Condition(Condition),
     /// To tell subscribers that the answer to the query with this code is another.
     Announce(u16),
+    /// To tell that a command with this code has ended, well or not.
+    End(u16, bool),
 }
 
 /// What has become of a question.
@@ -144,6 +146,9 @@ impl Driver {
                 self.stack.withdraw(Instant::now(), urn);
             }
             Command::Condition(condition) => self.stack.set_condition(Instant::now(), condition),
+            Command::End(command, successful) => {
+                self.stack.end_command(Instant::now(), command, successful);
+            }
             Command::Announce(query) => self.stack.announce(Instant::now(), query),
         }
     }

@@ -100,6 +100,18 @@ impl Component {
         let _ = self.shared.commands.send(Command::Announce(Q::CODE)).await;
     }
 
+    /// Tells that the command of type `C` which was last carried out has ended, and whether it has
+    /// done what it was to do: for services that [`tell_end_of`](crate::service::Handlers::tell_end_of)
+    /// it.
+    pub async fn ended<C: Message>(&self, successful: bool) {
+        // As in `offer`.
+        let _ = self
+            .shared
+            .commands
+            .send(Command::End(C::CODE, successful))
+            .await;
+    }
+
     /// The changes of the directory from now on.
     #[must_use]
     pub fn watch(&self) -> Watch {

@@ -1,5 +1,5 @@
 //! What a service is given beside a message or the time: who may command, where its answers go,
-//! and how it says that something has changed.
+//! and how it says that something has changed or is done.
 
 use std::collections::BTreeSet;
 
@@ -10,24 +10,33 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
 
+/// What services have said for whoever wants to know.
+#[derive(Debug, Default)]
+pub(crate) struct News {
+    /// The codes of queries whose answers are others now.
+    pub(crate) changed: BTreeSet<u16>,
+    /// The codes of commands that have come to an end, and whether to the wanted one.
+    pub(crate) ended: Vec<(u16, bool)>,
+}
+
 /// One service's view of its component while it handles something.
 #[derive(Debug)]
 pub struct Context<'a> {
     out: &'a mut Outbox,
     standing: &'a Standing,
-    changed: &'a mut BTreeSet<u16>,
+    news: &'a mut News,
 }
 
 impl<'a> Context<'a> {
     pub(super) const fn new(
         out: &'a mut Outbox,
         standing: &'a Standing,
-        changed: &'a mut BTreeSet<u16>,
+        news: &'a mut News,
     ) -> Self {
         Self {
             out,
             standing,
-            changed,
+            news,
         }
     }
 
@@ -60,6 +69,13 @@ impl<'a> Context<'a> {
 
     /// Says that the answer to the query `Q` is another now: whoever subscribed to it hears of it.
     pub fn changed<Q: Message>(&mut self) {
-        self.changed.insert(Q::CODE);
+        self.news.changed.insert(Q::CODE);
+    }
+
+    /// Says that the command with this code which was last carried out has come to its end, and
+    /// whether that is the wanted one: whoever asked for a command event hears of it. Only commands
+    /// whose end a service [tells](super::Service::tells_end_of) can be asked for so.
+    pub fn ended(&mut self, command: u16, successful: bool) {
+        self.news.ended.push((command, successful));
     }
 }

@@ -1,6 +1,6 @@
 //! A service made of functions, one per message: what an application offers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::time::Instant;
 
@@ -23,6 +23,7 @@ type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) + Send>;
 pub struct Handlers {
     offers: Vec<ServiceId>,
     by_code: BTreeMap<u16, Handler>,
+    told: BTreeSet<u16>,
 }
 
 impl Handlers {
@@ -32,6 +33,7 @@ impl Handlers {
         Self {
             offers: vec![id],
             by_code: BTreeMap::new(),
+            told: BTreeSet::new(),
         }
     }
 
@@ -87,6 +89,15 @@ impl Handlers {
         self.receive_if(Standing::acts_for, function)
     }
 
+    /// Lets clients have commands of type `M` carried out as command events (AS5710 1.1). The
+    /// application promises to say when one has ended, by [`Context::ended`] or
+    /// [`Stack::end_command`](super::Stack::end_command).
+    #[must_use]
+    pub fn tell_end_of<M: Message>(mut self) -> Self {
+        self.told.insert(M::CODE);
+        self
+    }
+
     fn receive_if<M: Message>(
         mut self,
         may: fn(&Standing, JausId) -> bool,
@@ -130,5 +141,9 @@ impl Service for Handlers {
         };
         handler(message, context);
         Handled::Yes
+    }
+
+    fn tells_end_of(&self, command: u16) -> bool {
+        self.told.contains(&command)
     }
 }

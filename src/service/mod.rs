@@ -90,6 +90,13 @@ pub trait Service: Send {
         let _ = (now, before, context);
     }
 
+    /// Whether this service tells the end of the commands with this code, with [`Context::ended`]:
+    /// clients may have them carried out as command events (AS5710 1.1).
+    fn tells_end_of(&self, command: u16) -> bool {
+        let _ = command;
+        false
+    }
+
     /// When this service wants to be woken.
     fn poll_timeout(&self) -> Option<Instant> {
         None

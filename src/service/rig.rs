@@ -1,8 +1,8 @@
 //! For tests: services without a stack, whose standing and time are set by hand.
 
-use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
+use super::context::News;
 use super::{Context, Controller, Handled, Outbox, Service, Standing, State};
 use crate::address::JausId;
 use crate::codec::Message;
@@ -18,7 +18,7 @@ pub(crate) const STRANGER: JausId = JausId::new(42, 2, 1);
 pub(crate) struct Rig {
     pub(crate) services: Vec<Box<dyn Service>>,
     pub(crate) now: Instant,
-    pub(crate) changed: BTreeSet<u16>,
+    pub(crate) news: News,
     standing: Standing,
     out: Outbox,
 }
@@ -33,7 +33,7 @@ impl Rig {
         let mut rig = Self {
             services,
             now: Instant::now(),
-            changed: BTreeSet::new(),
+            news: News::default(),
             standing: Standing::default(),
             out: Outbox::new(JausId::new(101, 1, 1)),
         };
@@ -54,7 +54,7 @@ impl Rig {
             },
         );
         for service in &mut self.services {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
             service.handle_standing(self.now, &before, &mut context);
         }
     }
@@ -71,7 +71,7 @@ impl Rig {
             to: self.out.source(),
         };
         self.services.iter_mut().any(|service| {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
             service.handle_message(self.now, &received, &mut context) == Handled::Yes
         })
     }
@@ -112,7 +112,7 @@ impl Rig {
 
     fn wake(&mut self) {
         for service in &mut self.services {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
             service.handle_timeout(self.now, &mut context);
         }
     }

@@ -1,18 +1,19 @@
 //! All services of one component behind one door.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 use std::time::Instant;
 
 use bytes::Bytes;
 
 use super::client::{Controls, Subscriptions};
+use super::context::News;
 use super::control::{AccessControl, Condition, Control, Management};
-use super::events::{EventSettings, Events, Outcome};
+use super::events::{CommandTrial, EventSettings, Events, Outcome, Refusal};
 use super::inquiries::Inquiries;
 use super::{
     CannotSubscribe, Change, Context, ControlId, ControlNews, ControlRefused, Directory, Discovery,
     Handled, Inquiry, NoAnswer, Outbox, Patience, Service, Standing, SubscriptionId,
-    SubscriptionNews, Topic,
+    SubscriptionNews, Topic, code_of,
 };
 use crate::address::JausId;
 use crate::codec::Message;
@@ -28,7 +29,7 @@ pub struct Stack {
     control: Control,
     /// What the services know of the control.
     standing: Standing,
-    changed: BTreeSet<u16>,
+    news: News,
     inquiries: Inquiries,
     subscriptions: Subscriptions,
     controls: Controls,
@@ -64,7 +65,7 @@ impl Stack {
             subscribers: Events::new(EventSettings::default()),
             control: Control::default(),
             standing: Standing::default(),
-            changed: BTreeSet::new(),
+            news: News::default(),
             inquiries: Inquiries::default(),
             subscriptions: Subscriptions::default(),
             controls: Controls::default(),
@@ -134,7 +135,14 @@ impl Stack {
 
     /// The application tells that the answer to the query with this code is another now.
     pub fn announce(&mut self, now: Instant, query: u16) {
-        self.changed.insert(query);
+        self.news.changed.insert(query);
+        self.collect(now);
+    }
+
+    /// The application tells that the command with this code has ended, and whether it has done what
+    /// it was to do.
+    pub fn end_command(&mut self, now: Instant, command: u16, successful: bool) {
+        self.news.ended.push((command, successful));
         self.collect(now);
     }
 
@@ -158,7 +166,7 @@ impl Stack {
             handled = self.control.handle_message(now, message, &mut self.out);
         }
         if handled == Handled::No {
-            handled = self.handle_by_services(now, message);
+            handled = self.handle_message_for_services(now, message);
         }
         self.collect(now);
         match answered {
@@ -173,10 +181,21 @@ impl Stack {
         }
     }
 
+    /// Hands a message to the services. A command takes the place of the one with the same code
+    /// whose end somebody waits for.
+    fn handle_message_for_services(&mut self, now: Instant, message: &Received) -> Handled {
+        if let Some(code) = code_of(&message.payload)
+            && self.standing.acts_for(message.source)
+        {
+            self.subscribers.end_command(code, false, &mut self.out);
+        }
+        self.handle_by_services(now, message)
+    }
+
     fn handle_by_services(&mut self, now: Instant, message: &Received) -> Handled {
-        let (out, standing, changed) = (&mut self.out, &self.standing, &mut self.changed);
+        let (out, standing, news) = (&mut self.out, &self.standing, &mut self.news);
         let handled = self.services.iter_mut().any(|service| {
-            let mut context = Context::new(out, standing, changed);
+            let mut context = Context::new(out, standing, news);
             service.handle_message(now, message, &mut context) == Handled::Yes
         });
         if handled { Handled::Yes } else { Handled::No }
@@ -187,6 +206,7 @@ impl Stack {
         match events.handle_message(now, message, &mut self.out) {
             Outcome::NotOurs => return Handled::No,
             Outcome::Done => {}
+            Outcome::TryCommand(trial) => self.carry_out(now, &trial),
             Outcome::Try(trial) => {
                 let report = self.answer(now, trial.client(), &trial.query);
                 let events = &mut self.subscribers;
@@ -194,6 +214,23 @@ impl Stack {
             }
         }
         Handled::Yes
+    }
+
+    /// Carries out a command whose end a client wants to be told of.
+    fn carry_out(&mut self, now: Instant, trial: &CommandTrial) {
+        let code = trial.code;
+        let told = self.services.iter().any(|it| it.tells_end_of(code));
+        let refusal = if !told {
+            Some(Refusal::NobodyTells)
+        } else if !self.standing.acts_for(trial.client()) {
+            Some(Refusal::NotAllowed)
+        } else {
+            None
+        };
+        let events = &mut self.subscribers;
+        if events.begin_command(now, trial, refusal, &mut self.out) {
+            self.handle_by_services(now, &trial.command());
+        }
     }
 
     /// What the component would answer to a client's query, if anything.
@@ -210,14 +247,14 @@ impl Stack {
         };
         // What is said meanwhile is the answer and goes nowhere; a query changes nothing.
         let out = std::mem::replace(&mut self.out, Outbox::new(id));
-        let changed = std::mem::take(&mut self.changed);
+        let news = std::mem::take(&mut self.news);
         let discovered = self.discovery.handle_quoted(now, &message, &mut self.out);
         if discovered == Handled::No
             && self.control.handle_message(now, &message, &mut self.out) == Handled::No
         {
             self.handle_by_services(now, &message);
         }
-        self.changed = changed;
+        self.news = news;
         let mut said = std::mem::replace(&mut self.out, out);
         std::iter::from_fn(|| said.pop())
             .find(|answer| answer.destination == client)
@@ -380,7 +417,7 @@ impl Stack {
         self.control.handle_timeout(now, &mut self.out);
         self.subscribers.expire(now, &mut self.out);
         for service in &mut self.services {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
             service.handle_timeout(now, &mut context);
         }
         self.inquiries.handle_timeout(now, &mut self.out);
@@ -396,7 +433,7 @@ impl Stack {
                 self.control.forget(id, &mut self.out);
                 self.subscribers.forget(id);
             }
-            self.changed.extend(Discovery::QUERIES);
+            self.news.changed.extend(Discovery::QUERIES);
             self.events.push_back(Event::Change(change));
         }
         self.follow_control(now);
@@ -421,14 +458,15 @@ impl Stack {
             return;
         }
         if before.state != after.state {
-            self.changed.insert(QueryStatus::CODE);
+            self.news.changed.insert(QueryStatus::CODE);
         }
         if before.controller != after.controller {
-            self.changed
+            self.news
+                .changed
                 .extend([QueryControl::CODE, QueryAuthority::CODE]);
         }
         for service in &mut self.services {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.changed);
+            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
             service.handle_standing(now, &before, &mut context);
         }
         self.events.push_back(Event::Standing(after));
@@ -436,7 +474,12 @@ impl Stack {
 
     /// Sends what clients have subscribed to and is due, or has changed.
     fn tell_subscribers(&mut self, now: Instant) {
-        for query in std::mem::take(&mut self.changed) {
+        let news = std::mem::take(&mut self.news);
+        for (command, successful) in news.ended {
+            let events = &mut self.subscribers;
+            events.end_command(command, successful, &mut self.out);
+        }
+        for query in news.changed {
             self.subscribers.handle_change(now, query);
         }
         while let Some(due) = self.subscribers.poll_due(now) {

@@ -262,7 +262,7 @@ mod tests {
         let (mut rig, clock) = rig(BEFORE_MIDNIGHT);
         rig.stand(State::Standby, Some(CLIENT));
         rig.send(CLIENT, &set(Some(at(1, 12, 30)), Some(on(30, 12, 1))));
-        assert!(rig.changed.contains(&QueryTime::CODE));
+        assert!(rig.news.changed.contains(&QueryTime::CODE));
         assert_eq!(shown(&mut rig), (on(30, 12, 1), at(1, 12, 30)));
         clock.fetch_add(60_000, Ordering::Relaxed);
         assert_eq!(shown(&mut rig), (on(30, 12, 1), at(1, 12, 31)));
@@ -276,7 +276,7 @@ mod tests {
         rig.stand(State::Ready, None);
         rig.send(CLIENT, &set(None, Some(on(30, 12, 1))));
         assert_eq!(shown(&mut rig), before);
-        assert!(rig.changed.is_empty());
+        assert!(rig.news.changed.is_empty());
     }
 
     #[test]

@@ -20,8 +20,10 @@
 //!   it would create them anew every five seconds, at 1 Hz.
 //! * Events do not expire unless [`EventSettings::timeout`] is set: clients of version 1.0 do not
 //!   know that they could. What is sent to a client that discovery finds gone ends.
-//! * Command events (1.1) are refused as unsupported: no service here tells when a command ends.
+//! * Command events (1.1) are for commands whose end a service [tells](super::Service::tells_end_of),
+//!   and for clients that may give them; others are refused before anything is carried out.
 
+mod commands;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -41,6 +43,8 @@ use crate::messages::core::{
     QueryEventTimeout, QueryEvents, RejectEventRequest, ReportEventTimeout, ReportEvents,
     UpdateEvent, report_event_timeout, report_events,
 };
+use commands::Commands;
+pub(super) use commands::{CommandTrial, Refusal};
 pub(super) use table::Due;
 use table::{Kind, Name, Subscription, Table};
 
@@ -87,6 +91,7 @@ impl Default for EventSettings {
 pub(super) struct Events {
     settings: EventSettings,
     table: Table,
+    commands: Commands,
 }
 
 /// What became of a message.
@@ -98,6 +103,8 @@ pub(super) enum Outcome {
     Done,
     /// Whether the event can be had depends on whether anybody answers its query.
     Try(Trial),
+    /// Whether the command is carried out depends on the services and on who is in control.
+    TryCommand(CommandTrial),
 }
 
 /// A subscription that is wanted.
@@ -123,6 +130,7 @@ impl Events {
         Self {
             settings,
             table: Table::default(),
+            commands: Commands::default(),
         }
     }
 
@@ -167,11 +175,7 @@ impl Events {
                 Outcome::Done
             }
             Some(CreateCommandEvent::CODE) => {
-                if let Some(create) = read::<CreateCommandEvent>(message) {
-                    let why = ResponseCode::MESSAGE_NOT_SUPPORTED;
-                    reject(message, create.request_id, why, out);
-                }
-                Outcome::Done
+                read(message).map_or(Outcome::Done, |it| create_command(message, it, out))
             }
             _ => Outcome::NotOurs,
         }
@@ -195,10 +199,12 @@ impl Events {
     }
 
     fn cancel(&mut self, message: &Received, cancel: &CancelEvent, out: &mut Outbox) {
-        match self.table.remove((message.source, cancel.event_id)) {
-            Some(ended) => {
-                let name = (message.source, cancel.event_id);
-                confirm(message, cancel.request_id, name, &ended, out);
+        let name = (message.source, cancel.event_id);
+        match self.table.remove(name) {
+            Some(ended) => confirm(message, cancel.request_id, name, &ended, out),
+            None if self.commands.remove(name) => {
+                // The command goes on; its end is no longer told.
+                out.reply(message, &confirmation(cancel.request_id, cancel.event_id));
             }
             None => reject(message, cancel.request_id, INVALID_EVENT, out),
         }
@@ -256,7 +262,7 @@ impl Events {
             let why = ResponseCode::CONNECTION_REFUSED;
             return reject(&trial.request, trial.request_id, why, out);
         }
-        let Some(id) = known.or_else(|| self.table.free_id(client)) else {
+        let Some(id) = known.or_else(|| self.free_id(client)) else {
             let why = ResponseCode::CONNECTION_REFUSED;
             return reject(&trial.request, trial.request_id, why, out);
         };
@@ -283,6 +289,12 @@ impl Events {
             }
         }
         self.table.insert(name, subscription);
+    }
+
+    /// A number that names no event of the client yet.
+    fn free_id(&self, client: JausId) -> Option<u8> {
+        let taken = |name| self.commands.contains(name);
+        self.table.free_id(client, taken)
     }
 
     /// What the client gets of what it wants.
@@ -327,16 +339,14 @@ impl Events {
     /// A client is gone, as far as discovery can tell.
     pub(super) fn forget(&mut self, client: JausId) {
         self.table.remove_client(client);
+        self.commands.remove_client(client);
     }
 
     /// Events that their clients have not renewed end, and the clients are told.
     pub(super) fn expire(&mut self, now: Instant, out: &mut Outbox) {
+        self.expire_commands(now, out);
         for (name, ended) in self.table.take_expired(now) {
-            let mut told = ConfirmEventRequest {
-                request_id: ended.request_id,
-                event_id: name.1,
-                ..ConfirmEventRequest::default()
-            };
+            let mut told = confirmation(ended.request_id, name.1);
             set_rate(&mut told, &ended);
             out.send(name.0, &told);
         }
@@ -372,7 +382,8 @@ impl Events {
     }
 
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
-        self.table.poll_timeout()
+        let commands = self.commands.poll_timeout();
+        self.table.poll_timeout().into_iter().chain(commands).min()
     }
 
     pub(super) fn len(&self) -> usize {
@@ -393,6 +404,17 @@ fn create(message: &Received, create: &CreateEvent, out: &mut Outbox) -> Outcome
         query: own(&create.query_message),
     };
     check(trial, out)
+}
+
+fn create_command(message: &Received, create: CreateCommandEvent, out: &mut Outbox) -> Outcome {
+    let request_id = create.request_id;
+    match CommandTrial::new(message, create) {
+        Ok(trial) => Outcome::TryCommand(trial),
+        Err(why) => {
+            reject(message, request_id, why, out);
+            Outcome::Done
+        }
+    }
 }
 
 /// A query without the rest of the datagram that it came in. What is too long is cut, and
@@ -445,13 +467,18 @@ fn confirm(
     subscription: &Subscription,
     out: &mut Outbox,
 ) {
-    let mut confirm = ConfirmEventRequest {
+    let mut confirm = confirmation(request_id, event_id);
+    set_rate(&mut confirm, subscription);
+    out.reply(request, &confirm);
+}
+
+/// A confirmation without a rate.
+fn confirmation(request_id: u8, event_id: u8) -> ConfirmEventRequest {
+    ConfirmEventRequest {
         request_id,
         event_id,
         ..ConfirmEventRequest::default()
-    };
-    set_rate(&mut confirm, subscription);
-    out.reply(request, &confirm);
+    }
 }
 
 fn set_rate(confirm: &mut ConfirmEventRequest, subscription: &Subscription) {

@@ -102,10 +102,12 @@ impl Table {
     }
 
     /// The lowest number that a client does not use, beginning with 1: 0 means none to some peers.
-    pub(super) fn free_id(&self, client: JausId) -> Option<u8> {
+    pub(super) fn free_id(&self, client: JausId, taken: impl Fn(Name) -> bool) -> Option<u8> {
         (1..=u8::MAX)
             .chain([0])
-            .find(|&id| !self.subscriptions.contains_key(&(client, id)))
+            .map(|id| (client, id))
+            .find(|name| !self.subscriptions.contains_key(name) && !taken(*name))
+            .map(|(_, id)| id)
     }
 
     /// Puts a subscription in, in place of another of that name.

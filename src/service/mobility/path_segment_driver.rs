@@ -76,6 +76,10 @@ impl Behaviour for LocalPathSegmentDriver {
         Handled::Yes
     }
 
+    fn tells_end_of(&self, command: u16) -> bool {
+        travel::tells_end_of(command)
+    }
+
     fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
         cockpit.work_off(context);
     }
@@ -111,6 +115,10 @@ impl Behaviour for GlobalPathSegmentDriver {
             _ => return travel::handle_list(code, exchange),
         }
         Handled::Yes
+    }
+
+    fn tells_end_of(&self, command: u16) -> bool {
+        travel::tells_end_of(command)
     }
 
     fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {

@@ -1,5 +1,6 @@
 //! The mobility services on a simulated vehicle, under virtual time.
 
+mod commands;
 mod lists;
 mod paths;
 mod sensors;

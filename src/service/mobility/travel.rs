@@ -32,6 +32,8 @@ pub(super) struct Travel {
     /// The element after it, 0 if it is the last.
     next: u16,
     ticket: Option<Ticket>,
+    /// The code of the command that the journey carries out, until its end is told.
+    command: Option<u16>,
 }
 
 impl Cockpit {
@@ -48,13 +50,30 @@ impl Cockpit {
             .is_some()
     }
 
-    /// Sets the place to drive to, and sets out if there is a speed.
-    pub(super) fn set_place(&mut self, place: Place) {
+    /// Sets the place to drive to, for a command with this code, and sets out if there is a speed.
+    pub(super) fn set_place(&mut self, place: Place, command: u16, context: &mut Context<'_>) {
+        self.take_up(command, context);
         self.travel.place = Some(place);
         self.travel.start = self.here();
         self.travel.active = None;
         self.travel.next = 0;
         self.set_out();
+    }
+
+    /// From now on the journey is for another command.
+    fn take_up(&mut self, command: u16, context: &mut Context<'_>) {
+        let before = self.travel.command.replace(command);
+        // Another command of the same code replaces the one before by itself.
+        if let Some(before) = before.filter(|&before| before != command) {
+            context.ended(before, false);
+        }
+    }
+
+    /// Tells the end of the command that the journey was for.
+    fn finish(&mut self, successful: bool, context: &mut Context<'_>) {
+        if let Some(command) = self.travel.command.take() {
+            context.ended(command, successful);
+        }
     }
 
     /// Changes the speed, and sets out or stops accordingly.
@@ -123,6 +142,9 @@ impl Cockpit {
             return;
         }
         let Some(active) = self.travel.active else {
+            if self.pilot.has_arrived(ticket) {
+                self.finish(true, context);
+            }
             return;
         };
         // The list may have been changed meanwhile.
@@ -145,7 +167,10 @@ impl Cockpit {
             let next = self.elements.get(element.next_uid);
             match next.filter(|_| element.next_uid != 0) {
                 Some(next) => self.begin(&next, self.travel.speed),
-                None => self.travel.active = None,
+                None => {
+                    self.travel.active = None;
+                    self.finish(true, context);
+                }
             }
             changed(context);
         }
@@ -153,6 +178,7 @@ impl Cockpit {
 
     /// Forgets the journey, but not the place.
     pub(super) fn abandon(&mut self, context: &mut Context<'_>) {
+        self.finish(false, context);
         let place = self.travel.place;
         let is_reset = context.standing().state == State::Initialize;
         self.travel = Travel {
@@ -197,19 +223,25 @@ pub(super) fn handle_speed(code: u16, exchange: &mut Exchange<'_, '_>) -> Handle
     Handled::Yes
 }
 
+/// Whether drivers along a list tell the end of a command with this code.
+pub(super) const fn tells_end_of(command: u16) -> bool {
+    matches!(command, ExecuteList::CODE | ExecuteListExt::CODE)
+}
+
 /// What drivers along a list do with messages about its execution.
 pub(super) fn handle_list(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
     match code {
         ExecuteList::CODE => {
             if let Some(message) = exchange.command::<ExecuteList>() {
-                execute(message.element_uid, message.speed_m_per_s(), exchange);
+                let speed = message.speed_m_per_s();
+                execute(code, message.element_uid, speed, exchange);
             }
         }
         ExecuteListExt::CODE => {
             if let Some(message) = exchange.command::<ExecuteListExt>()
                 && let Some(speed) = metres_per_second(message.speed)
             {
-                execute(message.element_uid, speed, exchange);
+                execute(code, message.element_uid, speed, exchange);
             }
         }
         QueryActiveElement::CODE => {
@@ -252,14 +284,17 @@ fn set_speed(speed: f64, exchange: &mut Exchange<'_, '_>) {
 
 /// Begins with an element of the list; without one, the speed of a list that is being worked off
 /// is changed.
-fn execute(uid: Option<u16>, speed: f64, exchange: &mut Exchange<'_, '_>) {
+fn execute(code: u16, uid: Option<u16>, speed: f64, exchange: &mut Exchange<'_, '_>) {
     let source = exchange.message.source;
     match uid {
         Some(uid) if !exchange.cockpit.execute(uid, speed) => {
             tracing::info!(%source, uid, "list not executed: there is no such element");
             return;
         }
-        Some(uid) => tracing::info!(%source, uid, speed, "list executed"),
+        Some(uid) => {
+            tracing::info!(%source, uid, speed, "list executed");
+            exchange.cockpit.take_up(code, exchange.context);
+        }
         None if exchange.cockpit.travel.active.is_some() => {
             tracing::info!(%source, speed, "travel speed of the list set");
             exchange.cockpit.set_speed(speed);

@@ -214,6 +214,12 @@ pub(super) trait Behaviour: Send {
     /// Deals with a message that has this code.
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled;
 
+    /// Whether this service tells the end of commands with this code.
+    fn tells_end_of(&self, command: u16) -> bool {
+        let _ = command;
+        false
+    }
+
     /// The vehicle has moved: says which answers are others now.
     fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
         let _ = (cockpit, context);
@@ -299,6 +305,10 @@ impl Service for OnVehicle {
             cockpit.pilot.stop();
             self.behaviour.handle_stop(&mut cockpit, context);
         }
+    }
+
+    fn tells_end_of(&self, command: u16) -> bool {
+        self.behaviour.tells_end_of(command)
     }
 
     fn poll_timeout(&self) -> Option<Instant> {

@@ -26,13 +26,19 @@ impl<K: Kind> Behaviour for WaypointDriver<K> {
 
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         if code == K::Set::CODE {
-            set(exchange.configure::<K::Set>().map(Into::into), exchange);
+            let place = exchange.configure::<K::Set>().map(Into::into);
+            set(place, code, exchange);
         } else if code == K::SetExt::CODE {
-            set(exchange.configure::<K::SetExt>().map(Into::into), exchange);
+            let place = exchange.configure::<K::SetExt>().map(Into::into);
+            set(place, code, exchange);
         } else if K::handle_query(code, exchange) == Handled::No {
             return travel::handle_speed(code, exchange);
         }
         Handled::Yes
+    }
+
+    fn tells_end_of(&self, command: u16) -> bool {
+        command == K::Set::CODE || command == K::SetExt::CODE
     }
 
     fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
@@ -45,7 +51,7 @@ impl<K: Kind> Behaviour for WaypointDriver<K> {
 }
 
 /// Takes a waypoint; with a travel speed, the vehicle sets out at once.
-fn set(place: Option<Place>, exchange: &mut Exchange<'_, '_>) {
+fn set(place: Option<Place>, command: u16, exchange: &mut Exchange<'_, '_>) {
     let Some(place) = place else {
         return;
     };
@@ -55,6 +61,6 @@ fn set(place: Option<Place>, exchange: &mut Exchange<'_, '_>) {
         return;
     }
     tracing::info!(%source, ?place, "waypoint set");
-    exchange.cockpit.set_place(place);
+    exchange.cockpit.set_place(place, command, exchange.context);
     travel::changed(exchange.context);
 }

@@ -34,6 +34,10 @@ impl<K: Kind> Behaviour for WaypointListDriver<K> {
         }
     }
 
+    fn tells_end_of(&self, command: u16) -> bool {
+        travel::tells_end_of(command)
+    }
+
     fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
         cockpit.work_off(context);
     }

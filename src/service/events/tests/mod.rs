@@ -5,6 +5,7 @@
 )]
 
 mod bounds;
+mod commands;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};

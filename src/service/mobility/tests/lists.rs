@@ -51,7 +51,7 @@ fn the_waypoints_of_a_list_are_reached_in_order_and_the_vehicle_stops_at_the_las
         assert_eq!(reached, next);
         assert!(pose.distance(x, y) <= 0.55, "{pose:?} is not {x} {y}");
     }
-    assert!(rig.changed.contains(&QueryActiveElement::CODE));
+    assert!(rig.news.changed.contains(&QueryActiveElement::CODE));
     rig.run(seconds(2.0));
     let motion = vehicle.motion();
     assert!(motion.velocity.is_rest() && motion.pose.distance(0.0, 0.0) <= 0.5);

@@ -84,7 +84,7 @@ fn the_local_pose_is_set_by_the_client_in_control_alone_in_every_state() {
         assert!((report.y_m().unwrap() + 1000.0).abs() < 0.001);
         rig.send(CLIENT, &pose(0.0, 0.0));
     }
-    assert!(rig.changed.contains(&QueryLocalPose::CODE));
+    assert!(rig.news.changed.contains(&QueryLocalPose::CODE));
     rig.stand(State::Ready, None);
     rig.send(CLIENT, &pose(7.0, 7.0));
     assert!(local_pose(&mut rig).x_m().unwrap().abs() < 0.001);
@@ -135,7 +135,7 @@ fn the_magnetic_variation_is_what_was_set() {
 fn effort_moves_the_vehicle_and_all_sensors_agree_on_it() {
     let (mut rig, _) = rig();
     rig.send(CLIENT, &effort(100.0, 0.0));
-    rig.changed.clear();
+    rig.news.changed.clear();
     rig.run(seconds(0.5));
     let presence_vector = 0xFFFF;
     let report: ReportAccelerationState = rig
@@ -167,7 +167,7 @@ fn effort_moves_the_vehicle_and_all_sensors_agree_on_it() {
         QueryLocalPose::CODE,
         QueryGlobalPose::CODE,
     ] {
-        assert!(rig.changed.contains(&code), "{code:04X}");
+        assert!(rig.news.changed.contains(&code), "{code:04X}");
     }
 }
 

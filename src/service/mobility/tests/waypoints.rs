@@ -52,7 +52,7 @@ fn a_waypoint_is_reported_as_it_was_set_with_the_wanted_fields_it_has() {
     let query = QueryLocalWaypointExt { presence_vector };
     let report: ReportLocalWaypointExt = rig.ask(&query).unwrap();
     assert!((report.x_m() - 1.0).abs() < 0.01 && report.heading.is_some());
-    assert!(rig.changed.contains(&QueryLocalWaypoint::CODE));
+    assert!(rig.news.changed.contains(&QueryLocalWaypoint::CODE));
 }
 
 #[test]
