@@ -2,7 +2,6 @@
 //! never two controllers, only the one in control makes the vehicle act, an emergency stops it
 //! whoever is in control, and who has lost control knows it soon.
 
-use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -10,14 +9,14 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::endpoint::{Config, Endpoint, Event as EndpointEvent};
 use jaus::messages::core::{
-    ClearEmergency, ConfirmControl, DeleteElement, RejectControl, Reset, Resume, SetEmergency,
-    Standby, list_manager,
+    ClearEmergency, DeleteElement, Reset, Resume, SetEmergency, Standby, list_manager,
 };
 use jaus::service::{
     AccessControl, ControlId, ControlNews, Discovery, Event, Handlers, Kind, Management, Patience,
     Profile, Scope, Service, Stack, Timing,
 };
 
+use crate::rules::Rules;
 use crate::sim::{Conditions, Host, Network, Owner, Random};
 
 const VEHICLE: JausId = JausId::new(101, 1, 1);
@@ -53,11 +52,10 @@ pub(crate) fn run(seed: u64) -> Result<(), String> {
 /// The vehicle, with what an onlooker on the wire knows of it.
 struct Vehicle {
     stack: Stack,
-    /// Whom it has told that they are in control.
-    controller: Option<JausId>,
-    emergencies: BTreeSet<JausId>,
+    rules: Rules,
     /// Whose commands it has acted on since the last look.
     acted: Arc<Mutex<Vec<JausId>>>,
+    /// The first promise that it has broken.
     broken: Option<String>,
 }
 
@@ -95,52 +93,25 @@ impl Vehicle {
         stack.start(now);
         Party::Vehicle(Box::new(Self {
             stack,
-            controller: None,
-            emergencies: BTreeSet::new(),
+            rules: Rules::new(now, Duration::from_secs(timeout.into())),
             acted,
             broken: None,
         }))
     }
 
-    /// What comes in, as an onlooker understands it.
-    fn look_at(&mut self, source: JausId, payload: &bytes::Bytes) {
-        if SetEmergency::decode(payload).is_ok() {
-            self.emergencies.insert(source);
-        } else if ClearEmergency::decode(payload).is_ok() {
-            self.emergencies.remove(&source);
-        }
-    }
-
     fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        let mut outcome = Ok(());
         while let Some(message) = self.stack.poll_transmit() {
-            self.overhear(message.destination, &message.payload);
+            outcome = outcome.and_then(|()| self.rules.say(now, &message));
             // There may be no way to the operator any more.
             let _ = endpoint.send(now, message);
         }
         while self.stack.poll_event().is_some() {}
-        for who in std::mem::take(&mut *self.acted.lock().expect("no panic")) {
-            if self.controller != Some(who) {
-                self.broken = Some(format!("acts for {who} and not for {:?}", self.controller));
-            } else if !self.emergencies.is_empty() {
-                self.broken = Some(format!("acts in an emergency of {:?}", self.emergencies));
-            }
-        }
-    }
-
-    fn overhear(&mut self, to: JausId, payload: &bytes::Bytes) {
-        if let Ok(confirm) = ConfirmControl::decode(payload) {
-            if confirm.response_code.0 != 0 {
-                return;
-            }
-            if let Some(other) = self.controller.filter(|other| *other != to) {
-                self.broken = Some(format!("{to} and {other} are both in control"));
-            }
-            self.controller = Some(to);
-        } else if let Ok(reject) = RejectControl::decode(payload) {
-            // In an emergency a release is refused, and control is kept.
-            if reject.response_code.0 == 0 && self.controller == Some(to) {
-                self.controller = None;
-            }
+        let acted_for = std::mem::take(&mut *self.acted.lock().expect("no panic"));
+        let standing = self.stack.standing();
+        let outcome = outcome.and_then(|()| self.rules.judge(now, standing, &acted_for));
+        if let Err(reason) = outcome {
+            self.broken.get_or_insert(reason);
         }
     }
 }
@@ -197,7 +168,7 @@ impl Owner for Party {
         };
         match self {
             Self::Vehicle(vehicle) => {
-                vehicle.look_at(message.source, &message.payload);
+                vehicle.rules.hear(now, &message);
                 vehicle.stack.handle_message(now, &message);
                 vehicle.settle(now, endpoint);
             }

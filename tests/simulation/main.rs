@@ -13,6 +13,7 @@ mod control;
 mod large;
 mod ledger;
 mod producer;
+mod rules;
 mod scenario;
 mod seeds;
 #[path = "../sim/mod.rs"]

@@ -1,0 +1,134 @@
+//! What a vehicle under Management may do, concluded from nothing but what it hears and says: for
+//! whom it acts, in which state it is, and who is in control.
+
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::endpoint::{Outgoing, Received};
+use jaus::messages::core::{
+    ClearEmergency, ConfirmControl, DeleteElement, RejectControl, RequestControl, Reset, Resume,
+    SetEmergency, Standby, confirm_control, reject_control,
+};
+use jaus::service::{Standing, State};
+
+pub(crate) struct Rules {
+    /// How long control lasts without being renewed; zero is for ever.
+    timeout: Duration,
+    /// Who was told last to be in control, and has not been told otherwise.
+    told: Option<JausId>,
+    /// When it asked for it last.
+    asked: Instant,
+    emergencies: BTreeSet<JausId>,
+    /// Whether the client in control has said Resume, and nothing has stopped the vehicle since.
+    resumed: bool,
+    /// For whom it should act now.
+    acts_for: Vec<JausId>,
+}
+
+/// The message code at the head of a payload.
+fn code_of(payload: &[u8]) -> Option<u16> {
+    payload.first_chunk().map(|&code| u16::from_le_bytes(code))
+}
+
+impl Rules {
+    /// What the vehicle acts on; any command would do.
+    const COMMAND: u16 = DeleteElement::CODE;
+
+    pub(crate) fn new(now: Instant, timeout: Duration) -> Self {
+        Self {
+            timeout,
+            told: None,
+            asked: now,
+            emergencies: BTreeSet::new(),
+            resumed: false,
+            acts_for: Vec::new(),
+        }
+    }
+
+    /// The vehicle is about to hear something.
+    pub(crate) fn hear(&mut self, now: Instant, message: &Received) {
+        let client = message.source;
+        let commands = self.told == Some(client) && self.emergencies.is_empty();
+        match code_of(&message.payload) {
+            Some(SetEmergency::CODE) => {
+                self.emergencies.insert(client);
+                self.resumed = false;
+            }
+            Some(ClearEmergency::CODE) if self.emergencies.remove(&client) => {
+                // It takes no control away, and the time begins anew.
+                self.asked = now;
+            }
+            Some(Resume::CODE) if commands => self.resumed = true,
+            Some(Standby::CODE | Reset::CODE) if commands => self.resumed = false,
+            Some(RequestControl::CODE) if commands => self.asked = now,
+            Some(Self::COMMAND) if commands && self.resumed => self.acts_for.push(client),
+            _ => {}
+        }
+    }
+
+    /// The vehicle says something.
+    pub(crate) fn say(&mut self, now: Instant, message: &Outgoing) -> Result<(), String> {
+        let client = message.destination;
+        if let Ok(confirm) = ConfirmControl::decode(&message.payload) {
+            if confirm.response_code != confirm_control::ResponseCode::CONTROL_ACCEPTED {
+                return Ok(());
+            }
+            if !self.emergencies.is_empty() {
+                return Err(format!("{client} is granted control in an emergency"));
+            }
+            if let Some(told) = self.told.filter(|&told| told != client) {
+                return Err(format!("{told} and {client} are both in control"));
+            }
+            self.told = Some(client);
+            self.asked = now;
+        } else if let Ok(reject) = RejectControl::decode(&message.payload)
+            && reject.response_code == reject_control::ResponseCode::CONTROL_RELEASED
+            && self.told == Some(client)
+        {
+            self.told = None;
+        }
+        Ok(())
+    }
+
+    /// Whether the vehicle is and has done what it should.
+    pub(crate) fn judge(
+        &mut self,
+        now: Instant,
+        standing: &Standing,
+        acted_for: &[JausId],
+    ) -> Result<(), String> {
+        let controller = standing.controller.map(|it| it.id);
+        if controller != self.told {
+            let told = self.told;
+            return Err(format!(
+                "{controller:?} is in control, and {told:?} was told"
+            ));
+        }
+        self.resumed &= controller.is_some();
+        if (standing.state == State::Emergency) == self.emergencies.is_empty() {
+            let clients = &self.emergencies;
+            return Err(format!(
+                "{} with emergencies of {clients:?}",
+                standing.state
+            ));
+        }
+        if (standing.state == State::Ready) != self.resumed {
+            let resumed = self.resumed;
+            return Err(format!("{} with resumed: {resumed}", standing.state));
+        }
+        let acts_for = std::mem::take(&mut self.acts_for);
+        if acted_for != acts_for {
+            return Err(format!("acted for {acted_for:?} instead of {acts_for:?}"));
+        }
+        let idle = now.saturating_duration_since(self.asked);
+        let limit = self.timeout + self.timeout / 4;
+        let lasts = self.timeout.is_zero() || controller.is_none() || idle <= limit;
+        if lasts || standing.state == State::Emergency {
+            Ok(())
+        } else {
+            Err(format!("{controller:?} has not asked again for {idle:?}"))
+        }
+    }
+}
