@@ -9,8 +9,8 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::messages::core::{
     CancelEvent, ConfirmControl, ConfirmElementRequest, ConfirmEventRequest, CreateEvent, Event,
-    QueryEvents, RejectControl, RejectEventRequest, ReleaseControl, RequestControl, SetElement,
-    UpdateEvent, query_events::QueryEventsVar,
+    QueryEvents, RejectControl, RejectEventRequest, ReleaseControl, RequestControl, Reset,
+    SetElement, UpdateEvent, query_events::QueryEventsVar,
 };
 use jaus::wire::{Frame, judp};
 
@@ -220,7 +220,8 @@ pub(crate) fn answers_to(code: u16) -> Vec<u16> {
         CreateEvent::CODE => vec![ConfirmEventRequest::CODE, RejectEventRequest::CODE],
         UpdateEvent::CODE | CancelEvent::CODE => vec![ConfirmEventRequest::CODE],
         RequestControl::CODE => vec![ConfirmControl::CODE],
-        ReleaseControl::CODE => vec![RejectControl::CODE],
+        // Who resets is in control, and is released.
+        ReleaseControl::CODE | Reset::CODE => vec![RejectControl::CODE],
         SetElement::CODE => vec![ConfirmElementRequest::CODE],
         query if query >> 12 == 2 => vec![query + 0x2000],
         _ => Vec::new(),
