@@ -34,7 +34,7 @@ fn reason_with(steps: &[&str], step: &str, peer: Peer) -> String {
     let flags = network();
     let _peer = peer.start(&flags);
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
-    let judge = ["judge", "105.1.1", "--unicast", "--limit", "0.3", "--json"];
+    let judge = ["judge", "105.1.1", "--unicast", "--limit", "1", "--json"];
     let run = run(&[&judge, steps, &*network].concat(), b"");
     assert_eq!(run.status, 1, "{run:?}");
     let lines = run.json();
@@ -62,7 +62,7 @@ fn silence_is_told_with_who_had_to_say_what_to_whom_and_how_long_was_waited() {
     let peer = Peer::offering(&[access_control::URN]);
     assert_eq!(
         reason("B13", peer),
-        "no ReportControl came to 42.2.1 within 0.3 s"
+        "no ReportControl came to 42.2.1 within 1 s"
     );
 }
 
@@ -70,10 +70,10 @@ fn silence_is_told_with_who_had_to_say_what_to_whom_and_how_long_was_waited() {
 fn an_answer_after_the_limit_is_none() {
     let peer = Peer::offering(&[access_control::URN])
         .answers::<QueryControl>(&in_control(JausId::new(0, 0, 0), 0))
-        .late(Duration::from_millis(450));
+        .late(Duration::from_millis(1500));
     assert_eq!(
         reason("B13", peer),
-        "no ReportControl came to 42.2.1 within 0.3 s"
+        "no ReportControl came to 42.2.1 within 1 s"
     );
 }
 
@@ -84,7 +84,7 @@ fn an_answer_to_another_than_who_asked_is_told() {
         .answers_to::<QueryControl>(JausId::new(42, 1, 1), &nobody);
     assert_eq!(
         reason("B13", peer),
-        "no ReportControl came to 42.2.1 within 0.3 s, but ReportControl to 42.1.1"
+        "no ReportControl came to 42.2.1 within 1 s, but ReportControl to 42.1.1"
     );
 }
 
@@ -94,7 +94,7 @@ fn another_answer_than_the_one_that_must_come_is_told() {
         Peer::offering(&[events::URN]).answers::<CreateEvent>(&ConfirmEventRequest::default());
     assert_eq!(
         reason("B7", peer),
-        "no RejectEventRequest came to 42.1.1 within 0.3 s, but ConfirmEventRequest to 42.1.1"
+        "no RejectEventRequest came to 42.1.1 within 1 s, but ConfirmEventRequest to 42.1.1"
     );
 }
 
