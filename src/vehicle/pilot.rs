@@ -300,6 +300,13 @@ impl Pilot {
     }
 }
 
+impl Drop for Pilot {
+    /// A platform that nobody drives any more stands still.
+    fn drop(&mut self) {
+        self.platform.drive(Drive::Stop);
+    }
+}
+
 impl Course {
     /// What to do now; notes the arrival.
     fn command(&mut self, pose: &Pose, limits: &Limits) -> Drive {

@@ -1,6 +1,7 @@
 //! A simulated vehicle under virtual time: where it gets to, and what it never does on the way.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::*;
@@ -248,6 +249,38 @@ fn whoever_is_told_to_stop_stops_within_its_brakes_and_then_wants_no_more_time()
     track.now += Duration::from_secs(3600);
     track.pilot.handle_time(track.now);
     assert_eq!(track.pilot.motion().pose, pose);
+}
+
+#[test]
+fn a_platform_whose_pilot_goes_away_is_told_to_stop() {
+    /// A platform that shows what it was told last.
+    struct Told(Arc<Mutex<Drive>>);
+
+    impl Platform for Told {
+        fn handle_time(&mut self, _: Instant) {}
+        fn motion(&self) -> Motion {
+            Motion::default()
+        }
+        fn set_pose(&mut self, _: Pose) {}
+        fn drive(&mut self, command: Drive) {
+            *self.0.lock().unwrap() = command;
+        }
+        fn limits(&self) -> Limits {
+            Limits::default()
+        }
+        fn set_limits(&mut self, _: Limits) {}
+    }
+
+    let told = Arc::new(Mutex::new(Drive::Stop));
+    let mut track = Track::new();
+    track.pilot = Pilot::new(Told(told.clone()), Frame::default());
+    track.pilot.handle_time(track.now);
+    let forward = Velocity::forward(1.0, 0.0);
+    track.pilot.pursue(Goal::Velocity(forward));
+    track.pilot.handle_time(track.now + Pilot::STEP);
+    assert_eq!(*told.lock().unwrap(), Drive::Velocity(forward));
+    drop(track);
+    assert_eq!(*told.lock().unwrap(), Drive::Stop);
 }
 
 #[test]

@@ -81,6 +81,7 @@ fn set(pose: GlobalPose, exchange: &mut Exchange<'_, '_>) {
     let (latitude, longitude, yaw) = (pose.latitude, pose.longitude, pose.yaw);
     tracing::info!(source = %exchange.message.source, latitude, longitude, yaw, "global pose set");
     exchange.cockpit.pilot.set_global_pose(pose);
+    exchange.cockpit.handle_new_frame();
     changed(exchange.context);
 }
 

@@ -67,6 +67,7 @@ fn set(pose: Pose, exchange: &mut Exchange<'_, '_>) {
     let (x, y, yaw) = (pose.x, pose.y, pose.yaw);
     tracing::info!(source = %exchange.message.source, x, y, yaw, "local pose set");
     exchange.cockpit.pilot.set_pose(pose);
+    exchange.cockpit.handle_new_frame();
     changed(exchange.context);
 }
 

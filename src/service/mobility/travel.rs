@@ -131,6 +131,19 @@ impl Cockpit {
         }
     }
 
+    /// The local frame lies elsewhere now: what is on the globe is elsewhere in it.
+    pub(super) fn handle_new_frame(&mut self) {
+        let on_globe = matches!(
+            self.travel.place,
+            Some(Place::Global(_) | Place::GlobalPath(_))
+        );
+        let is_under_way = |ticket| self.pilot.pursues(ticket) && !self.pilot.has_arrived(ticket);
+        if on_globe && self.travel.ticket.is_some_and(is_under_way) {
+            self.travel.start = self.here();
+            self.set_out();
+        }
+    }
+
     /// Goes on to the next element of the list when one has been reached.
     pub(super) fn work_off(&mut self, context: &mut Context<'_>) {
         let Some(ticket) = self.travel.ticket else {

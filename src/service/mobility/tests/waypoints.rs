@@ -7,7 +7,7 @@ use crate::messages::mobility::set_travel_speed_ext::{
 use crate::messages::mobility::{
     QueryGlobalWaypoint, QueryLocalWaypoint, QueryLocalWaypointExt, QueryTravelSpeed,
     QueryTravelSpeedExt, ReportGlobalWaypoint, ReportLocalWaypoint, ReportLocalWaypointExt,
-    ReportTravelSpeed, ReportTravelSpeedExt, SetGlobalWaypoint, SetLocalWaypointExt,
+    ReportTravelSpeed, ReportTravelSpeedExt, SetGlobalWaypoint, SetLocalPose, SetLocalWaypointExt,
     SetTravelSpeed, SetTravelSpeedExt, SetWrenchEffort,
 };
 
@@ -197,6 +197,38 @@ fn a_global_waypoint_is_driven_to_and_the_local_one_is_gone() {
     rig.run(seconds(20.0));
     let pose = vehicle.global_pose();
     assert!((pose.latitude - FRAME.0 - 0.0001).abs() < 5e-6, "{pose:?}");
+}
+
+#[test]
+fn a_global_waypoint_stays_where_it_is_when_the_local_frame_moves() {
+    let (mut rig, vehicle) = rig();
+    let mut waypoint = SetGlobalWaypoint::default();
+    waypoint.set_latitude_deg(FRAME.0 + 0.0002).unwrap();
+    waypoint.set_longitude_deg(FRAME.1).unwrap();
+    rig.send(CLIENT, &waypoint);
+    rig.send(CLIENT, &speed(2.0));
+    rig.run(seconds(5.0));
+    let mut pose = SetLocalPose::default();
+    pose.set_x_m(-500.0).unwrap();
+    pose.set_yaw_rad(2.0).unwrap();
+    rig.send(CLIENT, &pose);
+    rig.run(seconds(20.0));
+    let pose = vehicle.global_pose();
+    assert!((pose.latitude - FRAME.0 - 0.0002).abs() < 5e-6, "{pose:?}");
+    assert!(vehicle.motion().velocity.is_rest());
+}
+
+#[test]
+fn a_new_pose_at_a_local_waypoint_does_not_set_the_vehicle_in_motion() {
+    let (mut rig, vehicle) = rig();
+    rig.send(CLIENT, &local_waypoint(3.0, 0.0));
+    rig.send(CLIENT, &speed(2.0));
+    rig.run(seconds(20.0));
+    let mut pose = SetLocalPose::default();
+    pose.set_x_m(0.0).unwrap();
+    rig.send(CLIENT, &pose);
+    rig.run(seconds(5.0));
+    assert!(vehicle.motion().pose.x.abs() < 0.01);
 }
 
 #[test]
