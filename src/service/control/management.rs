@@ -18,7 +18,7 @@ impl Condition {
     const fn leads_from(self, state: State) -> State {
         match (self, state) {
             (Self::Initialized, State::Initialize | State::Failure) => State::Standby,
-            (Self::Failed, State::Shutdown) | (Self::Initialized, _) => state,
+            (Self::Failed, State::Shutdown) | (Self::Initialized | Self::Safe, _) => state,
             (Self::Failed, _) => State::Failure,
         }
     }
@@ -51,7 +51,11 @@ impl Control {
         if self.management.is_none() {
             return;
         }
-        // Told during an emergency, it counts afterwards.
+        if condition == Condition::Safe {
+            self.emergencies.clear();
+            self.end_emergency();
+        }
+        // Told during an emergency, the others count afterwards.
         let state = match &mut self.standing.state {
             State::Emergency => &mut self.resting,
             state => state,
@@ -120,9 +124,14 @@ impl Control {
     }
 
     fn clear_emergency(&mut self, client: JausId) {
-        let cleared = self.emergencies.remove(&client);
-        if cleared && self.emergencies.is_empty() {
+        if self.emergencies.remove(&client) && self.emergencies.is_empty() {
             tracing::info!(%client, "the last emergency is cleared");
+            self.end_emergency();
+        }
+    }
+
+    const fn end_emergency(&mut self) {
+        if matches!(self.standing.state, State::Emergency) {
             self.standing.state = self.resting;
         }
     }

@@ -125,6 +125,9 @@ pub enum Condition {
     Initialized,
     /// Something is broken; without effect while shutting down.
     Failed,
+    /// Whoever is responsible for the component on the spot has seen to it: every emergency is over,
+    /// also those of clients that have gone and will not clear theirs.
+    Safe,
 }
 
 /// The control over one component. Without settings anyone is obeyed, and no message is answered.

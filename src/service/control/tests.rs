@@ -433,6 +433,23 @@ fn an_emergency_ends_when_the_last_of_several_is_cleared() {
 }
 
 #[test]
+fn the_application_can_end_the_emergencies_of_clients_that_are_gone() {
+    let mut rig = Rig::ready();
+    rig.hear(SECOND, &STOP);
+    rig.hear(THIRD, &STOP);
+    rig.stack.set_condition(rig.now, Condition::Safe);
+    assert_eq!(rig.state(), State::Standby);
+    rig.hear(SECOND, &STOP);
+    rig.hear(THIRD, &CLEAR);
+    assert_eq!(rig.state(), State::Emergency, "of another emergency");
+    for state in [State::Initialize, State::Ready, State::Failure] {
+        let mut rig = Rig::brought_to(state);
+        rig.stack.set_condition(rig.now, Condition::Safe);
+        assert_eq!(rig.state(), state, "there was none");
+    }
+}
+
+#[test]
 fn in_an_emergency_control_neither_comes_nor_goes() {
     let mut rig = Rig::ready();
     rig.hear(THIRD, &STOP);
