@@ -17,15 +17,15 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::codec::{Message, ServiceId};
 use jaus::component::{
-    Component, Control, ControlError, ControlLost, FindError, Handlers, Kind, ManageError, Outage,
-    Patience, SubscribeError, Subscription, SubscriptionEnd, Update, When,
+    Component, Control, ControlError, ControlLost, FindError, Handlers, Kind, ManageError,
+    Management, Outage, Patience, SubscribeError, Subscription, SubscriptionEnd, Update, When,
 };
 use jaus::endpoint::{Outgoing, Received};
 use jaus::link::Group;
 use jaus::messages::core::{
     CancelEvent, ConfirmControl, ConfirmEventRequest, CreateEvent, Event, QueryStatus,
     RejectControl, RejectEventRequest, ReleaseControl, ReportStatus, RequestControl, Resume,
-    discovery,
+    discovery, management,
 };
 use jaus::node::{Config, Node, Port};
 
@@ -331,6 +331,58 @@ async fn resume_waits_until_the_peer_says_that_it_is_ready() {
         refused.to_string(),
         "101.1.33 was told to be in the state standby, and reports the status 1"
     );
+}
+
+#[tokio::test]
+async fn the_greater_authority_takes_control_and_an_emergency_stops_everybody() {
+    let group = own_group();
+    let start = |subsystem| Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
+    let attach = |subsystem| {
+        Component::builder(Kind::OperatorControlUnit, "Operator").attach(&start(subsystem), 1)
+    };
+    let (pupil, teacher) = (attach(42).unwrap(), attach(43).unwrap());
+    let rover = Component::builder(Kind::Vehicle, "Rover")
+        .management(Management::new())
+        .attach(&start(101), 1)
+        .unwrap();
+    let peer = within_limit(pupil.find_version(management::LATEST))
+        .await
+        .unwrap();
+    assert_eq!(peer, rover.id());
+    let query = QueryStatus {};
+    let subscribing = teacher.subscribe::<ReportStatus, _>(peer, &query, When::OnChange);
+    let mut states = within_limit(subscribing).await.unwrap();
+    // Each is waited for, because changes that follow one another too fast are told at once.
+    let mut state = async || within_limit(states.report()).await.unwrap().status.0;
+    assert_eq!(state().await, 2, "standby");
+
+    let mut held = within_limit(pupil.control(peer, 50)).await.unwrap();
+    within_limit(held.resume()).await.unwrap();
+    assert_eq!(state().await, 1, "ready");
+    let refused = within_limit(teacher.control(peer, 50)).await.unwrap_err();
+    assert!(
+        refused
+            .to_string()
+            .starts_with("no control over 101.1.1: the authority 50 is too low"),
+        "{refused}"
+    );
+    let taken = within_limit(teacher.control(peer, 60)).await.unwrap();
+    let lost = within_limit(held.lost()).await;
+    assert!(matches!(lost, ControlError::Lost { .. }), "{lost}");
+
+    within_limit(pupil.set_emergency(peer)).await.unwrap();
+    assert_eq!(state().await, 5, "emergency");
+    let refused = within_limit(taken.resume()).await.unwrap_err();
+    assert!(
+        matches!(refused, ManageError::State { found: 5, .. }),
+        "{refused}"
+    );
+    within_limit(pupil.clear_emergency(peer)).await.unwrap();
+    assert_eq!(state().await, 2, "standby");
+    within_limit(taken.resume()).await.unwrap();
+    assert_eq!(state().await, 1, "ready");
+    within_limit(taken.release()).await;
+    assert_eq!(state().await, 2, "standby");
 }
 
 #[tokio::test]

@@ -26,13 +26,18 @@ struct Bench {
 }
 
 impl Bench {
+    fn new() -> Self {
+        Self::looking_for(Scope::Nobody)
+    }
+
+    /// A client whose discovery looks for others.
     #[expect(
         clippy::disallowed_methods,
         reason = "virtual time begins at some instant"
     )]
-    fn new() -> Self {
+    fn looking_for(scope: Scope) -> Self {
         let profile = Profile::new(Kind::OperatorControlUnit, "Operator");
-        let discovery = Discovery::new(CLIENT, profile, Scope::Nobody, Timing::default(), 1);
+        let discovery = Discovery::new(CLIENT, profile, scope, Timing::default(), 1);
         let mut bench = Self {
             now: Instant::now(),
             stack: Stack::new(discovery, Vec::new()),

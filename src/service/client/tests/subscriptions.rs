@@ -9,10 +9,11 @@ use crate::codec::Message;
 use crate::messages::core::create_event::EventType;
 use crate::messages::core::{
     CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryControl, QueryEventTimeout,
-    QueryStatus, RejectEventRequest, ReportControl, ReportEventTimeout, ReportStatus,
+    QueryStatus, RejectEventRequest, ReportControl, ReportEventTimeout, ReportIdentification,
+    ReportStatus,
 };
 use crate::service::{
-    CannotSubscribe, Event as StackEvent, Outage, Patience, SubscriptionEnd, SubscriptionId,
+    CannotSubscribe, Event as StackEvent, Outage, Patience, Scope, SubscriptionEnd, SubscriptionId,
     SubscriptionNews, Topic, When,
 };
 
@@ -321,6 +322,29 @@ fn reports_on_change_are_down_when_nobody_confirms_them() {
     assert_eq!(told(&mut bench), [Told::Down(Outage::Unconfirmed)]);
     bench.run_ms(600_000);
     assert!(confirm_all(&mut bench, 3, 0.0) > 100);
+    assert_eq!(told(&mut bench), [Told::Up(None)]);
+}
+
+#[test]
+fn when_discovery_loses_the_peer_it_is_down_and_asked_for_when_the_peer_is_found() {
+    let mut bench = Bench::looking_for(Scope::System);
+    let identified = ReportIdentification {
+        query_type: 4.into(),
+        r#type: 60001.into(),
+        identification: "Rover".into(),
+    };
+    bench.hear(PEER, &identified);
+    subscribe(&mut bench, &status(When::OnChange));
+    // It is as good as silent, and goes before its first renewal.
+    confirm_all(&mut bench, 7, 0.0);
+    assert_eq!(told(&mut bench), [Told::Up(None)]);
+    bench.run_ms(19_000);
+    assert_eq!(told(&mut bench), [Told::Down(Outage::PeerLost)]);
+    bench.run_ms(60_000);
+    bench.sent.clear();
+    bench.hear(PEER, &identified);
+    bench.run_ms(0);
+    assert_eq!(confirm_all(&mut bench, 7, 0.0), 1, "not only after a pause");
     assert_eq!(told(&mut bench), [Told::Up(None)]);
 }
 
