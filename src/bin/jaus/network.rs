@@ -21,7 +21,7 @@ use crate::settings;
 #[command(next_help_heading = "Network")]
 pub(crate) struct Network {
     /// Our id, SUBSYSTEM.NODE.COMPONENT or SUBSYSTEM.NODE (then component 1) [default: 101.1.1 for
-    /// `jaus node`; the other commands take one from subsystem 60000 on]
+    /// `jaus node`, 42.1.1 for `jaus judge`; the other commands take one from subsystem 60000 on]
     #[arg(long, value_name = "ID")]
     id: Option<OwnId>,
 

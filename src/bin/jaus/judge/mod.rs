@@ -110,7 +110,10 @@ pub(crate) struct Judge {
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
 
-    /// Record what is said into this file (pcapng), with the step at each packet
+    /// Record what is said into this file (pcapng, written over), with the step at each packet
+    ///
+    /// The packets are put together from the messages that the judge's components say and hear:
+    /// sequence numbers are not those on the wire.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
 
