@@ -2,7 +2,8 @@
 //!
 //! A [`Loader`] reads definitions and resolves them into a [`Library`] of [`model`] types, with
 //! [`Diagnostics`] for everything that is wrong. From the model, [`rust`] and [`build`] write typed
-//! messages, and [`dynamic`] encodes and decodes without any generated code. The [`catalogue`]
+//! messages, and [`dynamic`] encodes and decodes without any generated code. What a service does
+//! when is in [`behaviour`]. The [`catalogue`]
 //! holds the definitions that come with the crate.
 //!
 //! ```
@@ -17,6 +18,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod behaviour;
 pub mod build;
 pub mod catalogue;
 mod check;

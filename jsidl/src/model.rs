@@ -10,6 +10,8 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::behaviour::StateMachine;
+
 /// Where something was declared: a file with the line and column (both from 1) in it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Location {
@@ -85,6 +87,9 @@ pub struct Service {
     pub inputs: Vec<Arc<Message>>,
     /// Messages that the service sends; inherited ones are not repeated.
     pub outputs: Vec<Arc<Message>>,
+    /// What the service itself says about its state machines;
+    /// [`Library::machines`](crate::Library::machines) adds what it inherits.
+    pub behaviour: Vec<StateMachine>,
     /// Where the `service_def` stands.
     pub location: Location,
 }

@@ -63,7 +63,9 @@ impl Source {
         }
     }
 
-    fn location(&self, offset: u32) -> Location {
+    /// File, line and column of a place in this text.
+    pub(crate) fn location(&self, span: Span) -> Location {
+        let offset = span.offset;
         let line = self.lines.partition_point(|&start| start <= offset).max(1);
         let start = self.lines.get(line - 1).copied().unwrap_or(0);
         Location {
@@ -113,7 +115,7 @@ impl Sources {
 
     /// File, line and column of a place.
     pub(crate) fn location(&self, span: Span) -> Location {
-        self.source(span).location(span.offset)
+        self.source(span).location(span)
     }
 
     /// The name of the file in which a place lies.
@@ -136,7 +138,7 @@ mod tests {
         let source = sources.add(Path::new("a.xml"), "\u{feff}über\r\nß x\n");
         let at = |needle: &str| {
             let offset = source.text().find(needle).expect("occurs");
-            source.location(u32::try_from(offset).expect("short"))
+            source.location(source.span(offset))
         };
         assert_eq!(at("über").to_string(), "a.xml:1:1");
         assert_eq!(at("r\r").to_string(), "a.xml:1:4");
@@ -148,11 +150,20 @@ mod tests {
         let mut sources = Sources::default();
         let text = format!("\n{}x", "ü".repeat(1000));
         let source = sources.add(Path::new("a.xml"), &text);
-        assert_eq!(source.location(1).to_string(), "a.xml:2:1");
-        assert_eq!(source.location(1 + 600).to_string(), "a.xml:2:301");
-        assert_eq!(source.location(2001).to_string(), "a.xml:2:1001");
-        assert_eq!(source.location(2002).to_string(), "a.xml:2:1002");
+        assert_eq!(source.location(source.span(1)).to_string(), "a.xml:2:1");
+        assert_eq!(
+            source.location(source.span(1 + 600)).to_string(),
+            "a.xml:2:301"
+        );
+        assert_eq!(
+            source.location(source.span(2001)).to_string(),
+            "a.xml:2:1001"
+        );
+        assert_eq!(
+            source.location(source.span(2002)).to_string(),
+            "a.xml:2:1002"
+        );
         let source = sources.add(Path::new("b.xml"), &"x".repeat(2 * BLOCK));
-        assert_eq!(source.location(512).to_string(), "b.xml:1:513");
+        assert_eq!(source.location(source.span(512)).to_string(), "b.xml:1:513");
     }
 }

@@ -101,8 +101,11 @@ fn of_fkie_only_the_message_that_cannot_be_encoded_is_left_out() {
             "CBRNSensorClass.xml: the record `CBRNRec` has 14 optional members, but its `presence_vector` has only 8 bits: use a wider `field_type_unsigned`",
         ]
     );
+    // What is said about state machines is counted elsewhere.
+    let mut warnings = findings(&loaded, Severity::Warning);
+    warnings.retain(|warning| !warning.contains("`initial_state`"));
     assert_eq!(
-        findings(&loaded, Severity::Warning),
+        warnings,
         [
             "CBRNSensor.xml: `CBDetailedMeasurement` has the code F932, which is also that of `RNDetailedMeasurement`: a receiver cannot tell them apart, so change one `message_id`",
             "HealthMonitor_V1.4.xml: the service `urn:jaus:jss:exp:aeodrs:HealthReporter 1.4`, of which this one is a client, is not loaded",

@@ -4,6 +4,7 @@
 //! Each rule looks at one construct, says what it finds and answers whether the construct is
 //! sound. Following references is not its business.
 
+mod behaviour;
 mod composite;
 mod field;
 mod layout;
@@ -15,6 +16,7 @@ use crate::diagnostic::Report;
 use crate::source::Span;
 use crate::syntax::Node;
 
+pub(crate) use behaviour::behaviour;
 pub(crate) use composite::{array, count, count_limit, group, header, required, size, tag};
 pub(crate) use field::{
     bits, enum_index, octet_index, one_meaning, overlap, scale, value_range, value_set,

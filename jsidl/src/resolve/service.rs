@@ -10,6 +10,10 @@ use crate::model::{Message, Reference, Service};
 use crate::source::Span;
 use crate::syntax::{Declaration, DeclarationKind, ServiceDef, SetRef, Target, TypeSetIndex};
 
+/// States of all services, inherited ones counted again: a long lineage must not multiply a large
+/// machine. All published definitions together have 20 000.
+const MOST_STATES: usize = 500_000;
+
 /// Messages of a set, each with the place where the service names it.
 type Vocabulary = Vec<(Arc<Message>, Span)>;
 
@@ -35,6 +39,10 @@ impl Resolver<'_> {
             check::ambiguous_codes(self.report, &library, service, places);
             check::ambiguous_names(self.report, service, places);
         }
+        let mut states_left = MOST_STATES;
+        for (service, _) in &kept {
+            check::behaviour(self.report, &library, service, &mut states_left);
+        }
         library
     }
 
@@ -56,6 +64,7 @@ impl Resolver<'_> {
             client_of: clients.map(|r| self.reference(r)).collect(),
             inputs,
             outputs,
+            behaviour: definition.behaviour.clone(),
             location: self.location(definition.span),
         };
         (service, [input_places, output_places].concat())

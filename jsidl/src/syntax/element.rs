@@ -6,7 +6,7 @@ use roxmltree::Node as Xml;
 use super::Expr;
 use crate::diagnostic::Report;
 use crate::expr::Expression;
-use crate::model::{Id, Number, Signed, Unsigned, Version};
+use crate::model::{Id, Location, Number, Signed, Unsigned, Version};
 use crate::source::{Source, Span, Spanned};
 
 /// AS5684 and AS5684A; files mix them.
@@ -49,6 +49,11 @@ impl Reader<'_> {
     /// Where an element begins.
     pub(super) fn span(&self, xml: Xml<'_, '_>) -> Span {
         self.source.span(xml.range().start)
+    }
+
+    /// As [`span`](Self::span), for the model.
+    pub(super) fn location(&self, xml: Xml<'_, '_>) -> Location {
+        self.source.location(self.span(xml))
     }
 
     /// The child elements. Drawing data of JSIDL+ is passed over; other foreign elements and text

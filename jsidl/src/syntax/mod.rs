@@ -3,6 +3,7 @@
 //! [`read`] turns one text into declarations, which it adds to a [`Program`]. What it cannot read
 //! it reports and marks as faulty, so that everything around it is still looked at.
 
+mod behaviour;
 mod composite;
 mod element;
 mod field;
@@ -10,6 +11,7 @@ mod limits;
 mod message;
 mod root;
 
+use crate::behaviour::StateMachine;
 use crate::expr::Expression;
 use crate::model::{GroupKind, Id, Number, Rounding, Unsigned};
 use crate::source::{Span, Spanned};
@@ -42,6 +44,8 @@ pub(crate) struct ServiceDef {
     pub(crate) inputs: Vec<Declaration>,
     pub(crate) outputs: Vec<Declaration>,
     pub(crate) events: Vec<Declaration>,
+    /// The state machines without errors.
+    pub(crate) behaviour: Vec<StateMachine>,
     /// Whether it can be identified and says what it refers to. If not, it is looked at for
     /// further mistakes and then left out.
     pub(crate) sound: bool,

@@ -187,6 +187,7 @@ impl Reader<'_> {
             self.only(events, &[]);
             self.declarations(events, &EVENT_SET)
         });
+        let behaviour = parts.behaviour.map(|behaviour| self.behaviour(behaviour));
         ServiceDef {
             span: self.span(xml),
             id: id.unwrap_or_else(stand_in),
@@ -198,6 +199,7 @@ impl Reader<'_> {
             inputs,
             outputs,
             events: events.unwrap_or_default(),
+            behaviour: behaviour.unwrap_or_default(),
             sound,
         }
     }
@@ -212,8 +214,9 @@ impl Reader<'_> {
                 "declared_const_set" => self.once(&mut parts.constants, child, xml),
                 "message_set" => self.once(&mut parts.messages, child, xml),
                 "internal_events_set" => self.once(&mut parts.events, child, xml),
-                // Free text, and the behaviour that the compiler does not look at yet.
-                "assumptions" | "protocol_behavior" => {}
+                // Free text.
+                "assumptions" => {}
+                "protocol_behavior" => self.once(&mut parts.behaviour, child, xml),
                 _ => self.misplaced(
                     child,
                     "service_def",
@@ -403,4 +406,5 @@ struct ServiceParts<'a, 'x> {
     constants: Option<Xml<'a, 'x>>,
     messages: Option<Xml<'a, 'x>>,
     events: Option<Xml<'a, 'x>>,
+    behaviour: Option<Xml<'a, 'x>>,
 }
