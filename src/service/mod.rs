@@ -21,6 +21,8 @@
 
 mod calendar;
 mod client;
+#[cfg(test)]
+mod contest;
 mod context;
 mod control;
 mod directory;
