@@ -238,6 +238,116 @@ fn the_published_management_answers_with_all_its_bases() {
     }
 }
 
+/// Our own machines go with the services of the library: after an emergency nothing moves by
+/// itself, and control cannot be released during one.
+#[test]
+fn our_management_differs_from_the_published_one_where_it_says_so() {
+    let mut loader = Loader::new();
+    loader.catalogue();
+    let loaded = loader.load();
+    assert!(loaded.diagnostics.is_empty(), "{}", loaded.diagnostics);
+    let versions = loaded.library.versions("urn:jaus:jss:core:Management");
+    let service = versions.last().expect("1.1 is there");
+    let machines = loaded.library.machines(service);
+    let machine = &machines[0];
+    let path = |rest: &str| format!("Receiving.Ready.{rest}");
+    let client = ["isControllingClient"];
+    let cases: [(&str, &str, &[&str], &str, &str); 12] = [
+        (
+            "NotControlled.Available.Standby",
+            "RequestControl",
+            &[],
+            "Controlled.Available.Standby",
+            "ConfirmControl CONTROL_ACCEPTED",
+        ),
+        (
+            "NotControlled.NotAvailable.Init",
+            "RequestControl",
+            &[],
+            "NotControlled.NotAvailable.Init",
+            "ConfirmControl NOT_AVAILABLE",
+        ),
+        (
+            "NotControlled.Available.Standby",
+            "SetEmergency",
+            &[],
+            "NotControlled.NotAvailable.Emergency",
+            "",
+        ),
+        (
+            "NotControlled.NotAvailable.Emergency",
+            "ReleaseControl",
+            &[],
+            "NotControlled.NotAvailable.Emergency",
+            "RejectControl NOT_AVAILABLE",
+        ),
+        (
+            "NotControlled.NotAvailable.Emergency",
+            "ClearEmergency",
+            &["isIDStored", "isLastID"],
+            "(back)",
+            "",
+        ),
+        (
+            "Controlled.Available.Ready",
+            "SetEmergency",
+            &[],
+            "Controlled.NotAvailable.Emergency",
+            "",
+        ),
+        (
+            "Controlled.NotAvailable.Emergency",
+            "ClearEmergency",
+            &["isIDStored", "isLastID"],
+            "Controlled.Available.Standby",
+            "",
+        ),
+        (
+            "Controlled.NotAvailable.Emergency",
+            "ReleaseControl",
+            &client,
+            "Controlled.NotAvailable.Emergency",
+            "RejectControl NOT_AVAILABLE",
+        ),
+        (
+            "Controlled.Available.Ready",
+            "ReleaseControl",
+            &client,
+            "NotControlled.Available.Standby",
+            "RejectControl CONTROL_RELEASED",
+        ),
+        (
+            "Controlled.Available.Ready",
+            "Reset",
+            &client,
+            "NotControlled.Available.Standby",
+            "RejectControl CONTROL_RELEASED",
+        ),
+        (
+            "Controlled.Available.Ready",
+            "QueryStatus",
+            &[],
+            "Controlled.Available.Ready",
+            "ReportStatus",
+        ),
+        (
+            "Controlled.Available.Ready",
+            "CreateEvent",
+            &["isSupported"],
+            "Controlled.Available.Ready",
+            "ConfirmEventRequest",
+        ),
+    ];
+    for (from, message, holds, to, sent) in cases {
+        let (target, answer) = step(machine, &path(from), message, holds);
+        assert_eq!(
+            (target.as_str(), answer.as_str()),
+            (to, sent),
+            "{message} in {from}"
+        );
+    }
+}
+
 const BASE: &str = r#"<service_def xmlns="urn:jaus:jsidl:1.1" name="Base" id="urn:base" version="1.0">
 <message_set><input_set/><output_set/></message_set>
 <protocol_behavior is_stateless="false">
