@@ -47,21 +47,27 @@ fn a_split_vehicle_has_two_components_and_only_the_second_drives() {
     );
     vehicle.read_until("106.1.1 is Platform Management, 106.1.2 Navigation");
     vehicle.read_until("Ctrl-C");
-    let found = run(&[&["discover", "--seconds", "2"], &*network].concat(), b"");
-    let tree = found.stdout;
-    let (manager, driver) = tree
-        .split_once("106.1.2")
-        .unwrap_or_else(|| panic!("{tree}"));
-    assert!(
-        manager.contains("106.1.1  \"Platform Management\""),
-        "{tree}"
-    );
-    assert!(!manager.contains("urn:jaus:jss:mobility:"), "{tree}");
-    assert!(
-        driver.contains("urn:jaus:jss:mobility:PrimitiveDriver"),
-        "{tree}"
-    );
-    let judge = ["judge", "106.1.2", "--only", "A2,B2,B11"];
+    let ask = |component: &str, query: &str, body: &str| {
+        let arguments = ["query", component, query, body, "--seconds", "30"];
+        run(&[&arguments, &*network].concat(), b"").only_line()["body"].to_string()
+    };
+    for (component, name, drives) in [
+        ("106.1.1", "Platform Management", false),
+        ("106.1.2", "Navigation", true),
+    ] {
+        let told = ask(component, "QueryIdentification", "{\"QueryType\":4}");
+        assert!(told.contains(name), "{told}");
+        // By its number alone, so that it does not speak for the other one.
+        let number = &component[6..];
+        let own = format!(
+            "[{{\"NodeRec\":{{\"NodeID\":1}},\"ComponentList\":[{{\"ComponentID\":{number}}}]}}]"
+        );
+        let services = ask(component, "QueryServices", &own);
+        assert!(services.contains("urn:jaus:jss:core:AccessControl"));
+        let mobility = "urn:jaus:jss:mobility:PrimitiveDriver";
+        assert_eq!(services.contains(mobility), drives, "{services}");
+    }
+    let judge = ["judge", "106.1.2", "--only", "A2,B2,B11", "--limit", "30"];
     let judged = run(&[&judge, &*network].concat(), b"");
     assert_eq!(judged.status, 0, "{}", judged.stdout);
 }
