@@ -358,6 +358,29 @@ fn a_component_that_is_only_listed_is_in_the_tree_as_long_as_it_is_listed() {
     assert_eq!(lost.collect::<Vec<_>>(), [(silent, Loss::Unlisted)]);
 }
 
+#[test]
+fn a_component_that_was_listed_is_asked_who_it_is_once_it_speaks_for_itself() {
+    let mut world = World::new();
+    world.start(plain(OPERATOR, "desk"));
+    let manager = world.puppet(JausId::new(7, 1, 1));
+    let late = world.puppet(JausId::new(7, 1, 2));
+    for _ in 0..4 {
+        world.run(seconds(1));
+        for message in world.received(manager) {
+            play_manager(&mut world, manager, &[1, 2], &message.payload);
+        }
+    }
+    world.received(late);
+    let call = QueryIdentification {
+        query_type: 2.into(),
+    };
+    world.say(late, OPERATOR, &call);
+    world.run(seconds(1));
+    let asked = world.received_as::<QueryIdentification>(late);
+    let levels: Vec<_> = asked.iter().map(|query| query.query_type.0).collect();
+    assert!(levels.contains(&4), "{levels:?}");
+}
+
 fn play_manager(
     world: &mut World,
     puppet: crate::world::Place,

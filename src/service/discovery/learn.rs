@@ -29,11 +29,15 @@ impl Discovery {
         if !self.search.covers(self.own, id) {
             return false;
         }
+        let was_listed = self.search.is_listed(id);
         let Some(new) = self.search.admit(now, id, listed_by) else {
             return false;
         };
         if new {
             self.welcome(now, id, listed_by.is_none());
+        } else if was_listed && listed_by.is_none() {
+            // Only now is there somebody to ask.
+            self.ask_who_it_is(now, id);
         }
         if listed_by.is_none() {
             self.appoint(now, id);
@@ -50,10 +54,14 @@ impl Discovery {
         self.changes.push_back(Change::Found(id));
         self.search.wonder(now, Question::Services(id));
         if direct {
-            for level in [Level::Subsystem, Level::Node, Level::Component] {
-                if self.directory.identification(level, id).is_none() {
-                    self.search.wonder(now, Question::Identify(id, level));
-                }
+            self.ask_who_it_is(now, id);
+        }
+    }
+
+    fn ask_who_it_is(&mut self, now: Instant, id: JausId) {
+        for level in [Level::Subsystem, Level::Node, Level::Component] {
+            if self.directory.identification(level, id).is_none() {
+                self.search.wonder(now, Question::Identify(id, level));
             }
         }
     }

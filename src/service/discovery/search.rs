@@ -140,6 +140,12 @@ impl Search {
         true
     }
 
+    /// Whether a component is known from another one's list alone.
+    pub(super) fn is_listed(&self, id: JausId) -> bool {
+        let peer = self.peers.get(&id);
+        peer.is_some_and(|peer| peer.listed_by.is_some())
+    }
+
     /// Forgets a component and what was to be asked about it.
     pub(super) fn forget(&mut self, id: JausId) {
         self.peers.remove(&id);
