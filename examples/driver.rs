@@ -14,13 +14,14 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     // What the motor is driven with, in percent.
     let motor = Arc::new(AtomicI32::new(0));
     let throttle = motor.clone();
-    let driver = Handlers::new(primitive_driver::LATEST).command(
-        move |effort: SetWrenchEffort, from, _context| {
+    let driver = Handlers::new(primitive_driver::LATEST)
+        .command(move |effort: SetWrenchEffort, from, _| {
             let ahead = effort.propulsive_linear_effort_x_percent().unwrap_or(0.0);
             println!("{} drives with {ahead:.0} %", from.source);
             throttle.store(ahead as i32, Relaxed);
-        },
-    );
+        })
+        // Standby, an emergency, lost control and shutdown all end here.
+        .on_stop(move |_| motor.store(0, Relaxed));
 
     let rover = Component::builder(Kind::Vehicle, "Rover")
         .offer(driver)
@@ -31,9 +32,6 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut standing = rover.watch_standing();
     while standing.changed().await.is_ok() {
         let now = rover.standing();
-        if !now.may_act() {
-            motor.store(0, Relaxed);
-        }
         println!("{} now, controlled by {:?}", now.state, now.controller);
     }
     Ok(())

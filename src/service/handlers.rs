@@ -9,6 +9,7 @@ use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 
+type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
 type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) + Send>;
 
 /// A service whose messages are answered by functions of the application.
@@ -24,6 +25,7 @@ pub struct Handlers {
     offers: Vec<ServiceId>,
     by_code: BTreeMap<u16, Handler>,
     told: BTreeSet<u16>,
+    stops: Vec<Stop>,
 }
 
 impl Handlers {
@@ -34,6 +36,7 @@ impl Handlers {
             offers: vec![id],
             by_code: BTreeMap::new(),
             told: BTreeSet::new(),
+            stops: Vec::new(),
         }
     }
 
@@ -87,6 +90,14 @@ impl Handlers {
         function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
     ) -> Self {
         self.receive_if(Standing::acts_for, function)
+    }
+
+    /// Calls a function whenever the component may no longer act, or another client takes control:
+    /// what moves something stops it there.
+    #[must_use]
+    pub fn on_stop(mut self, stop: impl FnMut(&mut Context<'_>) + Send + 'static) -> Self {
+        self.stops.push(Box::new(stop));
+        self
     }
 
     /// Lets clients have commands of type `M` carried out as command events (AS5710 1.1). The
@@ -143,7 +154,74 @@ impl Service for Handlers {
         Handled::Yes
     }
 
+    fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {
+        if context.standing().stops(before) {
+            for stop in &mut self.stops {
+                stop(context);
+            }
+        }
+    }
+
     fn tells_end_of(&self, command: u16) -> bool {
         self.told.contains(&command)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+    use crate::messages::core::{QueryTimeout, SetAuthority, list_manager};
+    use crate::service::State;
+    use crate::service::rig::{CLIENT, Rig, STRANGER};
+
+    /// Handlers that count: what anyone may say, what sets up, what acts, and stops.
+    fn counting() -> (Rig, [Arc<AtomicU32>; 4]) {
+        let counts: [Arc<AtomicU32>; 4] = Default::default();
+        let [heard, set_up, acted, stopped] = counts.clone();
+        let count = |counter: &AtomicU32| _ = counter.fetch_add(1, Ordering::Relaxed);
+        let handlers = Handlers::new(list_manager::LATEST)
+            .receive(move |_: QueryTimeout, _, _| count(&heard))
+            .configure(move |_: SetAuthority, _, _| count(&set_up))
+            .command(move |_: crate::messages::core::Reset, _, _| count(&acted))
+            .on_stop(move |_| count(&stopped));
+        (Rig::new(vec![Box::new(handlers)]), counts)
+    }
+
+    fn say_everything(rig: &mut Rig, source: JausId) {
+        rig.send(source, &QueryTimeout);
+        rig.send(source, &SetAuthority::default());
+        rig.send(source, &crate::messages::core::Reset);
+    }
+
+    #[test]
+    fn each_message_is_taken_from_whom_and_when_it_may_be() {
+        for (state, source, expected) in [
+            (State::Ready, CLIENT, [1, 1, 1]),
+            (State::Standby, CLIENT, [1, 1, 0]),
+            (State::Ready, STRANGER, [1, 0, 0]),
+        ] {
+            let (mut rig, counts) = counting();
+            rig.stand(state, Some(CLIENT));
+            say_everything(&mut rig, source);
+            let counted = [0, 1, 2].map(|i: usize| counts[i].load(Ordering::Relaxed));
+            assert_eq!(counted, expected, "{state}, {source}");
+        }
+    }
+
+    #[test]
+    fn what_moves_is_stopped_when_the_component_may_no_longer_act() {
+        let (mut rig, counts) = counting();
+        let stops = || counts[3].load(Ordering::Relaxed);
+        let before = stops();
+        rig.stand(State::Ready, Some(CLIENT));
+        assert_eq!(stops(), before, "nothing has changed");
+        rig.stand(State::Emergency, Some(CLIENT));
+        assert_eq!(stops(), before + 1);
+        rig.stand(State::Ready, Some(CLIENT));
+        rig.stand(State::Ready, Some(STRANGER));
+        assert_eq!(stops(), before + 2, "another client is in control");
     }
 }

@@ -76,6 +76,14 @@ impl Standing {
         self.state == State::Ready && self.obeys(client)
     }
 
+    /// Whether what a client has set in motion must stop now, this having been `before`: the
+    /// component may no longer act, or another client has taken control.
+    #[must_use]
+    pub fn stops(&self, before: &Self) -> bool {
+        let client = |standing: &Self| standing.controller.map(|controller| controller.id);
+        !self.may_act() || client(self) != client(before)
+    }
+
     /// Whether the component may act at all: it is ready, and somebody is there to answer for it.
     #[must_use]
     pub const fn may_act(&self) -> bool {
@@ -119,6 +127,24 @@ mod tests {
         for state in [State::Initialize, State::Standby, State::Emergency] {
             assert!(!controlled(state).acts_for(CLIENT) && !controlled(state).may_act());
         }
+    }
+
+    #[test]
+    fn what_moves_stops_for_another_client_and_when_not_ready_but_not_for_another_authority() {
+        let before = controlled(State::Ready);
+        let now = |id, state| Standing {
+            state,
+            controller: Some(Controller { id, authority: 1 }),
+            ..before
+        };
+        assert!(!now(CLIENT, State::Ready).stops(&before));
+        assert!(now(STRANGER, State::Ready).stops(&before));
+        assert!(now(CLIENT, State::Standby).stops(&before));
+        let nobody = Standing {
+            controller: None,
+            ..before
+        };
+        assert!(nobody.stops(&before));
     }
 
     #[test]

@@ -298,9 +298,7 @@ impl Service for OnVehicle {
     }
 
     fn handle_standing(&mut self, now: Instant, before: &Standing, context: &mut Context<'_>) {
-        let client = |standing: &Standing| standing.controller.map(|controller| controller.id);
-        let standing = context.standing();
-        if !standing.may_act() || client(standing) != client(before) {
+        if context.standing().stops(before) {
             let mut cockpit = self.vehicle.at(now);
             cockpit.pilot.stop();
             self.behaviour.handle_stop(&mut cockpit, context);
