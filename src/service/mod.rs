@@ -38,6 +38,8 @@ mod outbox;
 #[cfg(test)]
 mod rig;
 mod stack;
+#[cfg(test)]
+mod stack_rig;
 mod standing;
 mod time;
 mod transport;

@@ -1,75 +1,30 @@
 //! Each row of Access Control and Management, with a whole component and under virtual time.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "a test begins at some time, and all that follows is virtual"
-)]
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::{AccessControl, Condition, Management};
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::endpoint::Received;
 use crate::messages::core::confirm_control::ResponseCode as Confirmation;
 use crate::messages::core::reject_control::ResponseCode as Rejection;
 use crate::messages::core::*;
-use crate::service::{
-    Discovery, Kind, Profile, Scope, Stack, Standing as Now, State, Timing, Transport,
-};
-use crate::wire::{Broadcast, Priority};
+use crate::service::stack_rig::{StackRig as Rig, Told};
+use crate::service::{Stack, Standing as Now, State, Transport};
 
-const US: JausId = JausId::new(105, 1, 1);
 const FIRST: JausId = JausId::new(42, 2, 1);
 const SECOND: JausId = JausId::new(42, 2, 2);
 const THIRD: JausId = JausId::new(42, 2, 4);
 
-/// A component with what it has said.
-struct Rig {
-    stack: Stack,
-    now: Instant,
-}
-
 impl Rig {
-    fn new(settings: impl FnOnce(Stack) -> Stack) -> Self {
-        let profile = Profile::new(Kind::Vehicle, "Rover");
-        let discovery = Discovery::new(US, profile, Scope::Nobody, Timing::default(), 1);
-        let stack = settings(Stack::new(discovery, vec![Box::new(Transport)]));
-        let now = Instant::now();
-        Self { stack, now }
+    fn with(settings: impl FnOnce(Stack) -> Stack) -> Self {
+        Self::new(vec![Box::new(Transport)], settings)
     }
 
     fn managed() -> Self {
-        Self::new(|stack| stack.management(Management::new()))
+        Self::with(|stack| stack.management(Management::new()))
     }
 
-    /// A client sends something; what it and others are told.
-    fn hear<M: Message>(&mut self, source: JausId, message: &M) -> Vec<(JausId, Vec<u8>)> {
-        let received = Received {
-            source,
-            destination: US,
-            to: US,
-            priority: Priority::Standard,
-            broadcast: Broadcast::None,
-            payload: message.encode().unwrap(),
-            path: None,
-        };
-        self.stack.handle_message(self.now, &received);
-        self.said()
-    }
-
-    fn pass(&mut self, time: Duration) -> Vec<(JausId, Vec<u8>)> {
-        self.now += time;
-        self.stack.handle_timeout(self.now);
-        self.said()
-    }
-
-    fn said(&mut self) -> Vec<(JausId, Vec<u8>)> {
-        std::iter::from_fn(|| self.stack.poll_transmit())
-            .map(|message| (message.destination, message.payload.to_vec()))
-            .collect()
-    }
-
-    fn request(&mut self, client: JausId, authority_code: u8) -> Vec<(JausId, Vec<u8>)> {
+    fn request(&mut self, client: JausId, authority_code: u8) -> Vec<Told> {
         self.hear(client, &RequestControl { authority_code })
     }
 
@@ -85,7 +40,7 @@ impl Rig {
     /// In a state, under the control of `FIRST` where that can be, with an emergency of `THIRD`
     /// where one is meant.
     fn brought_to(state: State) -> Self {
-        let mut rig = Self::new(|stack| stack.management(Management::new().initializes()));
+        let mut rig = Self::with(|stack| stack.management(Management::new().initializes()));
         if state != State::Initialize {
             rig.stack.set_condition(rig.now, Condition::Initialized);
             rig.request(FIRST, 100);
@@ -112,16 +67,16 @@ impl Rig {
     }
 }
 
-fn confirmed(to: JausId, response_code: Confirmation) -> (JausId, Vec<u8>) {
+fn confirmed(to: JausId, response_code: Confirmation) -> Told {
     told(to, &ConfirmControl { response_code })
 }
 
-fn rejected(to: JausId, response_code: Rejection) -> (JausId, Vec<u8>) {
+fn rejected(to: JausId, response_code: Rejection) -> Told {
     told(to, &RejectControl { response_code })
 }
 
-fn told<M: Message>(to: JausId, message: &M) -> (JausId, Vec<u8>) {
-    (to, message.encode().unwrap().to_vec())
+fn told<M: Message>(to: JausId, message: &M) -> Told {
+    (to, message.encode().unwrap())
 }
 
 const STOP: SetEmergency = SetEmergency {
@@ -174,7 +129,7 @@ fn the_client_in_control_may_change_its_authority_by_asking_again() {
 
 #[test]
 fn authority_is_set_by_the_client_in_control_alone_and_only_downwards() {
-    let mut rig = Rig::new(|stack| stack.access_control(AccessControl::new().authority(10)));
+    let mut rig = Rig::with(|stack| stack.access_control(AccessControl::new().authority(10)));
     rig.request(FIRST, 220);
     for (client, authority_code, expected) in [
         (SECOND, 200, 220),
@@ -194,7 +149,7 @@ fn authority_is_set_by_the_client_in_control_alone_and_only_downwards() {
 #[test]
 fn queries_tell_who_controls_and_for_how_long() {
     let settings = AccessControl::new().authority(7).timeout(5);
-    let mut rig = Rig::new(|stack| stack.access_control(settings));
+    let mut rig = Rig::with(|stack| stack.access_control(settings));
     let nobody = ReportControl::default();
     assert_eq!(rig.hear(SECOND, &QueryControl), [told(SECOND, &nobody)]);
     let default = ReportAuthority { authority_code: 7 };
@@ -230,7 +185,7 @@ fn release_is_answered_to_the_client_in_control_and_when_nobody_is() {
 #[test]
 fn control_that_is_not_renewed_times_out() {
     let settings = AccessControl::new().timeout(4);
-    let mut rig = Rig::new(|stack| stack.management(Management::new().access_control(settings)));
+    let mut rig = Rig::with(|stack| stack.management(Management::new().access_control(settings)));
     rig.request(FIRST, 100);
     rig.hear(FIRST, &Resume);
     assert_eq!(rig.pass(Duration::from_secs(4)), []);
@@ -278,7 +233,7 @@ fn a_reset_drops_control_and_leads_to_standby() {
 
 #[test]
 fn a_component_that_initializes_cannot_be_controlled_before() {
-    let mut rig = Rig::new(|stack| stack.management(Management::new().initializes()));
+    let mut rig = Rig::with(|stack| stack.management(Management::new().initializes()));
     let refused = confirmed(FIRST, Confirmation::NOT_AVAILABLE);
     assert_eq!(rig.request(FIRST, 100), [refused]);
     rig.stack.set_condition(rig.now, Condition::Initialized);
@@ -485,7 +440,7 @@ fn a_flood_of_emergencies_is_bounded_and_can_be_cleared() {
 
 #[test]
 fn access_control_alone_leaves_a_component_ready_and_management_unanswered() {
-    let mut rig = Rig::new(|stack| stack.access_control(AccessControl::new()));
+    let mut rig = Rig::with(|stack| stack.access_control(AccessControl::new()));
     assert_eq!(rig.hear(FIRST, &QueryStatus), []);
     rig.hear(FIRST, &STOP);
     rig.request(FIRST, 100);
@@ -495,7 +450,7 @@ fn access_control_alone_leaves_a_component_ready_and_management_unanswered() {
 
 #[test]
 fn a_component_without_settings_obeys_anyone_and_answers_nothing() {
-    let mut rig = Rig::new(|stack| stack);
+    let mut rig = Rig::with(|stack| stack);
     assert_eq!(rig.request(FIRST, 100), []);
     assert_eq!(*rig.stack.standing(), Now::default());
 }

@@ -18,7 +18,8 @@ fn ready() -> Rig {
     let job = job
         .command(move |_: DeleteElement, _, _| _ = done.fetch_add(1, Ordering::Relaxed))
         .tell_end_of::<DeleteElement>();
-    rig.stack.offer(rig.now, Box::new(job));
+    let now = rig.now;
+    rig.stack.offer(now, Box::new(job));
     let authority_code = 100;
     rig.hear(CLIENT, &RequestControl { authority_code });
     rig.hear(CLIENT, &Resume);
@@ -47,8 +48,8 @@ impl Rig {
     }
 
     fn end_job(&mut self, successful: bool) -> Vec<(JausId, u8, CommandResult)> {
-        self.stack
-            .end_command(self.now, DeleteElement::CODE, successful);
+        let now = self.now;
+        self.stack.end_command(now, DeleteElement::CODE, successful);
         results(&self.said())
     }
 }

@@ -1,30 +1,23 @@
 //! Events of a whole component, under virtual time.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "a test begins at some time, and all that follows is virtual"
-)]
 
 mod bounds;
 mod commands;
 
+use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU16, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bytes::Bytes;
 
 use super::{EventSettings, INVALID_EVENT};
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
-use crate::endpoint::Received;
 use crate::messages::core::create_event::EventType;
 use crate::messages::core::*;
-use crate::service::{
-    Discovery, Handlers, Kind, Liveness, Management, Profile, Scope, Stack, Timing, Transport,
-};
-use crate::wire::{Broadcast, Priority};
+use crate::service::stack_rig::StackRig;
+use crate::service::{Handlers, Liveness, Management, Transport};
 
-const US: JausId = JausId::new(105, 1, 1);
 const CLIENT: JausId = JausId::new(42, 1, 1);
 const OTHER: JausId = JausId::new(42, 2, 1);
 const SECOND: Duration = Duration::from_secs(1);
@@ -37,9 +30,22 @@ const COUNTER: ServiceId = ServiceId {
 };
 
 struct Rig {
-    stack: Stack,
-    now: Instant,
+    rig: StackRig,
     number: Arc<AtomicU16>,
+}
+
+impl Deref for Rig {
+    type Target = StackRig;
+
+    fn deref(&self) -> &StackRig {
+        &self.rig
+    }
+}
+
+impl DerefMut for Rig {
+    fn deref_mut(&mut self) -> &mut StackRig {
+        &mut self.rig
+    }
 }
 
 impl Rig {
@@ -53,62 +59,21 @@ impl Rig {
         let counter = Handlers::new(COUNTER).answer(move |_: QueryElement| ReportElementCount {
             element_count: shown.load(Ordering::Relaxed),
         });
-        let profile = Profile::new(Kind::Vehicle, "Rover");
-        let discovery = Discovery::new(US, profile, Scope::Nobody, Timing::default(), 1);
         let services: Vec<Box<dyn crate::service::Service>> = vec![
             Box::new(Transport),
             Box::new(Liveness::new()),
             Box::new(counter),
         ];
-        let stack = Stack::new(discovery, services)
-            .event_settings(settings)
-            .management(Management::new());
-        Self {
-            stack,
-            now: Instant::now(),
-            number,
-        }
-    }
-
-    fn hear<M: Message>(&mut self, source: JausId, message: &M) -> Vec<(JausId, Bytes)> {
-        let received = Received {
-            source,
-            destination: US,
-            to: US,
-            priority: Priority::Standard,
-            broadcast: Broadcast::None,
-            payload: message.encode().unwrap(),
-            path: None,
-        };
-        self.stack.handle_message(self.now, &received);
-        self.said()
-    }
-
-    fn said(&mut self) -> Vec<(JausId, Bytes)> {
-        std::iter::from_fn(|| self.stack.poll_transmit())
-            .map(|message| (message.destination, message.payload))
-            .collect()
-    }
-
-    /// Lets time pass from wake-up to wake-up; what was said, and when.
-    fn run(&mut self, time: Duration) -> Vec<(Duration, JausId, Bytes)> {
-        let (start, end) = (self.now, self.now + time);
-        let mut said = Vec::new();
-        while let Some(wake) = self.stack.poll_timeout()
-            && wake <= end
-        {
-            self.now = self.now.max(wake);
-            self.stack.handle_timeout(self.now);
-            let at = self.now - start;
-            said.extend(self.said().into_iter().map(|(to, it)| (at, to, it)));
-        }
-        self.now = end;
-        said
+        let rig = StackRig::new(services, |stack| {
+            stack.event_settings(settings).management(Management::new())
+        });
+        Self { rig, number }
     }
 
     fn set(&mut self, number: u16) -> Vec<(JausId, Bytes)> {
         self.number.store(number, Ordering::Relaxed);
-        self.stack.announce(self.now, QueryElement::CODE);
+        let now = self.now;
+        self.stack.announce(now, QueryElement::CODE);
         self.said()
     }
 
@@ -184,7 +149,8 @@ fn a_late_wake_up_leaves_beats_out_and_keeps_to_the_others() {
     let mut rig = Rig::new();
     rig.create(CLIENT, &periodic(1, 10.0, &QueryHeartbeatPulse));
     rig.now += Duration::from_millis(1050);
-    rig.stack.handle_timeout(rig.now);
+    let now = rig.now;
+    rig.stack.handle_timeout(now);
     assert_eq!(rig.said().len(), 1, "ten beats were missed");
     let said = rig.run(Duration::from_millis(100));
     assert_eq!(said.len(), 1);
@@ -268,7 +234,8 @@ fn changes_that_follow_fast_are_told_together_and_the_last_is_not_lost() {
     let mut told = Vec::new();
     for number in 1..=1000 {
         rig.now += Duration::from_millis(1);
-        rig.stack.handle_timeout(rig.now);
+        let now = rig.now;
+        rig.stack.handle_timeout(now);
         told.extend(events(&rig.set(number)));
     }
     told.extend(events(
@@ -315,8 +282,8 @@ fn discovery_announces_what_it_learns() {
     };
     rig.create(CLIENT, &services);
     rig.now += SECOND;
-    rig.stack
-        .offer(rig.now, Box::new(Handlers::new(time::LATEST)));
+    let now = rig.now;
+    rig.stack.offer(now, Box::new(Handlers::new(time::LATEST)));
     let told = events(&rig.said());
     let report = ReportServices::decode(&told[0].report_message).unwrap();
     let text = format!("{report:?}");

@@ -1,0 +1,86 @@
+//! For tests: a whole component without a network, its clients, and the clock that it lives by.
+
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::{Discovery, Kind, Profile, Scope, Service, Stack, Timing};
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::endpoint::Received;
+use crate::wire::{Broadcast, Priority};
+
+/// The component.
+pub(crate) const US: JausId = JausId::new(105, 1, 1);
+
+/// What somebody was told.
+pub(crate) type Told = (JausId, Bytes);
+
+pub(crate) struct StackRig {
+    pub(crate) stack: Stack,
+    pub(crate) now: Instant,
+}
+
+impl StackRig {
+    /// A component that looks for nobody, with these services and settings.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "any moment will do as the beginning of virtual time"
+    )]
+    pub(crate) fn new(
+        services: Vec<Box<dyn Service>>,
+        settings: impl FnOnce(Stack) -> Stack,
+    ) -> Self {
+        let profile = Profile::new(Kind::Vehicle, "Rover");
+        let discovery = Discovery::new(US, profile, Scope::Nobody, Timing::default(), 1);
+        Self {
+            stack: settings(Stack::new(discovery, services)),
+            now: Instant::now(),
+        }
+    }
+
+    /// A client sends something; what it and others are told.
+    pub(crate) fn hear<M: Message>(&mut self, source: JausId, message: &M) -> Vec<Told> {
+        let received = Received {
+            source,
+            destination: US,
+            to: US,
+            priority: Priority::Standard,
+            broadcast: Broadcast::None,
+            payload: message.encode().unwrap(),
+            path: None,
+        };
+        self.stack.handle_message(self.now, &received);
+        self.said()
+    }
+
+    /// What has been said since this was asked last.
+    pub(crate) fn said(&mut self) -> Vec<Told> {
+        std::iter::from_fn(|| self.stack.poll_transmit())
+            .map(|message| (message.destination, message.payload))
+            .collect()
+    }
+
+    /// Lets time pass, and wakes the component once.
+    pub(crate) fn pass(&mut self, time: Duration) -> Vec<Told> {
+        self.now += time;
+        self.stack.handle_timeout(self.now);
+        self.said()
+    }
+
+    /// Lets time pass from wake-up to wake-up; what was said, and when.
+    pub(crate) fn run(&mut self, time: Duration) -> Vec<(Duration, JausId, Bytes)> {
+        let (start, end) = (self.now, self.now + time);
+        let mut said = Vec::new();
+        while let Some(wake) = self.stack.poll_timeout()
+            && wake <= end
+        {
+            self.now = self.now.max(wake);
+            self.stack.handle_timeout(self.now);
+            let at = self.now - start;
+            said.extend(self.said().into_iter().map(|(to, it)| (at, to, it)));
+        }
+        self.now = end;
+        said
+    }
+}
