@@ -130,6 +130,7 @@ impl Reader<'_> {
                 "entry" => self.once(&mut once[0], child, xml),
                 "exit" => self.once(&mut once[1], child, xml),
                 "default_state" => self.once(&mut once[2], child, xml),
+                "default_transition" => self.not_understood(child),
                 _ => self.misplaced(
                     child,
                     "state",
@@ -223,8 +224,11 @@ impl Reader<'_> {
     }
 
     fn kind(&mut self, xml: Xml<'_, '_>) -> Option<TransitionKind> {
-        self.only(xml, &["interpretation"]);
         let element = xml.tag_name().name().to_owned();
+        if element == "pop" {
+            return Some(self.pop(xml));
+        }
+        self.only(xml, &["interpretation"]);
         let leads = matches!(element.as_str(), "simple" | "push");
         let mut end = None;
         for child in self.children(xml) {
@@ -249,9 +253,24 @@ impl Reader<'_> {
                 self.lacks(xml, "end_state");
                 return None;
             }
-            ("pop", _) => TransitionKind::Pop,
             _ => TransitionKind::Internal,
         })
+    }
+
+    /// The standard lets a `pop` name a transition to be taken afterwards, with arguments; no
+    /// published one does.
+    fn pop(&mut self, xml: Xml<'_, '_>) -> TransitionKind {
+        self.only(xml, &["transition", "interpretation"]);
+        if let Some(transition) = self.attribute(xml, "transition") {
+            let message = "passed over: the `transition` of a `pop` is not understood yet";
+            self.report.warning(transition.span, message);
+        }
+        for child in self.children(xml) {
+            if child.tag_name().name() != "argument" {
+                self.misplaced(child, "pop", "`argument`s");
+            }
+        }
+        TransitionKind::Pop
     }
 
     fn parameter(&mut self, xml: Xml<'_, '_>) -> Option<Parameter> {
