@@ -15,4 +15,6 @@ mod papers;
 mod peer;
 mod right;
 mod vehicle;
+#[path = "../support/vehicle_process.rs"]
+mod vehicle_process;
 mod wrong;

@@ -1,44 +1,19 @@
 //! The reference vehicle passes every step.
 
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Stdio};
-
 use crate::cli_support::{jaus, run};
 use crate::peer::network;
+use crate::vehicle_process::VehicleProcess;
 
-/// `jaus vehicle` in a process of its own; killed when dropped.
-struct Vehicle(Child);
-
-impl Vehicle {
-    /// Starts it in the network that the flags name, and waits until it is there.
-    fn start(flags: &[&str]) -> Self {
-        let mut command = jaus();
-        command.args(["vehicle", "--id", "101.1.1"]).args(flags);
-        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
-        let mut stdout = BufReader::new(child.stdout.take().unwrap());
-        let mut introduction = String::new();
-        while !introduction.contains("Ctrl-C") {
-            let read = stdout.read_line(&mut introduction).unwrap();
-            assert_ne!(read, 0, "the vehicle has ended: {introduction}");
-        }
-        // It may go on talking.
-        std::thread::spawn(move || stdout.lines().map_while(Result::ok).for_each(drop));
-        Self(child)
-    }
-}
-
-impl Drop for Vehicle {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
+/// A vehicle in the network that the flags name.
+fn start(flags: &[&str]) -> VehicleProcess {
+    VehicleProcess::start(jaus().args(["vehicle", "--id", "101.1.1"]).args(flags))
 }
 
 #[test]
 fn the_reference_vehicle_passes_every_step_by_multicast_and_by_unicast() {
     let flags = network();
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
-    let _vehicle = Vehicle::start(&network);
+    let _vehicle = start(&network);
     let judged = run(&[&["judge", "101.1.1"], &*network].concat(), b"");
     assert_eq!(
         (judged.status, &*judged.stderr),
@@ -54,7 +29,7 @@ fn the_reference_vehicle_passes_every_step_by_multicast_and_by_unicast() {
 fn services_of_the_reference_vehicle_ignore_who_is_not_in_control() {
     let flags = network();
     let network: Vec<&str> = flags.iter().map(String::as_str).collect();
-    let _vehicle = Vehicle::start(&network);
+    let _vehicle = start(&network);
     let services = [
         "Management",
         "ListManager",

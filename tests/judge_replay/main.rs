@@ -21,3 +21,5 @@ mod client;
 mod contest;
 mod jauspp;
 mod vehicle;
+#[path = "../support/vehicle_process.rs"]
+mod vehicle_process;

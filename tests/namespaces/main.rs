@@ -17,6 +17,8 @@ mod hosts;
 mod judge;
 mod links;
 mod roles;
+#[path = "../support/vehicle_process.rs"]
+mod vehicle_process;
 
 use std::time::{Duration, Instant};
 
