@@ -75,8 +75,10 @@ pub(crate) struct Judge {
     /// From the service's definition: every query is asked, and its report read and checked; a
     /// query that ends too early must be ignored; every command that only the controlling client
     /// may give is given without control, must be ignored, and must leave the service's reports as
-    /// they were. The definitions do not yet describe the transitions between states: those of
-    /// Access Control, Management and Events are in steps B3 to B26.
+    /// they were. Of Access Control and Management every transition is walked, too: in each state,
+    /// everything that can be said about control and state, by the client in control and by
+    /// another, with what must come, be ignored, and be the state afterwards. Services that inherit
+    /// from them share these states. The transitions of Events are in steps B3 to B10.
     #[arg(long, value_name = "URN", value_parser = script::service::known, conflicts_with = "only")]
     service: Vec<&'static str>,
 

@@ -13,6 +13,7 @@ mod mobility;
 mod safety;
 pub(super) mod service;
 mod specimen;
+mod transitions;
 
 use jaus::messages::{core, mobility as jss};
 

@@ -23,7 +23,7 @@ use super::super::step::{
     Speaker::{Main, Second},
     Step, step,
 };
-use super::specimen;
+use super::{specimen, transitions};
 
 /// How long nothing must come of something that is to be ignored.
 const IGNORED: Duration = Duration::from_millis(300);
@@ -91,6 +91,13 @@ pub(in super::super) fn steps(
             let Some(number) = numbers.next() else { break };
             let mut step = step(Part::S, number, title).needs(&[urn]);
             step.acts = acts;
+            steps.push(step);
+        }
+        for (title, acts) in transitions::walk(service.id) {
+            let Some(number) = numbers.next() else { break };
+            let mut step = step(Part::S, number, title).needs(&[urn]);
+            step.acts = acts;
+            step.afterwards = transitions::afterwards();
             steps.push(step);
         }
     }
@@ -281,9 +288,23 @@ mod tests {
         let management = titles("Management");
         assert!(management.contains(&"Resume without control is ignored".to_owned()));
         assert!(
-            !management.iter().any(|title| title.contains("Emergency")),
+            !management.contains(&"SetEmergency without control is ignored".to_owned()),
             "anybody may"
         );
+    }
+
+    #[test]
+    fn the_states_of_control_are_walked_through_with_their_own_service_alone() {
+        let management = titles("Management");
+        for title in [
+            "Resume when Standby, controlled by the sender",
+            "Resume when Standby, controlled by another",
+            "ReleaseControl when Emergency, set by the sender, uncontrolled, by another client",
+        ] {
+            assert!(management.iter().any(|it| it == title), "{management:#?}");
+        }
+        let heir = titles("PrimitiveDriver");
+        assert!(!heir.iter().any(|title| title.contains(" when ")));
     }
 
     #[test]
