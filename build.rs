@@ -7,5 +7,8 @@ fn main() {
     if std::env::var_os("CARGO_FEATURE_MOBILITY").is_some() {
         build = build.module("mobility", "urn:jaus:jss:mobility:");
     }
+    if std::env::var_os("CARGO_FEATURE_GROUND").is_some() {
+        build = build.module("ground", "urn:jaus-rs:ground:");
+    }
     build.run();
 }

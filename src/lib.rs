@@ -15,6 +15,8 @@
 #![forbid(unsafe_code)]
 
 pub mod address;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod codec;
 #[cfg(feature = "node")]
 pub mod component;
@@ -24,6 +26,8 @@ pub mod link;
 pub mod messages;
 #[cfg(feature = "node")]
 pub mod node;
+#[cfg(feature = "parts")]
+pub mod parts;
 pub mod service;
 #[cfg(feature = "mobility")]
 pub mod vehicle;

@@ -18,16 +18,27 @@ pub mod mobility {
     include!(concat!(env!("OUT_DIR"), "/mobility.rs"));
 }
 
+/// Our own set for a ground vehicle: world model, mission, stages, odometry.
+#[cfg(feature = "ground")]
+#[allow(missing_docs, reason = "what the definitions do not describe")]
+pub mod ground {
+    include!(concat!(env!("OUT_DIR"), "/ground.rs"));
+}
+
 static MESSAGES: &[&[MessageInfo]] = &[
     core::MESSAGES,
     #[cfg(feature = "mobility")]
     mobility::MESSAGES,
+    #[cfg(feature = "ground")]
+    ground::MESSAGES,
 ];
 
 static SERVICES: &[&[ServiceInfo]] = &[
     core::SERVICES,
     #[cfg(feature = "mobility")]
     mobility::SERVICES,
+    #[cfg(feature = "ground")]
+    ground::SERVICES,
 ];
 
 /// All messages of the service sets that are switched on.

@@ -9,8 +9,8 @@ use clap::Args;
 use jaus::view::{self, Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 
 use crate::definitions::Definitions;
-use crate::failure::{Failure, Outcome};
-use crate::output::{Output, say};
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::{Output, say};
 
 /// Print captured messages, or lines of hex, as one JSON object a line
 ///

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use jaus::view::Dictionary;
 
-use crate::failure::Failure;
-use crate::output::say;
+use jaus::cli::failure::Failure;
+use jaus::cli::output::say;
 
 #[derive(Args)]
 pub(crate) struct Definitions {

@@ -13,10 +13,10 @@ use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity
 use jaus::node::{Config, Node};
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::failure::{Failure, Outcome};
-use crate::output::{Output, colours_wanted};
-use crate::runtime::{self, Clock};
-use crate::tree;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::{Output, colours_wanted};
+use jaus::cli::runtime::{self, Clock};
+use jaus::cli::tree;
 
 /// Watch a vehicle and an operator station find each other on this computer
 ///

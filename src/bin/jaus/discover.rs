@@ -5,11 +5,11 @@ use std::time::Duration;
 use clap::Args;
 use jaus::component::{Component, Kind};
 
-use crate::failure::{Failure, Outcome};
-use crate::network::Network;
-use crate::output::{Output, say};
-use crate::runtime::{self, Clock};
-use crate::tree;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::output::{Output, say};
+use jaus::cli::runtime::{self, Clock};
+use jaus::cli::tree;
 
 /// Show subsystems, nodes, components and their services
 ///

@@ -6,8 +6,8 @@ use clap::Args;
 use jaus::view::{Dictionary, Line, Request, Unreadable, to_hex};
 
 use crate::definitions::Definitions;
-use crate::failure::{Failure, Outcome};
-use crate::output::Output;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::Output;
 
 /// Read messages as JSON lines from standard input, and print their octets in hex
 ///

@@ -11,28 +11,21 @@ mod demo;
 mod discover;
 mod doctor;
 mod encode;
-mod failure;
 mod judge;
 mod monitor;
-mod network;
 mod node;
-mod output;
 mod ping;
 mod query;
 mod record;
 mod replay;
-mod runtime;
-mod settings;
-mod statistics;
-mod tree;
 mod vehicle;
 
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
-use tracing_subscriber::EnvFilter;
-
-use failure::{Failure, Outcome};
+use clap::{Parser, Subcommand};
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::logging::Logging;
+use jaus::cli::output;
 
 /// Speak SAE JAUS: run nodes, find and query others, read and write messages.
 #[derive(Parser)]
@@ -87,47 +80,9 @@ impl Command {
     }
 }
 
-#[derive(Args)]
-struct Logging {
-    /// Say more about what happens inside, on standard error; -vv and -vvv for details
-    ///
-    /// The environment variable JAUS_LOG chooses by module, for example JAUS_LOG=jaus::endpoint=trace.
-    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
-    verbose: u8,
-}
-
-impl Logging {
-    /// Sends the library's tracing to standard error.
-    fn start(&self) -> Result<(), Failure> {
-        let level = match self.verbose {
-            0 => "error",
-            1 => "info",
-            2 => "debug",
-            _ => "trace",
-        };
-        let filter = match std::env::var(LOG) {
-            Ok(filter) => EnvFilter::try_new(&filter)
-                .map_err(|error| Failure::new(format!("{LOG}={filter}: {error}")))?,
-            Err(_) => EnvFilter::new(level),
-        };
-        tracing_subscriber::fmt()
-            .with_env_filter(filter)
-            .with_writer(std::io::stderr)
-            .with_ansi(output::colours_wanted(&std::io::stderr()))
-            .with_target(self.verbose > 1)
-            // It would complain on standard error that standard error is closed, and panic.
-            .log_internal_errors(false)
-            .init();
-        Ok(())
-    }
-}
-
-/// The environment variable that says what to log.
-const LOG: &str = "JAUS_LOG";
-
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let outcome = cli.logging.start().and_then(|()| cli.command.run());
+    let outcome = cli.logging.start("error").and_then(|()| cli.command.run());
     match outcome {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Incomplete) => ExitCode::from(1),

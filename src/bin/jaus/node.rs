@@ -10,12 +10,12 @@ use jaus::endpoint::Event;
 use jaus::node::{ComponentEvent, ComponentEvents, Events, Local, Node, units};
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::failure::{Failure, Outcome};
-use crate::network::{Network, SubsystemKind};
-use crate::output::Output;
-use crate::runtime::{self, Clock};
-use crate::statistics::{self, DropWatch};
-use crate::tree;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::{Network, SubsystemKind};
+use jaus::cli::output::Output;
+use jaus::cli::runtime::{self, Clock};
+use jaus::cli::statistics::{self, DropWatch};
+use jaus::cli::tree;
 
 /// Run a node with one component that others can find
 ///

@@ -17,10 +17,10 @@ use jaus::messages::core::{
 use jaus::node::Port;
 use tokio::time::{Instant, sleep_until, timeout_at};
 
-use crate::failure::{Failure, Outcome};
-use crate::network::Network;
-use crate::output::{Output, say};
-use crate::runtime;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::output::{Output, say};
+use jaus::cli::runtime;
 
 /// The code of the padded message of `--size`: user-defined (AS5710 leaves D000h and above to
 /// users), so that no service acts on it.

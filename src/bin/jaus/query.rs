@@ -14,10 +14,10 @@ use serde::Serialize;
 use tokio::time::{Instant, timeout_at};
 
 use crate::definitions::Definitions;
-use crate::failure::{Failure, Outcome};
-use crate::network::Network;
-use crate::output::{Output, say};
-use crate::runtime;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::output::{Output, say};
+use jaus::cli::runtime;
 
 /// How often a question is asked while no answer comes.
 const AGAIN: Duration = Duration::from_millis(500);

@@ -23,9 +23,9 @@ use socket2::SockRef;
 use tokio::net::UdpSocket;
 use tokio::time::{Instant, sleep_until};
 
-use crate::failure::{Failure, Outcome};
-use crate::output::{Output, say};
-use crate::runtime;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::{Output, say};
+use jaus::cli::runtime;
 
 /// Send the UDP datagrams of a capture again, at the pace at which they were recorded
 ///

@@ -17,12 +17,12 @@ use jaus::service::mobility::Vehicle;
 use jaus::vehicle::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::failure::{Failure, Outcome};
-use crate::network::Network;
 use crate::node;
-use crate::output::Output;
-use crate::runtime::{self, Clock};
-use crate::tree;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::output::Output;
+use jaus::cli::runtime::{self, Clock};
+use jaus::cli::tree;
 
 /// Run a simulated vehicle that can be controlled and driven
 ///

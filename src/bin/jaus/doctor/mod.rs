@@ -12,10 +12,10 @@ use clap::Args;
 use serde_json::json;
 
 use self::finding::{Finding, Mark};
-use crate::failure::{Failure, Outcome};
-use crate::network::Network;
-use crate::output::{Output, colours_wanted, say};
-use crate::runtime;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::output::{Output, colours_wanted, say};
+use jaus::cli::runtime;
 
 /// Find out why nodes do not find each other
 ///

@@ -13,7 +13,7 @@ use jaus::node::{Config, Events, LinkReport, Node};
 use jaus::wire::Version;
 
 use super::finding::Finding;
-use crate::runtime;
+use jaus::cli::runtime;
 
 /// Peers that are named one by one.
 const MOST: usize = 12;

@@ -23,10 +23,10 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::view::Dictionary;
 
-use crate::failure::{Failure, Outcome};
-use crate::network::Network;
-use crate::output::{Output, say};
-use crate::runtime;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::output::{Output, say};
+use jaus::cli::runtime;
 use panel::Panel;
 use papers::Papers;
 use recording::Recording;

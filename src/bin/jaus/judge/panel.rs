@@ -21,7 +21,7 @@ use tokio::time::{Instant, timeout_at};
 use super::recording::Recording;
 use super::step::{Form, Reach, Speaker};
 use super::verdict::Said;
-use crate::failure::Failure;
+use jaus::cli::failure::Failure;
 
 /// What the judge calls itself.
 const NAME: &str = "jaus judge";

@@ -11,9 +11,9 @@ use super::step::{Form, Step};
 use super::subject::Subject;
 use super::verdict::{StepResult, Tally};
 use super::{Judge, json, junit};
-use crate::failure::Failure;
-use crate::output::{self, Output};
-use crate::runtime::Clock;
+use jaus::cli::failure::Failure;
+use jaus::cli::output::{self, Output};
+use jaus::cli::runtime::Clock;
 
 /// Everything that a run is written to.
 pub(super) struct Papers<'d> {

@@ -15,7 +15,7 @@ use jaus::node::Node;
 use jaus::view::{CaptureWriter, InterfaceNumber, LinkType, Timestamp};
 use jaus::wire::{Flags, Frame, judp};
 
-use crate::failure::Failure;
+use jaus::cli::failure::Failure;
 
 /// Routers that a recorded packet may pass, for want of a better number.
 const TTL: u8 = 16;

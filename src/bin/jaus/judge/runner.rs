@@ -16,7 +16,7 @@ use super::step::{Act, Check, Exchange, Expectation, Form, Reach, Speaker, Step,
 use super::subject::Subject;
 use super::verdict::{Proceeding, Said, StepResult, Verdict};
 use super::watch::Observation;
-use crate::failure::Failure;
+use jaus::cli::failure::Failure;
 
 /// Carries out one step after the other.
 pub(super) struct Runner {

@@ -17,7 +17,7 @@ use tokio::time::Instant;
 
 use super::panel::{Panel, SETTLING, code_of};
 use super::step::{Reach, Speaker};
-use crate::failure::Failure;
+use jaus::cli::failure::Failure;
 
 /// How often each question is put, because the first datagrams may be lost while addresses are
 /// learned.

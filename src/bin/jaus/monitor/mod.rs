@@ -17,9 +17,9 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use self::sample::{Sample, View};
 use self::table::Screen;
-use crate::failure::{Failure, Outcome};
-use crate::network::Network;
-use crate::runtime;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::runtime;
 
 /// Watch peers, links and losses as they are
 ///

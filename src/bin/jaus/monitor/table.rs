@@ -5,8 +5,8 @@ use std::io::{IsTerminal, stdout};
 use terminal_size::{Height, Width, terminal_size};
 
 use super::sample::{DropRow, LinkRow, PeerRow, View};
-use crate::failure::Failure;
-use crate::output::Output;
+use jaus::cli::failure::Failure;
+use jaus::cli::output::Output;
 
 /// Rows where nobody said how many, and no terminal ends.
 const MOST: usize = 1000;

@@ -10,7 +10,7 @@ use jaus::link::udp::{Settings, UdpLink};
 use jaus::link::{Group, Interfaces, Slab, interface::Ip};
 
 use super::Packet;
-use crate::failure::Failure;
+use jaus::cli::failure::Failure;
 
 /// A listener on each interface. They say nothing.
 pub(super) struct Listeners {

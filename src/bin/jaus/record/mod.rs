@@ -21,10 +21,10 @@ use jaus::link::{Group, Interfaces};
 use jaus::view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType, Timestamp};
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::failure::{Failure, Outcome};
-use crate::output::say;
-use crate::runtime;
 use filter::Filter;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::say;
+use jaus::cli::runtime;
 
 /// Record JAUS traffic into a capture file, for `jaus decode`, `jaus replay` and Wireshark
 ///

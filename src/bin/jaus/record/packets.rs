@@ -19,7 +19,7 @@ use tokio::io::Interest;
 use tokio::net::UdpSocket;
 
 use super::Packet;
-use crate::failure::Failure;
+use jaus::cli::failure::Failure;
 
 /// Packets taken before others have their turn.
 const BATCH: usize = 64;

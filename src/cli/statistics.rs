@@ -2,17 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use jaus::endpoint::Counter;
-use jaus::node::Node;
+use crate::endpoint::Counter;
+use crate::node::Node;
 
-use crate::failure::Failure;
-use crate::output::Output;
+use super::failure::Failure;
+use super::output::Output;
 
 /// Peers that are listed one by one.
 const MOST: usize = 20;
 
 /// Prints counters, links, mailboxes and peers.
-pub(crate) fn print(node: &Node, output: &mut Output) -> Result<(), Failure> {
+pub fn print(node: &Node, output: &mut Output) -> Result<(), Failure> {
     output.line("")?;
     for (counter, count) in node.counters().iter().filter(|&(_, count)| count > 0) {
         output.line(format_args!("{count:>9}  {}", counter.name()))?;
@@ -62,7 +62,7 @@ fn links(node: &Node) -> Vec<String> {
 }
 
 fn mailboxes(node: &Node) -> Vec<String> {
-    let line = |component: jaus::node::ComponentReport| {
+    let line = |component: crate::node::ComponentReport| {
         let mailbox = component.mailbox;
         format!(
             "component {}: {} delivered, {} dropped unread, {} waiting",
@@ -102,13 +102,13 @@ fn peers(node: &Node) -> Vec<String> {
 /// Notices when drops grow, a line for each reason; called now and then, so that a flood cannot
 /// fill a log.
 #[derive(Default)]
-pub(crate) struct DropWatch {
+pub struct DropWatch {
     before: BTreeMap<Counter, u64>,
 }
 
 impl DropWatch {
     /// Logs what was dropped since the last call.
-    pub(crate) fn log(&mut self, node: &Node) {
+    pub fn log(&mut self, node: &Node) {
         for (counter, total) in node.counters().iter() {
             if !counter.name().starts_with("dropped: ") {
                 continue;

@@ -3,27 +3,34 @@
 use std::fmt::{self, Display};
 use std::io::{self, IsTerminal, StdoutLock, Write};
 
-use crate::failure::Failure;
+use super::failure::Failure;
 
 /// Standard output. Every line is on its way when [`line`](Self::line) returns.
-pub(crate) struct Output {
+pub struct Output {
     out: StdoutLock<'static>,
 }
 
+impl Default for Output {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Output {
-    pub(crate) fn new() -> Self {
+    /// Takes hold of standard output.
+    pub fn new() -> Self {
         Self {
             out: io::stdout().lock(),
         }
     }
 
     /// Prints what is no line: a screen.
-    pub(crate) fn part(&mut self, text: &str) -> Result<(), Failure> {
+    pub fn part(&mut self, text: &str) -> Result<(), Failure> {
         self.write(format_args!("{text}"))
     }
 
     /// Prints a line.
-    pub(crate) fn line(&mut self, text: impl Display) -> Result<(), Failure> {
+    pub fn line(&mut self, text: impl Display) -> Result<(), Failure> {
         self.write(format_args!("{text}\n"))
     }
 
@@ -39,11 +46,16 @@ impl Output {
 }
 
 /// Says something on standard error. If nobody reads that, it is not said.
-pub(crate) fn say(words: impl Display) {
-    let _ = writeln!(io::stderr().lock(), "jaus: {words}");
+pub fn say(words: impl Display) {
+    say_as("jaus", words);
+}
+
+/// The same for another program than `jaus`.
+pub fn say_as(program: &str, words: impl Display) {
+    let _ = writeln!(io::stderr().lock(), "{program}: {words}");
 }
 
 /// Whether to write in colours: to a terminal, unless NO_COLOR (<https://no-color.org>) is set.
-pub(crate) fn colours_wanted(stream: &impl IsTerminal) -> bool {
+pub fn colours_wanted(stream: &impl IsTerminal) -> bool {
     stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

@@ -1,25 +1,26 @@
 //! The flags of every command that goes on the network: who we are, and where.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
+use crate::address::JausId;
+use crate::component::Kind;
+use crate::link::local::record::Reason;
+use crate::link::udp::PortTaken;
+use crate::link::{Group, Interfaces};
+use crate::node::{Address, Config, Host, HostError, Node, Peer, Port, Sender};
 use clap::{Args, ValueEnum};
-use jaus::address::JausId;
-use jaus::component::Kind;
-use jaus::link::local::record::Reason;
-use jaus::link::udp::PortTaken;
-use jaus::link::{Group, Interfaces};
-use jaus::node::{Address, Config, Host, HostError, Node, Peer, Port, Sender};
 use serde::Deserialize;
 
-use crate::failure::Failure;
-use crate::settings;
+use super::failure::Failure;
+use super::settings;
 
-#[derive(Args)]
+#[derive(Args, Debug)]
 #[command(next_help_heading = "Network")]
-pub(crate) struct Network {
+#[expect(missing_docs, reason = "it would become the help text of whoever flattens it")]
+pub struct Network {
     /// Our id, SUBSYSTEM.NODE.COMPONENT or SUBSYSTEM.NODE (then component 1) [default: 101.1.1 for
     /// `jaus node`, 42.1.1 for `jaus judge`; the other commands take one from subsystem 60000 on]
     #[arg(long, value_name = "ID")]
@@ -60,7 +61,7 @@ pub(crate) struct Network {
         num_args = 0..=1,
         require_equals = true,
         default_missing_value = "default",
-        conflicts_with_all = ["interface", "loopback", "port", "group", "ttl", "peer", "config"],
+        conflicts_with_all = ["interface", "loopback", "port", "group", "ttl", "peer"],
     )]
     attach: Option<Address>,
 
@@ -82,12 +83,12 @@ pub(crate) struct Network {
 
 /// Who a node is, as far as a settings file or flags say.
 #[derive(Debug, Default, Deserialize)]
-pub(crate) struct Identity {
+pub struct Identity {
     id: Option<OwnId>,
     /// What the subsystem is called.
-    pub(crate) name: Option<String>,
+    pub name: Option<String>,
     /// What the subsystem is.
-    pub(crate) kind: Option<SubsystemKind>,
+    pub kind: Option<SubsystemKind>,
 }
 
 /// Our own id: one component, so no wildcards.
@@ -125,7 +126,7 @@ impl TryFrom<String> for OwnId {
 /// The kinds of subsystems, as flags and files name them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum SubsystemKind {
+pub enum SubsystemKind {
     /// Something that moves or acts
     Vehicle,
     /// An operator control unit
@@ -147,7 +148,7 @@ impl From<SubsystemKind> for Kind {
 impl Network {
     /// For a node that is meant to be found: its component's id, what the file says about it, and
     /// the settings. `default` is the id of whoever chooses none.
-    pub(crate) fn for_node(&self, default: JausId) -> Result<(JausId, Identity, Config), Failure> {
+    pub fn for_node(&self, default: JausId) -> Result<(JausId, Identity, Config), Failure> {
         let (identity, node) = self.settings()?;
         let id = self.chosen_id(&identity, &node).unwrap_or(default);
         Ok((id, identity, self.with_flags(node, id)?))
@@ -155,14 +156,14 @@ impl Network {
 
     /// For a look at a node that is to be: the id that it is to have, if one is chosen, and its
     /// settings, but with a passing id.
-    pub(crate) fn for_examination(&self) -> Result<(Option<JausId>, Config), Failure> {
+    pub fn for_examination(&self) -> Result<(Option<JausId>, Config), Failure> {
         let (identity, node) = self.settings()?;
         let id = self.chosen_id(&identity, &node);
         Ok((id, self.with_flags(node, passing_id())?))
     }
 
     /// Whether settings come from a file.
-    pub(crate) const fn has_file(&self) -> bool {
+    pub const fn has_file(&self) -> bool {
         self.config.is_some()
     }
 
@@ -191,12 +192,12 @@ impl Network {
 
     /// The same for a command that looks at the numbers of its node, so that it needs one of its
     /// own.
-    pub(crate) fn for_own_node(&self, command: &str) -> Result<(JausId, Config), Failure> {
+    pub fn for_own_node(&self, command: &str) -> Result<(JausId, Config), Failure> {
         self.for_own_node_as(passing_id(), command)
     }
 
     /// The same for a command that has a usual id.
-    pub(crate) fn for_own_node_as(
+    pub fn for_own_node_as(
         &self,
         usual: JausId,
         command: &str,
@@ -209,8 +210,46 @@ impl Network {
         self.for_a_moment_as(usual)
     }
 
+    /// The settings file, if one is chosen.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        self.config.as_deref()
+    }
+
+    /// A place for a component that stays: on the host's node, or on one of its own. `usual` is the
+    /// id of whoever chooses none; on the host's node its component number alone counts.
+    ///
+    /// Where the host's node is not there yet, it is waited for, for ever: components may be started
+    /// in any order.
+    ///
+    /// # Errors
+    /// If a flag or the file is mistaken, or a node cannot be started, or will not have us.
+    pub async fn join(&self, usual: JausId) -> Result<Place, Failure> {
+        let Some(address) = &self.attach else {
+            let (id, identity, config) = self.for_node(usual)?;
+            let config = config.or_any_free_port();
+            let node = Node::start(config).map_err(Failure::of)?;
+            let port = node.attach(id.component()).map_err(Failure::of)?;
+            return Ok(Place {
+                port,
+                identity,
+                stay: Stay::OnOurs(node),
+            });
+        };
+        let (identity, node) = self.settings()?;
+        let id = self.chosen_id(&identity, &node);
+        let host = Host::at(address.clone());
+        let port = wait_for_host(&host, id, usual.component()).await?;
+        let stay = Stay::AtHost(port.sender());
+        Ok(Place {
+            port,
+            identity,
+            stay,
+        })
+    }
+
     /// A component for a command that runs for a moment, on the host's node or on one of its own.
-    pub(crate) async fn join_for_a_moment(&self) -> Result<(Port, Stay), Failure> {
+    pub async fn join_for_a_moment(&self) -> Result<(Port, Stay), Failure> {
         let Some(address) = &self.attach else {
             let (id, config) = self.for_a_moment()?;
             let node = Node::start(config).map_err(Failure::of)?;
@@ -257,21 +296,76 @@ impl Network {
     }
 }
 
+/// A place that a component has taken.
+pub struct Place {
+    /// Its door to the node.
+    pub port: Port,
+    /// Who its subsystem is, as far as the settings file says.
+    pub identity: Identity,
+    /// Whose node it is.
+    pub stay: Stay,
+}
+
+/// Attaches to the host's node as soon as there is one, and the place is free: a component that has
+/// crashed may still be there for a moment.
+#[expect(clippy::disallowed_methods, reason = "processes start in real time")]
+async fn wait_for_host(host: &Host, id: Option<JausId>, usual: u8) -> Result<Port, Failure> {
+    const PAUSE: Duration = Duration::from_millis(100);
+    const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+    const TAKEN: u32 = 10;
+    let mut pause = PAUSE;
+    let (mut taken, mut told) = (0, false);
+    loop {
+        let attached = match id {
+            Some(id) => host.attach_as(id).await,
+            None => host.attach(usual).await,
+        };
+        let error = match attached {
+            Ok(port) => return Ok(port),
+            Err(error) => error,
+        };
+        match &error {
+            HostError::Link(_) => {}
+            HostError::Refused {
+                reason: Reason::Taken,
+                ..
+            } if taken < TAKEN => taken += 1,
+            _ => return Err(Failure::of(error)),
+        }
+        if !std::mem::replace(&mut told, true) {
+            tracing::info!("waiting for the node of this host: {error}");
+        }
+        tokio::time::sleep(pause).await;
+        pause = (2 * pause).min(LONGEST_PAUSE);
+    }
+}
+
 /// Where the component of a passing command lives.
-pub(crate) enum Stay {
+pub enum Stay {
+    /// A node of our own.
     OnOurs(Node),
+    /// The node of the host.
     AtHost(Sender),
 }
 
 impl Stay {
+    /// The node, if it is in this process.
+    #[must_use]
+    pub fn node(&self) -> Option<Node> {
+        match self {
+            Self::OnOurs(node) => Some(node.clone()),
+            Self::AtHost(_) => None,
+        }
+    }
+
     /// Whether it is a node that somebody else runs.
-    pub(crate) const fn is_guest(&self) -> bool {
+    pub const fn is_guest(&self) -> bool {
         matches!(self, Self::AtHost(_))
     }
 
     /// Ends it, once nobody holds the component any more.
     #[expect(clippy::disallowed_methods, reason = "a farewell in real time")]
-    pub(crate) async fn end(self) {
+    pub async fn end(self) {
         match self {
             Self::OnOurs(node) => node.shutdown().await,
             Self::AtHost(sender) => {

@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 
 use tokio::runtime::Builder;
 
-use crate::failure::Failure;
+use super::failure::Failure;
 
 /// Runs a command's network part to its end.
-pub(crate) fn run<T>(work: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
+pub fn run<T>(work: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
     let runtime = Builder::new_current_thread()
         .enable_all()
         .build()
@@ -22,7 +22,7 @@ pub(crate) fn run<T>(work: impl Future<Output = Result<T, Failure>>) -> Result<T
 }
 
 /// Waits for Ctrl-C or a request to terminate; with a time limit for that at most.
-pub(crate) async fn end(limit: Option<Duration>) {
+pub async fn end(limit: Option<Duration>) {
     let limit = async {
         match limit {
             Some(limit) => tokio::time::sleep(limit).await,
@@ -60,7 +60,7 @@ async fn termination() {
 }
 
 /// A flag's number of seconds: `2`, `0.5`.
-pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
+pub fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text
         .parse()
         .map_err(|_| "write a number of seconds such as 2 or 0.5".to_owned())?;
@@ -74,14 +74,16 @@ const MOST: Duration = Duration::from_secs(365 * 86_400);
 
 /// The time since a command began, printed as `  12.34 s`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Clock(Instant);
+pub struct Clock(Instant);
 
 impl Clock {
-    pub(crate) fn start() -> Self {
+    /// Begins to count.
+    pub fn start() -> Self {
         Self(Instant::now())
     }
 
-    pub(crate) fn elapsed(self) -> Duration {
+    /// How long it has been counting.
+    pub fn elapsed(self) -> Duration {
         self.0.elapsed()
     }
 }

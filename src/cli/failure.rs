@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// A run that came to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Outcome {
+pub enum Outcome {
     /// Exit status 0.
     Done,
     /// Something could not be read, or did not answer: exit status 1.
@@ -18,7 +18,7 @@ pub(crate) enum Outcome {
 
 impl Outcome {
     /// [`Incomplete`](Self::Incomplete) if anything was missing.
-    pub(crate) fn complete_if(complete: bool) -> Self {
+    pub fn complete_if(complete: bool) -> Self {
         if complete {
             Self::Done
         } else {
@@ -29,7 +29,7 @@ impl Outcome {
 
 /// Why a run could not be: exit status 2.
 #[derive(Debug)]
-pub(crate) enum Failure {
+pub enum Failure {
     /// Nobody reads our output any more; not worth a word.
     OutputClosed,
     /// What is wrong and what to do.
@@ -38,12 +38,12 @@ pub(crate) enum Failure {
 
 impl Failure {
     /// A sentence for people.
-    pub(crate) fn new(message: impl Into<String>) -> Self {
+    pub fn new(message: impl Into<String>) -> Self {
         Self::Message(message.into())
     }
 
     /// An error of the library, with its causes: its sentences are made for people.
-    pub(crate) fn of(error: impl Error) -> Self {
+    pub fn of(error: impl Error) -> Self {
         let mut message = error.to_string();
         let mut source = error.source();
         while let Some(cause) = source {
@@ -54,7 +54,7 @@ impl Failure {
     }
 
     /// A file that cannot be opened or read.
-    pub(crate) fn file(path: &Path, error: &io::Error) -> Self {
+    pub fn file(path: &Path, error: &io::Error) -> Self {
         Self::Message(format!("{}: {error}", path.display()))
     }
 }

@@ -6,31 +6,84 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
-use jaus::node::Config;
+use crate::node::Config;
 use serde_json::Value as Json;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue, Deserializer, Error};
 
-use crate::failure::Failure;
-use crate::network::Identity;
+use super::failure::Failure;
+use super::network::Identity;
 
-/// The tool's own keys; all others are the node's.
+/// The programs' own keys; all others are the node's.
 const OWN: [&str; 3] = ["id", "name", "kind"];
 
+/// The table with the flags of a program that is one component.
+const COMPONENT: &str = "component";
+
 /// Reads a settings file: who the node is, and its settings.
-pub(crate) fn read(path: &Path) -> Result<(Identity, Config), Failure> {
+pub fn read(path: &Path) -> Result<(Identity, Config), Failure> {
     let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
     parse(&text).map_err(|mistake| Failure::new(format!("{}:{mistake}", path.display())))
+}
+
+/// The flags in the table `[component]` of a settings file, as they would stand on the command line:
+/// a key is a flag's long name, `true` stands for a flag without a value, a list for one that is
+/// given several times.
+///
+/// # Errors
+/// If the file cannot be read, or a value cannot be a flag's.
+pub fn flags(path: &Path) -> Result<Vec<String>, Failure> {
+    let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
+    flags_in(&text).map_err(|mistake| Failure::new(format!("{}:{mistake}", path.display())))
+}
+
+fn flags_in(text: &str) -> Result<Vec<String>, Mistake> {
+    let table = DeTable::parse(text).map_err(|error| Mistake::of(&error, text))?;
+    let Some(component) = table.get_ref().get(COMPONENT) else {
+        return Ok(Vec::new());
+    };
+    let mistake =
+        |place: Range<usize>, problem: &str| Mistake::at(Some(place), text, problem.to_owned());
+    let DeValue::Table(entries) = component.get_ref() else {
+        let problem = "write a section, [component]";
+        return Err(mistake(component.span(), problem));
+    };
+    let mut flags = Vec::new();
+    for (key, value) in entries {
+        let single = std::slice::from_ref(value);
+        let values = match value.get_ref() {
+            DeValue::Array(values) => &values[..],
+            _ => single,
+        };
+        for value in values {
+            match value.get_ref() {
+                DeValue::Boolean(true) => flags.push(format!("--{}", key.get_ref())),
+                DeValue::Boolean(false) => {}
+                DeValue::String(text) => flags.push(format!("--{}={text}", key.get_ref())),
+                DeValue::Integer(number) => flags.push(format!("--{}={number}", key.get_ref())),
+                DeValue::Float(number) => flags.push(format!("--{}={number}", key.get_ref())),
+                DeValue::Datetime(_) | DeValue::Array(_) | DeValue::Table(_) => {
+                    let problem =
+                        "a flag's value is a text, a number, true or false, or a list of them";
+                    return Err(mistake(value.span(), problem));
+                }
+            }
+        }
+    }
+    Ok(flags)
 }
 
 fn parse(text: &str) -> Result<(Identity, Config), Mistake> {
     let wrong = |error: Error| Mistake::of(&error, text);
     let table = DeTable::parse(text).map_err(wrong)?;
     let known = serde_json::to_value(Config::default()).unwrap_or_default();
-    if let Some(unknown) = unknown_key(table.get_ref(), &known, &OWN, "") {
+    let besides = [&OWN[..], &[COMPONENT]].concat();
+    if let Some(unknown) = unknown_key(table.get_ref(), &known, &besides, "") {
         return Err(unknown.in_text(text));
     }
     let place = table.span();
+    let mut table = table;
+    table.get_mut().remove(COMPONENT);
     let is_own = |(key, _): &(Spanned<DeString<'_>>, _)| OWN.contains(&key.get_ref().as_ref());
     let (own, node): (Vec<_>, Vec<_>) = table.into_inner().into_iter().partition(is_own);
     let part = |entries: Vec<_>| {

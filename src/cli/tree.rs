@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use jaus::address::JausId;
-use jaus::component::{Change, Directory, Identification, Kind, Level, Loss, Offer};
-use jaus::service::Component;
+use crate::address::JausId;
+use crate::component::{Change, Directory, Identification, Kind, Level, Loss, Offer};
+use crate::service::Component;
 use serde_json::{Map, Value as Json, json};
 
 /// The tree as indented lines, without `left_out`, the component that looked.
-pub(crate) fn lines(directory: &Directory, left_out: Option<JausId>) -> Vec<String> {
+pub fn lines(directory: &Directory, left_out: Option<JausId>) -> Vec<String> {
     let mut lines = Vec::new();
     for (number, subsystem) in directory.subsystems() {
         let others: Vec<_> = subsystem
@@ -56,7 +56,7 @@ fn naming(identification: Option<&Identification>) -> String {
 }
 
 /// `the vehicle "Rover"`, or `called "Camera"`.
-pub(crate) fn introduction(Identification { kind, name }: &Identification) -> String {
+pub fn introduction(Identification { kind, name }: &Identification) -> String {
     match kind {
         Kind::Vehicle | Kind::OperatorControlUnit => format!("the {kind} \"{name}\""),
         _ => format!("called \"{name}\""),
@@ -77,7 +77,7 @@ fn services(component: &Component) -> Vec<String> {
 }
 
 /// The versions of every service, the newest first.
-pub(crate) fn by_urn(offers: &[Offer]) -> BTreeMap<&str, Vec<String>> {
+pub fn by_urn(offers: &[Offer]) -> BTreeMap<&str, Vec<String>> {
     let mut services: BTreeMap<&str, Vec<String>> = BTreeMap::new();
     for Offer { urn, major, minor } in offers.iter().rev() {
         services
@@ -89,7 +89,7 @@ pub(crate) fn by_urn(offers: &[Offer]) -> BTreeMap<&str, Vec<String>> {
 }
 
 /// The tree as one JSON object, without the component `own`.
-pub(crate) fn json(directory: &Directory, own: JausId) -> Json {
+pub fn json(directory: &Directory, own: JausId) -> Json {
     let mut subsystems = Vec::new();
     for (number, subsystem) in directory.subsystems() {
         let mut nodes = Vec::new();
@@ -139,7 +139,7 @@ fn named_json(key: &str, id: Json, identification: Option<&Identification>) -> M
 }
 
 /// A change in words; `None` if it says nothing that the next one does not say better.
-pub(crate) fn in_words(change: Change, directory: &Directory) -> Option<String> {
+pub fn in_words(change: Change, directory: &Directory) -> Option<String> {
     Some(match change {
         Change::SubsystemFound(_) => return None,
         Change::Found(id) => format!("{id} has come"),
@@ -164,7 +164,7 @@ pub(crate) fn in_words(change: Change, directory: &Directory) -> Option<String> 
 }
 
 /// A change as a JSON object.
-pub(crate) fn change_json(change: Change, directory: &Directory) -> Json {
+pub fn change_json(change: Change, directory: &Directory) -> Json {
     match change {
         Change::SubsystemFound(number) => {
             json!({ "change": "subsystem found", "subsystem": number })

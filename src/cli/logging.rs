@@ -1,0 +1,50 @@
+//! The library's tracing on standard error, as much of it as is asked for.
+
+use clap::Args;
+use tracing_subscriber::EnvFilter;
+
+use super::Failure;
+use super::output::colours_wanted;
+
+/// The flag of every program that says how much is told.
+#[derive(Args, Debug, Clone, Copy)]
+pub struct Logging {
+    /// Say more about what happens inside, on standard error; -vv and -vvv for details
+    ///
+    /// The environment variable JAUS_LOG chooses by module, for example JAUS_LOG=jaus::endpoint=trace.
+    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    verbose: u8,
+}
+
+/// The environment variable that says what to log.
+const LOG: &str = "JAUS_LOG";
+
+impl Logging {
+    /// Sends the library's tracing to standard error. `usual` is what is told without a flag, such
+    /// as `error`.
+    ///
+    /// # Errors
+    /// If the environment variable cannot be read.
+    pub fn start(&self, usual: &str) -> Result<(), Failure> {
+        let level = match self.verbose {
+            0 => usual,
+            1 => "info",
+            2 => "debug",
+            _ => "trace",
+        };
+        let filter = match std::env::var(LOG) {
+            Ok(filter) => EnvFilter::try_new(&filter)
+                .map_err(|error| Failure::new(format!("{LOG}={filter}: {error}")))?,
+            Err(_) => EnvFilter::new(level),
+        };
+        tracing_subscriber::fmt()
+            .with_env_filter(filter)
+            .with_writer(std::io::stderr)
+            .with_ansi(colours_wanted(&std::io::stderr()))
+            .with_target(self.verbose > 1)
+            // It would complain on standard error that standard error is closed, and panic.
+            .log_internal_errors(false)
+            .init();
+        Ok(())
+    }
+}
