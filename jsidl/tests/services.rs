@@ -51,6 +51,10 @@ fn every_service_of_the_core_and_mobility_sets_is_there() {
         21 + 3,
         "1.1, and the layouts that were published before"
     );
+    let own = library
+        .services()
+        .filter(|it| it.id.urn.starts_with("urn:jaus-rs:ground:"));
+    assert!(own.count() >= 3, "our own set");
     for service in library.services() {
         let root = library
             .lineage(service)

@@ -19,7 +19,10 @@ use super::settings;
 
 #[derive(Args, Debug)]
 #[command(next_help_heading = "Network")]
-#[expect(missing_docs, reason = "it would become the help text of whoever flattens it")]
+#[expect(
+    missing_docs,
+    reason = "it would become the help text of whoever flattens it"
+)]
 pub struct Network {
     /// Our id, SUBSYSTEM.NODE.COMPONENT or SUBSYSTEM.NODE (then component 1) [default: 101.1.1 for
     /// `jaus node`, 42.1.1 for `jaus judge`; the other commands take one from subsystem 60000 on]

@@ -16,6 +16,7 @@ pub mod arbitrary;
 #[doc(hidden)]
 pub mod bits;
 mod blob;
+mod code;
 mod composite;
 mod enumeration;
 mod error;
@@ -35,6 +36,7 @@ pub use bytes::Bytes;
 
 pub use bits::Bits;
 pub use blob::FormattedBlob;
+pub use code::report_code;
 pub use composite::Composite;
 pub use enumeration::Enumeration;
 pub use error::{DecodeError, DecodeErrorKind, EncodeError, EncodeErrorKind};

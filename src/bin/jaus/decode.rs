@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use bytes::Bytes;
 use clap::Args;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::{Output, say};
 use jaus::view::{self, Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 
 use crate::definitions::Definitions;
-use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::output::{Output, say};
 
 /// Print captured messages, or lines of hex, as one JSON object a line
 ///

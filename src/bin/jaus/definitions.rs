@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use jaus::view::Dictionary;
-
 use jaus::cli::failure::Failure;
 use jaus::cli::output::say;
+use jaus::view::Dictionary;
 
 #[derive(Args)]
 pub(crate) struct Definitions {

@@ -7,16 +7,15 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use jaus::address::JausId;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::{Output, colours_wanted};
+use jaus::cli::runtime::{self, Clock};
+use jaus::cli::tree;
 use jaus::component::{Change, Component, Handlers, Kind, Level, QueryError};
 use jaus::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse};
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
 use tokio::time::{MissedTickBehavior, interval};
-
-use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::output::{Output, colours_wanted};
-use jaus::cli::runtime::{self, Clock};
-use jaus::cli::tree;
 
 /// Watch a vehicle and an operator station find each other on this computer
 ///

@@ -3,13 +3,12 @@
 use std::time::Duration;
 
 use clap::Args;
-use jaus::component::{Component, Kind};
-
 use jaus::cli::failure::{Failure, Outcome};
 use jaus::cli::network::Network;
 use jaus::cli::output::{Output, say};
 use jaus::cli::runtime::{self, Clock};
 use jaus::cli::tree;
+use jaus::component::{Component, Kind};
 
 /// Show subsystems, nodes, components and their services
 ///

@@ -3,11 +3,11 @@
 use std::io::{self, BufRead};
 
 use clap::Args;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::Output;
 use jaus::view::{Dictionary, Line, Request, Unreadable, to_hex};
 
 use crate::definitions::Definitions;
-use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::output::Output;
 
 /// Read messages as JSON lines from standard input, and print their octets in hex
 ///

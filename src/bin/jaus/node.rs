@@ -5,17 +5,16 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::component::{Component, Kind};
-use jaus::endpoint::Event;
-use jaus::node::{ComponentEvent, ComponentEvents, Events, Local, Node, units};
-use tokio::time::{MissedTickBehavior, interval};
-
 use jaus::cli::failure::{Failure, Outcome};
 use jaus::cli::network::{Network, SubsystemKind};
 use jaus::cli::output::Output;
 use jaus::cli::runtime::{self, Clock};
 use jaus::cli::statistics::{self, DropWatch};
 use jaus::cli::tree;
+use jaus::component::{Component, Kind};
+use jaus::endpoint::Event;
+use jaus::node::{ComponentEvent, ComponentEvents, Events, Local, Node, units};
+use tokio::time::{MissedTickBehavior, interval};
 
 /// Run a node with one component that others can find
 ///

@@ -8,6 +8,10 @@ use std::time::Duration;
 use bytes::Bytes;
 use clap::{Args, ValueEnum};
 use jaus::address::JausId;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::output::{Output, say};
+use jaus::cli::runtime;
 use jaus::codec::Message;
 use jaus::endpoint::{Outgoing, Path, Received};
 use jaus::messages::core::{
@@ -16,11 +20,6 @@ use jaus::messages::core::{
 };
 use jaus::node::Port;
 use tokio::time::{Instant, sleep_until, timeout_at};
-
-use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::network::Network;
-use jaus::cli::output::{Output, say};
-use jaus::cli::runtime;
 
 /// The code of the padded message of `--size`: user-defined (AS5710 leaves D000h and above to
 /// users), so that no service acts on it.

@@ -7,6 +7,11 @@ use std::time::Duration;
 use bytes::Bytes;
 use clap::Args;
 use jaus::address::JausId;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::output::{Output, say};
+use jaus::cli::runtime;
+use jaus::codec::report_code;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::node::Port;
 use jaus::view::{Dictionary, Line, Request};
@@ -14,10 +19,6 @@ use serde::Serialize;
 use tokio::time::{Instant, timeout_at};
 
 use crate::definitions::Definitions;
-use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::network::Network;
-use jaus::cli::output::{Output, say};
-use jaus::cli::runtime;
 
 /// How often a question is asked while no answer comes.
 const AGAIN: Duration = Duration::from_millis(500);
@@ -57,7 +58,7 @@ impl Query {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         let dictionary = self.definitions.load()?;
         let query = self.octets(&dictionary)?;
-        let report = report_code(&query).ok_or_else(|| {
+        let report = report_to(&query).ok_or_else(|| {
             Failure::new(format!(
                 "{} is not a query: nobody reports on it. Queries have codes from 2000h to 2FFFh",
                 self.message
@@ -155,8 +156,7 @@ fn answer(source: JausId, line: Line<'_>) -> Result<String, Failure> {
     serde_json::to_string(&Answer { source, line }).map_err(Failure::of)
 }
 
-/// Reports have the code of their query with 4 in front instead of 2 (AS5710).
-fn report_code(query: &[u8]) -> Option<u16> {
-    let code = u16::from_le_bytes(*query.first_chunk()?);
-    (code >> 12 == 2).then_some(code + 0x2000)
+/// The code of the report that answers a message, if it is a query.
+fn report_to(query: &[u8]) -> Option<u16> {
+    report_code(u16::from_le_bytes(*query.first_chunk()?))
 }

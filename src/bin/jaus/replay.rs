@@ -16,16 +16,15 @@ use std::time::Duration;
 use bytes::Bytes;
 use clap::Args;
 use jaus::address::JausId;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::{Output, say};
+use jaus::cli::runtime;
 use jaus::link::STANDARD_PORT;
 use jaus::view::{Capture, Datagram, JAUS_PORT, Network, Timestamp};
 use jaus::wire::judp;
 use socket2::SockRef;
 use tokio::net::UdpSocket;
 use tokio::time::{Instant, sleep_until};
-
-use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::output::{Output, say};
-use jaus::cli::runtime;
 
 /// Send the UDP datagrams of a capture again, at the pace at which they were recorded
 ///

@@ -9,6 +9,11 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use jaus::address::JausId;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::output::Output;
+use jaus::cli::runtime::{self, Clock};
+use jaus::cli::tree;
 use jaus::component::{
     AccessControl, Builder, Component, Condition, Kind, Management, Standing, State, Time,
 };
@@ -18,11 +23,6 @@ use jaus::vehicle::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::node;
-use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::network::Network;
-use jaus::cli::output::Output;
-use jaus::cli::runtime::{self, Clock};
-use jaus::cli::tree;
 
 /// Run a simulated vehicle that can be controlled and driven
 ///

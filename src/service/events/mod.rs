@@ -34,7 +34,7 @@ use bytes::Bytes;
 
 use super::{Outbox, code_of, read};
 use crate::address::JausId;
-use crate::codec::{Message, ServiceId};
+use crate::codec::{Message, ServiceId, report_code};
 use crate::endpoint::Received;
 use crate::messages::core::query_events::QueryEventsVar;
 use crate::messages::core::reject_event_request::ResponseCode;
@@ -431,7 +431,7 @@ fn is_the_same(one: &Subscription, other: &Subscription) -> bool {
 /// Refuses what cannot be, whoever might answer the query.
 fn check(trial: Trial, out: &mut Outbox) -> Outcome {
     let why = match code_of(&trial.query) {
-        Some(code) if !is_query(code) => ResponseCode::MESSAGE_NOT_SUPPORTED,
+        Some(code) if report_code(code).is_none() => ResponseCode::MESSAGE_NOT_SUPPORTED,
         Some(_) if trial.query.len() > LONGEST_QUERY => ResponseCode::INVALID_EVENT_SETUP,
         // Nothing comes of events about events.
         Some(QueryEvents::CODE | QueryEventTimeout::CODE) => ResponseCode::MESSAGE_NOT_SUPPORTED,
@@ -442,11 +442,6 @@ fn check(trial: Trial, out: &mut Outbox) -> Outcome {
     };
     reject(&trial.request, trial.request_id, why, out);
     Outcome::Done
-}
-
-/// Whether a message code is a query's (AS5710: 2000h to 3FFFh).
-const fn is_query(code: u16) -> bool {
-    matches!(code, 0x2000..=0x3FFF)
 }
 
 const fn type_number(kind: Kind) -> u8 {

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use jaus::address::JausId;
+use jaus::cli::runtime;
 use jaus::component::{Component, Directory, Kind};
 use jaus::endpoint::{Event, Path, Peer};
 use jaus::link::interface;
@@ -13,7 +14,6 @@ use jaus::node::{Config, Events, LinkReport, Node};
 use jaus::wire::Version;
 
 use super::finding::Finding;
-use jaus::cli::runtime;
 
 /// Peers that are named one by one.
 const MOST: usize = 12;

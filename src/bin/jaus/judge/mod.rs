@@ -21,12 +21,12 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::view::Dictionary;
-
 use jaus::cli::failure::{Failure, Outcome};
 use jaus::cli::network::Network;
 use jaus::cli::output::{Output, say};
 use jaus::cli::runtime;
+use jaus::view::Dictionary;
+
 use panel::Panel;
 use papers::Papers;
 use recording::Recording;

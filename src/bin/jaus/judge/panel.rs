@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::codec::Message;
+use jaus::cli::failure::Failure;
+use jaus::codec::{Message, report_code};
 use jaus::endpoint::{Outgoing, Received};
 use jaus::messages::core::{
     QueryHeartbeatPulse, QueryIdentification, ReportHeartbeatPulse, ReportIdentification,
@@ -21,7 +22,6 @@ use tokio::time::{Instant, timeout_at};
 use super::recording::Recording;
 use super::step::{Form, Reach, Speaker};
 use super::verdict::Said;
-use jaus::cli::failure::Failure;
 
 /// What the judge calls itself.
 const NAME: &str = "jaus judge";
@@ -200,7 +200,7 @@ impl Panel {
         let Some(code) = code_of(&received.payload) else {
             return Ok(false);
         };
-        if code >> 12 != 2 {
+        if report_code(code).is_none() {
             return Ok(false);
         }
         if received.source == self.subject {

@@ -4,6 +4,9 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+use jaus::cli::failure::Failure;
+use jaus::cli::output::{self, Output};
+use jaus::cli::runtime::Clock;
 use jaus::view::Dictionary;
 
 use super::report::Report;
@@ -11,9 +14,6 @@ use super::step::{Form, Step};
 use super::subject::Subject;
 use super::verdict::{StepResult, Tally};
 use super::{Judge, json, junit};
-use jaus::cli::failure::Failure;
-use jaus::cli::output::{self, Output};
-use jaus::cli::runtime::Clock;
 
 /// Everything that a run is written to.
 pub(super) struct Papers<'d> {

@@ -10,12 +10,11 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use etherparse::PacketBuilder;
+use jaus::cli::failure::Failure;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::node::Node;
 use jaus::view::{CaptureWriter, InterfaceNumber, LinkType, Timestamp};
 use jaus::wire::{Flags, Frame, judp};
-
-use jaus::cli::failure::Failure;
 
 /// Routers that a recorded packet may pass, for want of a better number.
 const TTL: u8 = 16;

@@ -4,6 +4,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
+use jaus::cli::failure::Failure;
 use jaus::codec::Message;
 use jaus::messages::core::{
     CancelEvent, ClearEmergency, Event, ReleaseControl, clear_emergency::EmergencyCode,
@@ -16,7 +17,6 @@ use super::step::{Act, Check, Exchange, Expectation, Form, Reach, Speaker, Step,
 use super::subject::Subject;
 use super::verdict::{Proceeding, Said, StepResult, Verdict};
 use super::watch::Observation;
-use jaus::cli::failure::Failure;
 
 /// Carries out one step after the other.
 pub(super) struct Runner {

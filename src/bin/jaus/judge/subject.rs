@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
+use jaus::cli::failure::Failure;
 use jaus::codec::Message;
 use jaus::messages::core::query_identification::QueryType;
 use jaus::messages::core::query_services::{ComponentId, ComponentRec, NodeId, NodeRec, NodeSeq};
@@ -17,7 +18,6 @@ use tokio::time::Instant;
 
 use super::panel::{Panel, SETTLING, code_of};
 use super::step::{Reach, Speaker};
-use jaus::cli::failure::Failure;
 
 /// How often each question is put, because the first datagrams may be lost while addresses are
 /// learned.

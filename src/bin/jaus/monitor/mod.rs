@@ -8,6 +8,9 @@ use std::time::Duration;
 use bytes::Bytes;
 use clap::{Args, ValueEnum};
 use jaus::address::JausId;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::network::Network;
+use jaus::cli::runtime;
 use jaus::codec::Message;
 use jaus::component::{Component, Kind};
 use jaus::endpoint::Outgoing;
@@ -17,9 +20,6 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use self::sample::{Sample, View};
 use self::table::Screen;
-use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::network::Network;
-use jaus::cli::runtime;
 
 /// Watch peers, links and losses as they are
 ///

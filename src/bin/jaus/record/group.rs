@@ -6,11 +6,11 @@ use std::task::Poll;
 
 use bytes::Bytes;
 use etherparse::PacketBuilder;
+use jaus::cli::failure::Failure;
 use jaus::link::udp::{Settings, UdpLink};
 use jaus::link::{Group, Interfaces, Slab, interface::Ip};
 
 use super::Packet;
-use jaus::cli::failure::Failure;
 
 /// A listener on each interface. They say nothing.
 pub(super) struct Listeners {

@@ -17,14 +17,14 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use bytes::Bytes;
 use clap::Args;
+use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::output::say;
+use jaus::cli::runtime;
 use jaus::link::{Group, Interfaces};
 use jaus::view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType, Timestamp};
 use tokio::time::{MissedTickBehavior, interval};
 
 use filter::Filter;
-use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::output::say;
-use jaus::cli::runtime;
 
 /// Record JAUS traffic into a capture file, for `jaus decode`, `jaus replay` and Wireshark
 ///

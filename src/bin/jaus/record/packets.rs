@@ -10,6 +10,7 @@ use std::net;
 use std::os::fd::AsRawFd;
 
 use bytes::Bytes;
+use jaus::cli::failure::Failure;
 use jaus::link::interface;
 use nix::errno::Errno;
 use nix::sys::socket::{
@@ -19,7 +20,6 @@ use tokio::io::Interest;
 use tokio::net::UdpSocket;
 
 use super::Packet;
-use jaus::cli::failure::Failure;
 
 /// Packets taken before others have their turn.
 const BATCH: usize = 64;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::codec::{Message, MessageInfo, ServiceInfo};
+use jaus::codec::{Message, MessageInfo, ServiceInfo, report_code};
 use jaus::messages::core::{
     CancelEvent, ClearEmergency, CreateCommandEvent, CreateEvent, QueryElement, RegisterServices,
     ReleaseControl, RequestControl, SetEmergency, UpdateEvent, access_control,
@@ -153,10 +153,7 @@ fn is_controlled(service: &ServiceInfo) -> bool {
 
 /// The type of the report that answers a query.
 fn report_of(query: &MessageInfo) -> Option<&'static MessageInfo> {
-    if query.code >> 12 != 2 {
-        return None;
-    }
-    registry().by_code(query.code + 0x2000).next()
+    registry().by_code(report_code(query.code)?).next()
 }
 
 /// Asks a query, which need not be answered: that is another step's business.

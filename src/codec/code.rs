@@ -1,0 +1,28 @@
+//! What a message code says about its message.
+
+/// The code of the report that answers a query; `None` if the code is not a query's.
+///
+/// Queries are 2000h to 3FFFh and their reports 2000h above (AS5710). In the range that is left to
+/// experiments, services of IOP and our own have queries from E000h on and their reports 1000h above.
+#[must_use]
+pub const fn report_code(query: u16) -> Option<u16> {
+    match query {
+        0x2000..=0x3FFF => Some(query + 0x2000),
+        0xE000..=0xEFFF => Some(query + 0x1000),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_query_has_its_report_and_others_have_none() {
+        assert_eq!(report_code(0x2B00), Some(0x4B00));
+        assert_eq!(report_code(0xE702), Some(0xF702));
+        for other in [0x0405, 0x4B00, 0xD110, 0xF702] {
+            assert_eq!(report_code(other), None, "{other:04X}");
+        }
+    }
+}
