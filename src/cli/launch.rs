@@ -171,7 +171,35 @@ fn command<F: Ready>() -> Command {
         .long_about(None)
         .after_help(F::EXAMPLES)
         .args_override_self(true)
+        .mut_arg("id", |id| id.help(id_help(F::ID)))
+        .mut_arg("config", |config| {
+            config
+                .help(FILE_HELP)
+                .long_help(format!("{FILE_HELP}\n\n{FILE_EXAMPLE}"))
+        })
 }
+
+fn id_help(usual: JausId) -> String {
+    format!(
+        "Our id, SUBSYSTEM.NODE.COMPONENT; on the node of the host (--attach) its subsystem and node \
+         are ours [default: {usual}; on the node of the host component {}]",
+        usual.component()
+    )
+}
+
+const FILE_HELP: &str = "Take the settings from a TOML file; flags come on top";
+
+const FILE_EXAMPLE: &str = r#"For example:
+  id = "101.1.1"                  # who we are
+  name = "Rover"                  # what the subsystem is called
+  interfaces = ["eth0"]           # or "all", or "loopback"
+  port = 3794
+  group = "239.255.0.1:3794"      # or "off"
+  peers = ["192.168.7.2", "102.255.255@192.168.7.3:3795"]
+
+  [component]                     # the flags above, by their long names
+  attach = true
+  seconds = 60"#;
 
 fn parse<F: Ready>(matches: &ArgMatches) -> Program<F> {
     // The matches are those of this very command, so that only a mistake in its definition can fail.
