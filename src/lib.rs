@@ -24,6 +24,8 @@ pub mod endpoint;
 #[cfg(feature = "node")]
 pub mod link;
 pub mod messages;
+#[cfg(feature = "ground")]
+pub mod mission;
 #[cfg(feature = "node")]
 pub mod node;
 #[cfg(feature = "parts")]

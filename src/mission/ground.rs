@@ -1,0 +1,224 @@
+//! The cells that the middle of a vehicle may be in, and what it costs to drive over them.
+
+use super::Terrain;
+
+/// The cells of a [`Terrain`] that are open to the middle of a vehicle.
+pub(super) struct Ground {
+    rows: usize,
+    columns: usize,
+    /// 0 where it may not be, else how well it can drive there.
+    cells: Vec<u8>,
+    /// What the best of them costs, as [`Ground::weight`] tells.
+    least: u64,
+}
+
+/// The number of a cell, row by row.
+pub(super) type Cell = u32;
+
+/// What a step over the side of two cells costs for each unit of their weights, and over a corner.
+const SIDE: u64 = 10;
+const CORNER: u64 = 14;
+
+impl Ground {
+    /// The ground for a vehicle that keeps `clearance` metres between its middle and everything
+    /// that nothing can drive on. Beyond the map there is nothing to keep away from.
+    ///
+    /// A vehicle that already stands closer than that to an obstacle may leave: around `start`,
+    /// counted in rows and columns, only what nothing can drive on is closed.
+    pub(super) fn new(terrain: &Terrain, clearance: f64, start: (f64, f64)) -> Self {
+        let (rows, columns) = (terrain.rows().into(), terrain.columns().into());
+        let radius = clearance / terrain.cell();
+        let mut ground = Self {
+            rows,
+            columns,
+            cells: terrain.cells().to_vec(),
+            least: 0,
+        };
+        if radius > 0.5 {
+            ground.keep_away(radius);
+            ground.open_around(start, radius, terrain.cells());
+        }
+        let best = ground.cells.iter().max().copied().unwrap_or_default();
+        ground.least = weight_of(best);
+        ground
+    }
+
+    /// Closes the cells whose middle is closer than `radius` cells to a cell that is closed.
+    fn keep_away(&mut self, radius: f64) {
+        let widths = widths(radius);
+        let aside = self.distances_in_rows(widths[0]);
+        let columns = self.columns;
+        for row in 0..self.rows {
+            let open = &mut self.cells[row * columns..][..columns];
+            for (rise, &width) in widths.iter().enumerate() {
+                let below = row.checked_sub(rise);
+                let above = Some(row + rise).filter(|&above| above < self.rows);
+                for other in below.into_iter().chain(above) {
+                    let aside = &aside[other * columns..][..columns];
+                    for (cell, &aside) in open.iter_mut().zip(aside) {
+                        *cell = if aside <= width { 0 } else { *cell };
+                    }
+                }
+            }
+        }
+    }
+
+    /// For each cell how many columns the nearest closed cell of its row is away, and no more than
+    /// one beyond `most`.
+    fn distances_in_rows(&self, most: u8) -> Vec<u8> {
+        let far = most.saturating_add(1);
+        let mut aside = vec![far; self.cells.len()];
+        let rows = self.cells.chunks(self.columns);
+        for (cells, aside) in rows.zip(aside.chunks_mut(self.columns)) {
+            measure(cells.iter().zip(aside.iter_mut()), far);
+            measure(cells.iter().zip(aside.iter_mut()).rev(), far);
+        }
+        aside
+    }
+
+    /// Opens what can be driven on at all close to a point, so that a vehicle which stands there
+    /// can leave.
+    fn open_around(&mut self, (row, column): (f64, f64), radius: f64, cells: &[u8]) {
+        let reach = radius + 1.0;
+        let span = |middle: f64, side: usize| {
+            let first = (middle - reach).floor().max(0.0) as usize;
+            let last = (middle + reach).ceil().max(0.0) as usize;
+            first..last.min(side)
+        };
+        for at_row in span(row, self.rows) {
+            for at_column in span(column, self.columns) {
+                let (up, aside) = (at_row as f64 + 0.5 - row, at_column as f64 + 0.5 - column);
+                let at = at_row * self.columns + at_column;
+                if up.hypot(aside) <= reach && self.cells[at] == 0 {
+                    // As bad as can be: it is better to be farther away.
+                    self.cells[at] = cells[at].min(1);
+                }
+            }
+        }
+    }
+
+    pub(super) const fn rows(&self) -> usize {
+        self.rows
+    }
+
+    pub(super) const fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// How many cells there are, open or not.
+    pub(super) const fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    pub(super) fn is_open(&self, row: usize, column: usize) -> bool {
+        self.cells[row * self.columns + column] != 0
+    }
+
+    /// The cell around a point that is counted in rows and columns and lies on the map.
+    pub(super) fn cell_at(&self, (row, column): (f64, f64)) -> Cell {
+        let row = (row as usize).min(self.rows - 1);
+        let column = (column as usize).min(self.columns - 1);
+        self.cell(row, column)
+    }
+
+    pub(super) const fn cell(&self, row: usize, column: usize) -> Cell {
+        // A terrain has at most 2^24 cells.
+        (row * self.columns + column) as Cell
+    }
+
+    /// The row and the column of a cell.
+    pub(super) const fn place(&self, cell: Cell) -> (usize, usize) {
+        let cell = cell as usize;
+        (cell / self.columns, cell % self.columns)
+    }
+
+    /// The middle of a cell, counted in rows and columns.
+    pub(super) fn middle(&self, cell: Cell) -> (f64, f64) {
+        let (row, column) = self.place(cell);
+        (row as f64 + 0.5, column as f64 + 0.5)
+    }
+
+    /// What a cell costs for each unit of way over it; `None` if it is closed.
+    pub(super) fn weight(&self, row: usize, column: usize) -> Option<u64> {
+        match self.cells[row * self.columns + column] {
+            0 => None,
+            open => Some(weight_of(open)),
+        }
+    }
+
+    /// The cells next to a cell, and what it costs to go there. Over a corner it goes only where
+    /// both cells beside it are open.
+    pub(super) fn neighbours(&self, cell: Cell) -> impl Iterator<Item = (Cell, u64)> {
+        let (row, column) = self.place(cell);
+        let own = self.weight(row, column).unwrap_or_default();
+        let step = move |(up, aside): (isize, isize)| {
+            let row_there = row.checked_add_signed(up).filter(|&it| it < self.rows)?;
+            let column_there = column
+                .checked_add_signed(aside)
+                .filter(|&it| it < self.columns)?;
+            let there = self.weight(row_there, column_there)?;
+            let over_corner = up != 0 && aside != 0;
+            if over_corner && !(self.is_open(row, column_there) && self.is_open(row_there, column))
+            {
+                return None;
+            }
+            let length = if over_corner { CORNER } else { SIDE };
+            Some((
+                self.cell(row_there, column_there),
+                length * (own + there) / 2,
+            ))
+        };
+        STEPS.into_iter().filter_map(step)
+    }
+
+    /// What it costs at least to go so many rows and columns.
+    pub(super) fn at_least(&self, rows: usize, columns: usize) -> u64 {
+        let (short, long) = (rows.min(columns) as u64, rows.max(columns) as u64);
+        (CORNER * short + SIDE * (long - short)) * self.least
+    }
+}
+
+/// Counts from closed cells on, in the order of the row, and keeps what is less than before.
+fn measure<'a>(row: impl Iterator<Item = (&'a u8, &'a mut u8)>, far: u8) {
+    let mut distance = far;
+    for (&cell, aside) in row {
+        distance = match cell {
+            0 => 0,
+            _ => distance.saturating_add(1).min(far),
+        };
+        *aside = distance.min(*aside);
+    }
+}
+
+const STEPS: [(isize, isize); 8] = [
+    (1, 0),
+    (0, 1),
+    (-1, 0),
+    (0, -1),
+    (1, 1),
+    (-1, 1),
+    (-1, -1),
+    (1, -1),
+];
+
+/// What the best ground costs for each unit of way, and by how much the worst costs more.
+const BEST: u64 = 64;
+const WORSE: u64 = 4 * BEST;
+
+/// What ground costs that can be driven on as well as `open` says, for each unit of way.
+fn weight_of(open: u8) -> u64 {
+    BEST + WORSE * u64::from(u8::MAX - open) / u64::from(u8::MAX - 1)
+}
+
+/// For each number of rows away: how many columns away a closed cell may be and still be closer
+/// than `radius` cells to the middle of a cell. It is the nearest side or corner that counts.
+fn widths(radius: f64) -> Vec<u8> {
+    let rows = (0..).map(|row: u8| (f64::from(row) - 0.5).max(0.0));
+    rows.take_while(|&rise| rise < radius)
+        .take(usize::from(u8::MAX))
+        .map(|rise| {
+            let width = (radius * radius - rise * rise).sqrt() + 0.5;
+            (width.ceil() - 1.0).clamp(0.0, f64::from(u8::MAX - 1)) as u8
+        })
+        .collect()
+}

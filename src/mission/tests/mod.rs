@@ -1,0 +1,4 @@
+//! Tests of planning and of the waterfall.
+
+mod paths;
+mod stages;

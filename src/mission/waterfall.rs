@@ -1,0 +1,452 @@
+//! The waterfall: the stages of a mission, of which each begins when the one before it has
+//! succeeded, and which begins again from the first when one of them is blocked.
+
+mod stage;
+mod watch;
+
+use std::time::{Duration, Instant};
+
+pub use stage::{Link, LinkState, Stage};
+use watch::Links;
+
+use super::Path;
+
+/// How patient a mission is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// How often it is begun at most; at least once.
+    pub attempts: u8,
+    /// Between an attempt that was blocked and the next one.
+    pub pause: Duration,
+    /// How long a stage may take to begin, or to come back.
+    pub patience: Duration,
+    /// How long a stage may say that it is blocked until it counts.
+    pub settling: Duration,
+    /// How long the vehicle may drive without getting on.
+    pub stall: Duration,
+    /// The greatest speed, in metres per second, for whoever does not choose one.
+    pub speed: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            attempts: 3,
+            pause: Duration::from_secs(3),
+            patience: Duration::from_secs(15),
+            settling: Duration::from_secs(1),
+            stall: Duration::from_secs(60),
+            speed: 1.0,
+        }
+    }
+}
+
+/// Where to go.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Destination {
+    /// Metres along X of the local frame.
+    pub x: f64,
+    /// Metres along Y of the local frame.
+    pub y: f64,
+    /// The greatest speed, in metres per second.
+    pub speed: Option<f64>,
+}
+
+/// One attempt of one mission. What is reported of an earlier one does not count any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Run {
+    /// The mission, counted from 1.
+    pub mission: u32,
+    /// The attempt, counted from 1.
+    pub attempt: u8,
+}
+
+/// What the owner of a [`Mission`] has to do for it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Action {
+    /// Stop the vehicle, give back what is controlled, and give up any earlier action.
+    Halt,
+    /// Fetch the map, and [say how it went](Mission::handle_map).
+    FetchMap(Run),
+    /// Plan a path to the destination over it, and [say how it went](Mission::handle_path).
+    Plan(Run, Destination),
+    /// Take the path segment driver under control, hand the path over, have it driven at this
+    /// speed in metres per second, and [say how it went](Mission::handle_handed_over).
+    HandOver(Run, Path, f64),
+}
+
+/// How far a mission is.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Report {
+    /// Which attempt of which mission; mission 0 before the first.
+    pub run: Run,
+    /// How often it is begun at most.
+    pub attempts: u8,
+    /// The stage that it is in.
+    pub stage: Stage,
+    /// How much of the path is driven, from 0 to 100 %.
+    pub progress: u8,
+    /// Where it goes.
+    pub destination: Destination,
+    /// How much of the path lies ahead, in metres.
+    pub remaining: f64,
+    /// Why it does not go on, or why it was begun again; may be empty.
+    pub reason: String,
+}
+
+/// Why a wish was not granted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// It is about a mission that is not the last one.
+    #[error("mission {wanted} can not be approved: mission {current} has replaced it")]
+    Replaced {
+        /// The one that was meant.
+        wanted: u32,
+        /// The last one.
+        current: u32,
+    },
+    /// There is nothing to approve.
+    #[error("mission {mission} can not be approved: it is over ({stage})")]
+    Over {
+        /// The one that was meant.
+        mission: u32,
+        /// How it ended.
+        stage: Stage,
+    },
+    /// A destination or a speed that is none.
+    #[error(
+        "the destination must be finite numbers of metres, and the speed more than 0 and at most \
+         100 m/s"
+    )]
+    NoDestination,
+}
+
+/// The mission of a planner: the last one that was asked for.
+#[derive(Debug)]
+pub struct Mission {
+    settings: Settings,
+    report: Report,
+    approved: bool,
+    path: Path,
+    links: Links,
+    /// When the next attempt begins.
+    again: Option<Instant>,
+    /// When the stage has taken too long.
+    deadline: Option<Instant>,
+    halts: bool,
+    action: Option<Action>,
+}
+
+impl Mission {
+    /// No mission yet.
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        let settings = Settings {
+            attempts: settings.attempts.max(1),
+            ..settings
+        };
+        Self {
+            settings,
+            report: Report {
+                attempts: settings.attempts,
+                ..Report::default()
+            },
+            approved: false,
+            path: Path::default(),
+            links: Links::default(),
+            again: None,
+            deadline: None,
+            halts: false,
+            action: None,
+        }
+    }
+
+    /// How far it is.
+    #[must_use]
+    pub const fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// The path that was planned last for it; empty before.
+    #[must_use]
+    pub const fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Begins another mission, instead of any that is under way; says its number. With `approved`
+    /// it drives as soon as there is a path.
+    ///
+    /// # Errors
+    /// If the destination or the speed is none; what was under way goes on then.
+    pub fn go_to(
+        &mut self,
+        now: Instant,
+        destination: Destination,
+        approved: bool,
+    ) -> Result<u32, Refusal> {
+        let Destination { x, y, speed } = destination;
+        let is_speed = |speed: f64| speed > 0.0 && speed <= 100.0;
+        if !x.is_finite() || !y.is_finite() || !speed.is_none_or(is_speed) {
+            return Err(Refusal::NoDestination);
+        }
+        self.halt();
+        let mission = self.report.run.mission.wrapping_add(1).max(1);
+        self.report = Report {
+            run: Run {
+                mission,
+                attempt: 1,
+            },
+            attempts: self.settings.attempts,
+            destination,
+            ..Report::default()
+        };
+        self.approved = approved;
+        self.path = Path::default();
+        self.begin(now);
+        Ok(mission)
+    }
+
+    /// The operator approves the path, or the mission before there is one.
+    ///
+    /// # Errors
+    /// If that mission is over or was replaced.
+    pub fn approve(&mut self, now: Instant, mission: u32) -> Result<(), Refusal> {
+        let current = self.report.run.mission;
+        let stage = self.report.stage;
+        if mission != current {
+            return Err(Refusal::Replaced {
+                wanted: mission,
+                current,
+            });
+        }
+        if !stage.is_under_way() {
+            return Err(Refusal::Over { mission, stage });
+        }
+        self.approved = true;
+        if stage == Stage::AwaitingApproval {
+            self.hand_over(now);
+        }
+        Ok(())
+    }
+
+    /// Ends the mission, if one is under way, and says why: the operator wants it, has taken over,
+    /// or there is an emergency. Only another destination makes the vehicle drive again.
+    pub fn stop(&mut self, reason: &str) {
+        if self.report.stage.is_under_way() {
+            self.end(Stage::Stopped, reason);
+        }
+    }
+
+    /// The map is there, or why it is not.
+    pub fn handle_map(&mut self, now: Instant, run: Run, result: Result<(), String>) {
+        if !self.is_in(run, Stage::Map) {
+            return;
+        }
+        match result {
+            Ok(()) => {
+                self.enter(now, Stage::Planning);
+                self.action = Some(Action::Plan(run, self.report.destination));
+            }
+            Err(reason) => self.set_back(now, &reason),
+        }
+    }
+
+    /// There is a path, or why there is none. A mission that is `hopeless` is not begun again.
+    pub fn handle_path(&mut self, now: Instant, run: Run, result: Result<Path, NotPlanned>) {
+        if !self.is_in(run, Stage::Planning) {
+            return;
+        }
+        match result {
+            Ok(path) => {
+                self.report.remaining = path.length();
+                self.path = path;
+                self.enter(now, Stage::AwaitingApproval);
+                if self.approved {
+                    self.hand_over(now);
+                }
+            }
+            Err(why) if why.hopeless => self.end(Stage::Failed, &why.reason),
+            Err(why) => self.set_back(now, &why.reason),
+        }
+    }
+
+    /// The path segment driver has the path and was told to drive it, or why not.
+    pub fn handle_handed_over(&mut self, now: Instant, run: Run, result: Result<(), String>) {
+        if !self.is_in(run, Stage::Path) {
+            return;
+        }
+        match result {
+            Ok(()) => {
+                self.links.open();
+                // From here on the drivers are watched one by one.
+                self.deadline = None;
+                self.go_on(now);
+            }
+            Err(reason) => self.set_back(now, &reason),
+        }
+    }
+
+    /// A stage of the chain has told how it is.
+    pub fn handle_link(&mut self, now: Instant, link: Link, state: LinkState) {
+        self.links.note(now, link, state);
+        self.go_on(now);
+    }
+
+    /// How much of the path is driven, from 0 to 100 %, and how much lies ahead in metres.
+    pub fn handle_progress(&mut self, now: Instant, run: Run, progress: u8, remaining: f64) {
+        if self.report.run != run || !self.report.stage.is_handed_over() {
+            return;
+        }
+        let progress = progress.min(100);
+        if self.report.stage == Stage::Driving && progress != self.report.progress {
+            self.deadline = now.checked_add(self.settings.stall);
+        }
+        self.report.progress = progress;
+        self.report.remaining = remaining;
+    }
+
+    /// The attempt can not go on, for a reason that no stage has told.
+    pub fn handle_setback(&mut self, now: Instant, run: Run, reason: &str) {
+        if self.report.run == run && self.again.is_none() && self.report.stage.is_under_way() {
+            self.set_back(now, reason);
+        }
+    }
+
+    /// It is `now`.
+    pub fn handle_time(&mut self, now: Instant) {
+        if self.again.is_some_and(|again| again <= now) {
+            self.begin(now);
+        }
+        self.go_on(now);
+        if self.deadline.is_some_and(|deadline| deadline <= now) {
+            let reason = self.too_long();
+            self.set_back(now, &reason);
+        }
+    }
+
+    /// When [`handle_time`](Self::handle_time) must be called.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        let stage = self.report.stage;
+        let lost = self.links.give_up_at(stage, &self.settings);
+        let times = [self.again, self.deadline, lost.map(|(at, _)| at)];
+        times.into_iter().flatten().min()
+    }
+
+    /// What is to be done next.
+    pub fn poll_action(&mut self) -> Option<Action> {
+        if std::mem::take(&mut self.halts) {
+            return Some(Action::Halt);
+        }
+        self.action.take()
+    }
+
+    /// Whether an attempt is in a stage, and not waiting for its beginning.
+    fn is_in(&self, run: Run, stage: Stage) -> bool {
+        self.report.run == run && self.report.stage == stage && self.again.is_none()
+    }
+
+    /// Begins an attempt.
+    fn begin(&mut self, now: Instant) {
+        self.again = None;
+        self.links.close();
+        self.enter(now, Stage::Map);
+        self.action = Some(Action::FetchMap(self.report.run));
+    }
+
+    fn enter(&mut self, now: Instant, stage: Stage) {
+        self.report.stage = stage;
+        self.links.begin(now);
+        let patience = match stage {
+            Stage::Map | Stage::Planning | Stage::Path => Some(self.settings.patience),
+            Stage::Driving => Some(self.settings.stall),
+            // An operator may take as long as they like; drivers are watched one by one.
+            _ => None,
+        };
+        self.deadline = patience.and_then(|patience| now.checked_add(patience));
+    }
+
+    fn hand_over(&mut self, now: Instant) {
+        self.enter(now, Stage::Path);
+        let speed = self.report.destination.speed.unwrap_or(self.settings.speed);
+        self.action = Some(Action::HandOver(self.report.run, self.path.clone(), speed));
+    }
+
+    /// Goes through the stages of the chain as far as they have succeeded.
+    fn go_on(&mut self, now: Instant) {
+        while let Some(next) = self.links.next(self.report.stage) {
+            if next == Stage::Arrived {
+                self.report.progress = 100;
+                self.report.remaining = 0.0;
+                return self.end(Stage::Arrived, "");
+            }
+            self.enter(now, next);
+        }
+        let lost = self.links.give_up_at(self.report.stage, &self.settings);
+        if let Some((_, reason)) = lost.filter(|&(at, _)| at <= now) {
+            self.set_back(now, &reason);
+        }
+    }
+
+    /// An attempt has failed: another one, unless that was the last.
+    fn set_back(&mut self, now: Instant, reason: &str) {
+        let Report { run, attempts, .. } = self.report;
+        if run.attempt >= attempts {
+            return self.end(Stage::Failed, reason);
+        }
+        self.halt();
+        self.report.run.attempt += 1;
+        self.report.stage = Stage::Map;
+        self.report.progress = 0;
+        reason.clone_into(&mut self.report.reason);
+        self.again = now.checked_add(self.settings.pause);
+    }
+
+    fn end(&mut self, stage: Stage, reason: &str) {
+        self.halt();
+        self.report.stage = stage;
+        reason.clone_into(&mut self.report.reason);
+    }
+
+    /// Nothing goes on any more.
+    fn halt(&mut self) {
+        self.halts |= self.report.stage.is_under_way();
+        self.action = None;
+        self.again = None;
+        self.deadline = None;
+        self.links.close();
+    }
+
+    fn too_long(&self) -> String {
+        match self.report.stage {
+            Stage::Driving => format!(
+                "the vehicle has not got on for {} s at {} % of the path",
+                self.settings.stall.as_secs(),
+                self.report.progress
+            ),
+            stage => format!(
+                "the stage \"{stage}\" has taken longer than {} s",
+                self.settings.patience.as_secs()
+            ),
+        }
+    }
+}
+
+/// Why there is no path.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NotPlanned {
+    /// For people.
+    pub reason: String,
+    /// Whether another attempt would come to the same end.
+    pub hopeless: bool,
+}
+
+impl From<super::NoPath> for NotPlanned {
+    fn from(error: super::NoPath) -> Self {
+        Self {
+            reason: error.to_string(),
+            hopeless: !error.may_pass(),
+        }
+    }
+}
