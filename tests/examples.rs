@@ -103,6 +103,17 @@ fn the_operator_drives_the_driver_and_lets_it_go() {
 }
 
 #[test]
+fn the_group_stops_everybody_when_one_is_too_fast() {
+    let _sensor = Example::start("sensor");
+    let mut driver = Example::start("driver");
+    driver.expect("102.1.33 is up");
+    let mut group = Example::start("group");
+    group.expect("101.1.33 tells its speed");
+    group.expect("everybody stops");
+    group.expect("102.1.33 is told to stop");
+}
+
+#[test]
 fn the_readme_shows_the_sensor_and_the_client_as_they_are() {
     let readme = include_str!("../README.md");
     let examples = [

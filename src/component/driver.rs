@@ -232,7 +232,7 @@ fn transmit(stack: &mut Stack, port: &Port) -> Result<(), node::SendError> {
     result
 }
 
-async fn sleep_until(wake: Option<Instant>) {
+pub(super) async fn sleep_until(wake: Option<Instant>) {
     match wake {
         Some(wake) => tokio::time::sleep_until(wake.into()).await,
         None => std::future::pending().await,

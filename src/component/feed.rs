@@ -3,10 +3,10 @@
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Waker};
 use std::time::Instant;
 
 use bytes::Bytes;
-use tokio::sync::Notify;
 
 use crate::service::{Outage, SubscriptionEnd, SubscriptionNews};
 
@@ -14,7 +14,6 @@ use crate::service::{Outage, SubscriptionEnd, SubscriptionNews};
 #[derive(Debug)]
 pub(super) struct Feed {
     state: Mutex<State>,
-    news: Notify,
 }
 
 /// What waits for the reader.
@@ -30,6 +29,8 @@ struct State {
     queue: VecDeque<Item>,
     condition: Condition,
     end: Option<Option<SubscriptionEnd>>,
+    /// The reader, while it waits: there is one at most.
+    reader: Option<Waker>,
 }
 
 /// How a subscription is doing.
@@ -52,7 +53,6 @@ impl Feed {
     pub(super) fn new() -> Self {
         Self {
             state: Mutex::new(State::default()),
-            news: Notify::new(),
         }
     }
 
@@ -71,8 +71,7 @@ impl Feed {
             }
             SubscriptionNews::Ended(end) => state.end = Some(Some(end)),
         }
-        drop(state);
-        self.news.notify_one();
+        wake(state);
     }
 
     /// The component has stopped; the reader gets what is left, and then the end.
@@ -80,24 +79,20 @@ impl Feed {
         let mut state = self.lock();
         state.condition.up = false;
         state.end.get_or_insert(None);
-        drop(state);
-        self.news.notify_one();
+        wake(state);
     }
 
     /// The reader's side: the next item, or `None` at the end.
-    pub(super) async fn next(&self) -> Option<Item> {
-        loop {
-            {
-                let mut state = self.lock();
-                if let Some(item) = state.queue.pop_front() {
-                    return Some(item);
-                }
-                if state.end.is_some() {
-                    return None;
-                }
-            }
-            self.news.notified().await;
+    pub(super) fn poll_next(&self, cx: &mut Context<'_>) -> Poll<Option<Item>> {
+        let mut state = self.lock();
+        if let Some(item) = state.queue.pop_front() {
+            return Poll::Ready(Some(item));
         }
+        if state.end.is_some() {
+            return Poll::Ready(None);
+        }
+        state.reader = Some(cx.waker().clone());
+        Poll::Pending
     }
 
     pub(super) fn condition(&self) -> Condition {
@@ -115,6 +110,15 @@ impl Feed {
 
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Wakes the reader, if it waits, once it can have the lock.
+fn wake(mut state: MutexGuard<'_, State>) {
+    let reader = state.reader.take();
+    drop(state);
+    if let Some(reader) = reader {
+        reader.wake();
     }
 }
 
@@ -151,7 +155,13 @@ impl State {
 
 #[cfg(test)]
 mod tests {
+    use std::future::poll_fn;
+
     use super::*;
+
+    async fn next(feed: &Feed) -> Option<Item> {
+        poll_fn(|cx| feed.poll_next(cx)).await
+    }
 
     fn report(number: u8) -> SubscriptionNews {
         SubscriptionNews::Report {
@@ -168,8 +178,8 @@ mod tests {
             feed.tell(report(number));
         }
         assert_eq!(feed.condition().missed, 1);
-        assert!(matches!(feed.next().await, Some(Item::Up)));
-        let Some(Item::Report(first)) = feed.next().await else {
+        assert!(matches!(next(&feed).await, Some(Item::Up)));
+        let Some(Item::Report(first)) = next(&feed).await else {
             panic!("a report is due");
         };
         assert_eq!(first[..], [1], "report 0 made room");
@@ -180,7 +190,20 @@ mod tests {
         let feed = Feed::new();
         feed.tell(report(7));
         feed.stop();
-        assert!(matches!(feed.next().await, Some(Item::Report(_))));
-        assert!(feed.next().await.is_none() && feed.next().await.is_none());
+        assert!(matches!(next(&feed).await, Some(Item::Report(_))));
+        assert!(next(&feed).await.is_none() && next(&feed).await.is_none());
+    }
+
+    #[tokio::test]
+    async fn a_reader_that_waits_is_woken_by_news_and_by_the_end() {
+        let feed = Feed::new();
+        let telling = async {
+            feed.tell(report(1));
+            tokio::task::yield_now().await;
+            feed.stop();
+        };
+        let reading = async { (next(&feed).await, next(&feed).await) };
+        let (read, ()) = tokio::join!(reading, telling);
+        assert!(matches!(read, (Some(Item::Report(_)), None)));
     }
 }

@@ -21,7 +21,7 @@ use crate::service::{Change, Condition, Directory, Kind, Offer, Service, Standin
 /// A component that lives on a node. Cheap to clone; it stops when the last clone is dropped.
 #[derive(Debug, Clone)]
 pub struct Component {
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
 }
 
 #[derive(Debug)]
@@ -202,29 +202,37 @@ impl Component {
         query: &Q,
         when: When,
     ) -> Result<Subscription<R>, SubscribeError> {
-        let impossible = |why| SubscribeError::Impossible {
+        let query_message = query.encode().map_err(|error| SubscribeError::Impossible {
             peer,
             query: Q::NAME,
-            why,
-        };
+            why: error.into(),
+        })?;
         let topic = Topic {
             peer,
-            query: query.encode().map_err(|error| impossible(error.into()))?,
+            query: query_message,
             report: R::CODE,
             when,
         };
+        self.subscribe_to(topic, Q::NAME).await
+    }
+
+    /// Subscribes to a topic, whose query is called `query`.
+    pub(super) async fn subscribe_to<R: Message>(
+        &self,
+        topic: Topic,
+        query: &'static str,
+    ) -> Result<Subscription<R>, SubscribeError> {
+        let peer = topic.peer;
         let subscribed = self.hold(|reply| Hold::Subscribe { topic, reply }).await;
         match subscribed.ok_or(SubscribeError::Stopped)? {
             Ok((ticket, feed)) => Ok(Subscription::new(ticket, self.clone(), peer, feed)),
-            Err(NotSubscribed::Impossible(why)) => Err(impossible(why)),
-            Err(NotSubscribed::Ended(why)) => Err(SubscribeError::Ended {
-                peer,
-                query: Q::NAME,
-                why,
-            }),
+            Err(NotSubscribed::Impossible(why)) => {
+                Err(SubscribeError::Impossible { peer, query, why })
+            }
+            Err(NotSubscribed::Ended(why)) => Err(SubscribeError::Ended { peer, query, why }),
             Err(NotSubscribed::NotSent(error)) => Err(SubscribeError::NotSent {
                 peer,
-                query: Q::NAME,
+                query,
                 source: error.into(),
             }),
         }

@@ -68,6 +68,7 @@ mod control;
 mod driver;
 mod error;
 mod feed;
+mod group;
 mod handle;
 mod subscription;
 mod watch;
@@ -83,6 +84,7 @@ pub use control::Control;
 pub use error::{
     ControlError, DeliverError, FindError, ManageError, QueryError, SendError, SubscribeError,
 };
+pub use group::{Audience, GroupSubscription, GroupUpdate, Results};
 pub use handle::Component;
 pub use subscription::{Subscription, Update};
 pub use watch::{Messages, Watch};

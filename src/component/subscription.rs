@@ -1,7 +1,9 @@
 //! A subscription in the hands of an application: a stream of reports that says when it is down.
 
+use std::future::poll_fn;
 use std::marker::PhantomData;
 use std::sync::Arc;
+use std::task::{Context, Poll, ready};
 use std::time::Instant;
 
 use super::Component;
@@ -65,18 +67,28 @@ impl<R: Message> Subscription<R> {
     ///
     /// Nothing is lost if the returned future is dropped.
     pub async fn next(&mut self) -> Option<Update<R>> {
+        poll_fn(|cx| self.poll_next(cx)).await
+    }
+
+    /// The same as [`next`](Self::next) for who writes futures by hand.
+    pub fn poll_next(&mut self, cx: &mut Context<'_>) -> Poll<Option<Update<R>>> {
         loop {
-            match self.feed.next().await? {
-                Item::Up => return Some(Update::Up),
-                Item::Down { since, why } => return Some(Update::Down { since, why }),
+            let Some(item) = ready!(self.feed.poll_next(cx)) else {
+                return Poll::Ready(None);
+            };
+            let update = match item {
+                Item::Up => Update::Up,
+                Item::Down { since, why } => Update::Down { since, why },
                 Item::Report(octets) => match R::decode(&octets) {
-                    Ok(report) => return Some(Update::Report(report)),
+                    Ok(report) => Update::Report(report),
                     Err(error) => {
                         self.feed.count_unreadable();
                         tracing::debug!(peer = %self.peer, %error, "report cannot be read");
+                        continue;
                     }
                 },
-            }
+            };
+            return Poll::Ready(Some(update));
         }
     }
 

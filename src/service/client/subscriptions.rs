@@ -34,6 +34,14 @@ pub struct Topic {
     pub when: When,
 }
 
+impl Topic {
+    /// Whether the wire can carry what is asked for.
+    pub(crate) fn check(&self) -> Result<(), CannotSubscribe> {
+        create_event(self, 0)?.encode()?;
+        Ok(())
+    }
+}
+
 /// Why a subscription cannot even be tried.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
