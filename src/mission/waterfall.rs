@@ -4,6 +4,7 @@
 mod stage;
 mod watch;
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub use stage::{Link, LinkState, Stage};
@@ -52,6 +53,26 @@ pub struct Destination {
     pub speed: Option<f64>,
 }
 
+impl Destination {
+    /// The greatest speed that may be asked for, in metres per second.
+    pub const MAX_SPEED: f64 = 100.0;
+
+    /// What is wrong with it, and what would do.
+    fn mistake(&self) -> Option<String> {
+        let Self { x, y, speed } = *self;
+        if !x.is_finite() || !y.is_finite() {
+            return Some(format!(
+                "the destination at x {x} m, y {y} m is no place: set finite numbers of metres"
+            ));
+        }
+        let speed = speed.filter(|&speed| !(speed > 0.0 && speed <= Self::MAX_SPEED))?;
+        Some(format!(
+            "a speed of {speed} m/s can not be driven: set one above 0 and up to {} m/s",
+            Self::MAX_SPEED
+        ))
+    }
+}
+
 /// One attempt of one mission. What is reported of an earlier one does not count any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Run {
@@ -72,7 +93,7 @@ pub enum Action {
     Plan(Run, Destination),
     /// Take the path segment driver under control, hand the path over, have it driven at this
     /// speed in metres per second, and [say how it went](Mission::handle_handed_over).
-    HandOver(Run, Path, f64),
+    HandOver(Run, Arc<Path>, f64),
 }
 
 /// How far a mission is.
@@ -114,12 +135,6 @@ pub enum Refusal {
         /// How it ended.
         stage: Stage,
     },
-    /// A destination or a speed that is none.
-    #[error(
-        "the destination must be finite numbers of metres, and the speed more than 0 and at most \
-         100 m/s"
-    )]
-    NoDestination,
 }
 
 /// The mission of a planner: the last one that was asked for.
@@ -128,7 +143,7 @@ pub struct Mission {
     settings: Settings,
     report: Report,
     approved: bool,
-    path: Path,
+    path: Arc<Path>,
     links: Links,
     /// When the next attempt begins.
     again: Option<Instant>,
@@ -153,7 +168,7 @@ impl Mission {
                 ..Report::default()
             },
             approved: false,
-            path: Path::default(),
+            path: Arc::default(),
             links: Links::default(),
             again: None,
             deadline: None,
@@ -170,26 +185,14 @@ impl Mission {
 
     /// The path that was planned last for it; empty before.
     #[must_use]
-    pub const fn path(&self) -> &Path {
+    pub const fn path(&self) -> &Arc<Path> {
         &self.path
     }
 
     /// Begins another mission, instead of any that is under way; says its number. With `approved`
-    /// it drives as soon as there is a path.
-    ///
-    /// # Errors
-    /// If the destination or the speed is none; what was under way goes on then.
-    pub fn go_to(
-        &mut self,
-        now: Instant,
-        destination: Destination,
-        approved: bool,
-    ) -> Result<u32, Refusal> {
-        let Destination { x, y, speed } = destination;
-        let is_speed = |speed: f64| speed > 0.0 && speed <= 100.0;
-        if !x.is_finite() || !y.is_finite() || !speed.is_none_or(is_speed) {
-            return Err(Refusal::NoDestination);
-        }
+    /// it drives as soon as there is a path. To a destination that is none, or with a speed that is
+    /// none, it has failed at once.
+    pub fn go_to(&mut self, now: Instant, destination: Destination, approved: bool) -> u32 {
         self.halt();
         let mission = self.report.run.mission.wrapping_add(1).max(1);
         self.report = Report {
@@ -202,9 +205,12 @@ impl Mission {
             ..Report::default()
         };
         self.approved = approved;
-        self.path = Path::default();
-        self.begin(now);
-        Ok(mission)
+        self.path = Arc::default();
+        match destination.mistake() {
+            Some(mistake) => self.end(Stage::Failed, &mistake),
+            None => self.begin(now),
+        }
+        mission
     }
 
     /// The operator approves the path, or the mission before there is one.
@@ -260,7 +266,7 @@ impl Mission {
         match result {
             Ok(path) => {
                 self.report.remaining = path.length();
-                self.path = path;
+                self.path = Arc::new(path);
                 self.enter(now, Stage::AwaitingApproval);
                 if self.approved {
                     self.hand_over(now);
@@ -370,7 +376,11 @@ impl Mission {
     fn hand_over(&mut self, now: Instant) {
         self.enter(now, Stage::Path);
         let speed = self.report.destination.speed.unwrap_or(self.settings.speed);
-        self.action = Some(Action::HandOver(self.report.run, self.path.clone(), speed));
+        self.action = Some(Action::HandOver(
+            self.report.run,
+            Arc::clone(&self.path),
+            speed,
+        ));
     }
 
     /// Goes through the stages of the chain as far as they have succeeded.

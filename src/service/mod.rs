@@ -28,6 +28,8 @@ mod control;
 mod directory;
 mod discovery;
 mod events;
+#[cfg(feature = "ground")]
+pub mod ground;
 mod handlers;
 mod inquiries;
 mod list;

@@ -60,7 +60,7 @@ impl World {
             y: 4.0,
             speed: None,
         };
-        world.mission.go_to(world.now, to, approved).unwrap();
+        world.mission.go_to(world.now, to, approved);
         world
     }
 
@@ -147,7 +147,7 @@ fn each_stage_begins_when_the_one_before_has_succeeded() {
     assert_eq!(world.stage(), Stage::Path);
     assert_eq!(
         world.take_actions(),
-        [Action::HandOver(run, path(), SETTINGS.speed)]
+        [Action::HandOver(run, path().into(), SETTINGS.speed)]
     );
     world.hand_over();
     assert_eq!(world.stage(), Stage::Path);
@@ -350,7 +350,7 @@ fn another_destination_replaces_the_mission() {
     world.drive();
     let old = world.run();
     let to = Destination::default();
-    assert_eq!(world.mission.go_to(world.now, to, false), Ok(2));
+    assert_eq!(world.mission.go_to(world.now, to, false), 2);
     let new = world.run();
     assert_eq!(world.take_actions(), [Action::Halt, Action::FetchMap(new)]);
     world.mission.handle_map(world.now, old, Ok(()));
@@ -366,19 +366,25 @@ fn another_destination_replaces_the_mission() {
 }
 
 #[test]
-fn what_is_no_destination_is_refused_and_nothing_changes() {
-    let mut world = World::under_way(true);
-    world.drive();
-    for (x, speed) in [
-        (f64::NAN, None),
-        (f64::INFINITY, None),
-        (0.0, Some(0.0)),
-        (0.0, Some(f64::NAN)),
+fn what_is_no_destination_fails_with_what_would_do() {
+    for (x, speed, says) in [
+        (f64::NAN, None, "x NaN m, y 0 m is no place"),
+        (f64::INFINITY, None, "set finite numbers"),
+        (
+            0.0,
+            Some(0.0),
+            "a speed of 0 m/s can not be driven: set one above 0 and up to 100 m/s",
+        ),
+        (0.0, Some(f64::NAN), "a speed of NaN m/s"),
     ] {
-        let to = Destination { x, y: 0.0, speed };
-        let refusal = world.mission.go_to(world.now, to, true);
-        assert_eq!(refusal, Err(Refusal::NoDestination));
-        assert_eq!(world.stage(), Stage::Driving);
+        let mut world = World::under_way(true);
+        world.drive();
+        world
+            .mission
+            .go_to(world.now, Destination { x, y: 0.0, speed }, true);
+        assert_eq!(world.stage(), Stage::Failed);
+        assert!(world.reason().contains(says), "{}", world.reason());
+        assert_eq!(world.take_actions(), [Action::Halt]);
     }
 }
 

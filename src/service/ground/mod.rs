@@ -1,0 +1,8 @@
+//! The services of a ground vehicle, which are our own: what no published set has.
+//!
+//! Each service tells others of something that lives elsewhere, and is a thin cover over it: the
+//! mission in [`mission`](crate::mission).
+
+mod planner;
+
+pub use planner::{MissionPlanner, Missions, News};
