@@ -50,23 +50,37 @@ fn flags_in(text: &str) -> Result<Vec<String>, Mistake> {
     };
     let mut flags = Vec::new();
     for (key, value) in entries {
-        let single = std::slice::from_ref(value);
-        let values = match value.get_ref() {
-            DeValue::Array(values) => &values[..],
-            _ => single,
-        };
-        for value in values {
-            match value.get_ref() {
-                DeValue::Boolean(true) => flags.push(format!("--{}", key.get_ref())),
-                DeValue::Boolean(false) => {}
-                DeValue::String(text) => flags.push(format!("--{}={text}", key.get_ref())),
-                DeValue::Integer(number) => flags.push(format!("--{}={number}", key.get_ref())),
-                DeValue::Float(number) => flags.push(format!("--{}={number}", key.get_ref())),
-                DeValue::Datetime(_) | DeValue::Array(_) | DeValue::Table(_) => {
-                    let problem =
-                        "a flag's value is a text, a number, true or false, or a list of them";
-                    return Err(mistake(value.span(), problem));
-                }
+        let given = flag(key.get_ref(), value);
+        flags.extend(given.map_err(|(place, problem)| mistake(place, problem))?);
+    }
+    Ok(flags)
+}
+
+/// One flag of a table of flags, as it would stand on the command line.
+///
+/// # Errors
+/// Where the value cannot be a flag's, and why.
+pub fn flag(
+    name: &str,
+    value: &Spanned<DeValue<'_>>,
+) -> Result<Vec<String>, (Range<usize>, &'static str)> {
+    let single = std::slice::from_ref(value);
+    let values = match value.get_ref() {
+        DeValue::Array(values) => &values[..],
+        _ => single,
+    };
+    let mut flags = Vec::new();
+    for value in values {
+        match value.get_ref() {
+            DeValue::Boolean(true) => flags.push(format!("--{name}")),
+            DeValue::Boolean(false) => {}
+            DeValue::String(text) => flags.push(format!("--{name}={text}")),
+            DeValue::Integer(number) => flags.push(format!("--{name}={number}")),
+            DeValue::Float(number) => flags.push(format!("--{name}={number}")),
+            DeValue::Datetime(_) | DeValue::Array(_) | DeValue::Table(_) => {
+                let problem =
+                    "a flag's value is a text, a number, true or false, or a list of them";
+                return Err((value.span(), problem));
             }
         }
     }
@@ -97,7 +111,7 @@ fn parse(text: &str) -> Result<(Identity, Config), Mistake> {
 
 /// What is wrong, and where. Printed as `LINE: …`, to stand behind the file's name.
 #[derive(Debug)]
-struct Mistake {
+pub struct Mistake {
     line: usize,
     /// The line as it stands in the file: key and value.
     written: String,
@@ -105,7 +119,8 @@ struct Mistake {
 }
 
 impl Mistake {
-    fn at(place: Option<Range<usize>>, text: &str, problem: String) -> Self {
+    /// A mistake at a place of the text, if it is known where.
+    pub fn at(place: Option<Range<usize>>, text: &str, problem: String) -> Self {
         let before = place.map_or("", |place| text.get(..place.start).unwrap_or(text));
         let line = before.matches('\n').count();
         Self {
@@ -115,7 +130,8 @@ impl Mistake {
         }
     }
 
-    fn of(error: &Error, text: &str) -> Self {
+    /// What serde or the parser finds wrong with the text, with what would be right.
+    pub fn of(error: &Error, text: &str) -> Self {
         let problem = error.message().replace('\n', "; ");
         let problem = match remedy(&problem) {
             Some(remedy) => format!("{problem}: {remedy}"),
@@ -198,19 +214,13 @@ fn inner_table<'t, 'i>(value: &'t Spanned<DeValue<'i>>) -> Option<&'t DeTable<'i
     }
 }
 
-fn unknown_words<'k>(
+/// Words for a key that means nothing: the nearest one that does, or all.
+pub fn unknown_words<'k>(
     key: &str,
     section: &str,
     names: impl Iterator<Item = &'k str> + Clone,
 ) -> String {
-    /// Less alike than this, and it is hardly a slip of the finger.
-    const ALIKE: f64 = 0.75;
-    let likeness = |name: &&str| strsim::jaro_winkler(key, name);
-    let nearest = names
-        .clone()
-        .max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
-        .filter(|name| likeness(name) >= ALIKE);
-    match nearest {
+    match nearest(key, names.clone()) {
         Some(nearest) => {
             format!("there is no setting `{section}{key}`; did you mean `{section}{nearest}`?")
         }
@@ -222,6 +232,16 @@ fn unknown_words<'k>(
             )
         }
     }
+}
+
+/// The name of which another one may be a misspelling.
+pub fn nearest<'k>(misspelt: &str, names: impl Iterator<Item = &'k str>) -> Option<&'k str> {
+    /// Less alike than this, and it is hardly a slip of the finger.
+    const ALIKE: f64 = 0.75;
+    let alike = names.map(|name| (strsim::jaro_winkler(misspelt, name), name));
+    let best = alike.max_by(|(a, _), (b, _)| a.total_cmp(b));
+    best.filter(|(likeness, _)| *likeness >= ALIKE)
+        .map(|(_, name)| name)
 }
 
 #[cfg(test)]

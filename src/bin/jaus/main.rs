@@ -18,6 +18,8 @@ mod ping;
 mod query;
 mod record;
 mod replay;
+#[cfg(target_os = "linux")]
+mod up;
 mod vehicle;
 
 use std::process::ExitCode;
@@ -46,6 +48,14 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Demo(demo::Demo),
+    #[cfg(target_os = "linux")]
+    Up(up::Up),
+    #[cfg(target_os = "linux")]
+    #[command(name = up::leash::NAME, hide = true)]
+    Leash(up::leash::Leash),
+    #[cfg(target_os = "linux")]
+    #[command(name = up::warden::NAME, hide = true)]
+    Warden(up::warden::Warden),
     Node(node::NodeCommand),
     Vehicle(vehicle::VehicleCommand),
     Monitor(monitor::Monitor),
@@ -64,6 +74,12 @@ impl Command {
     fn run(&self) -> Result<Outcome, Failure> {
         match self {
             Self::Demo(demo) => demo.run(),
+            #[cfg(target_os = "linux")]
+            Self::Up(up) => up.run(),
+            #[cfg(target_os = "linux")]
+            Self::Leash(leash) => leash.run(),
+            #[cfg(target_os = "linux")]
+            Self::Warden(warden) => warden.run(),
             Self::Node(node) => node.run(),
             Self::Vehicle(vehicle) => vehicle.run(),
             Self::Monitor(monitor) => monitor.run(),

@@ -1,0 +1,157 @@
+//! One running process: how it is started, heard, signalled, and found to have ended.
+//!
+//! It leads a process group of its own, so that what it starts in turn ends with it, and Ctrl-C
+//! reaches `jaus up` alone. Between the fork and the program stands [`leash`](super::leash).
+
+use std::fs;
+use std::io::{self, PipeReader};
+use std::os::fd::OwnedFd;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Child as Process, Command, Stdio};
+
+use nix::errno::Errno;
+use nix::sys::signal::{Signal, killpg};
+use nix::sys::wait::{Id, WaitPidFlag, WaitStatus, waitid};
+use nix::unistd::Pid;
+use tokio::io::AsyncReadExt;
+use tokio::net::unix::pipe;
+use tokio::task::JoinHandle;
+
+use super::console::Voice;
+use super::leash;
+use super::supervisor::Exit;
+use super::system::Part;
+
+/// A process, until it is [reaped](Self::reap).
+pub(super) struct Child {
+    process: Process,
+    group: Pid,
+    listening: JoinHandle<()>,
+}
+
+impl Child {
+    /// Starts a part, whose output is said by its voice.
+    ///
+    /// # Errors
+    /// What the operating system has against it.
+    pub(super) fn start(part: &Part, voice: Voice) -> io::Result<Self> {
+        if let Some(directory) = &part.directory {
+            fs::create_dir_all(directory)?;
+        }
+        let (reader, writer) = io::pipe()?;
+        let mut command = Command::new(leash::PROGRAM);
+        command
+            .arg0("jaus")
+            .args(leash::arguments())
+            .arg(&part.program)
+            .args(&part.arguments)
+            .envs(part.environment.iter().map(|(name, value)| (name, value)))
+            .stdin(Stdio::null())
+            .stdout(writer.try_clone()?)
+            .stderr(writer)
+            .process_group(0);
+        if let Some(directory) = &part.directory {
+            command.current_dir(directory);
+        }
+        let listening = listen(reader, voice)?;
+        let process = command.spawn().inspect_err(|_| listening.abort())?;
+        let group = i32::try_from(process.id()).map(Pid::from_raw);
+        Ok(Self {
+            group: group.map_err(io::Error::other)?,
+            process,
+            listening,
+        })
+    }
+
+    /// The number of the process, and of its group.
+    pub(super) const fn id(&self) -> Pid {
+        self.group
+    }
+
+    /// Sends a signal to the process and all that it has started.
+    pub(super) fn signal(&self, signal: Signal) {
+        // The process is not reaped, so its number is nobody else's; an error means that it, or
+        // what is left of it, has ended.
+        if let Err(error) = killpg(self.group, signal)
+            && error != Errno::ESRCH
+        {
+            tracing::debug!(group = %self.group, %signal, %error, "cannot be signalled");
+        }
+    }
+
+    /// Whether the process has ended. Its number stays its own until it is [reaped](Self::reap).
+    pub(super) fn has_ended(&self) -> bool {
+        let look = WaitPidFlag::WEXITED | WaitPidFlag::WNOHANG | WaitPidFlag::WNOWAIT;
+        !matches!(
+            waitid(Id::Pid(self.group), look),
+            Ok(WaitStatus::StillAlive) | Err(Errno::EINTR)
+        )
+    }
+
+    /// Takes leave of a process that has ended: what it has started is ended too, and what it has
+    /// said is said.
+    pub(super) async fn reap(mut self) -> Exit {
+        self.signal(Signal::SIGKILL);
+        let exit = match self.process.wait() {
+            Ok(status) => match (status.code(), status.signal()) {
+                (Some(code), _) => Exit::Status(code),
+                (None, Some(signal)) => Exit::Signal(signal),
+                (None, None) => Exit::NotStarted,
+            },
+            Err(_) => Exit::NotStarted,
+        };
+        // A process that has left the group may keep the pipe open for ever.
+        #[expect(clippy::disallowed_methods, reason = "last words, in real time")]
+        let _ = tokio::time::timeout(LAST_WORDS, self.listening).await;
+        exit
+    }
+}
+
+const LAST_WORDS: std::time::Duration = std::time::Duration::from_millis(200);
+
+/// Has every line that comes out of a pipe said.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the command owns its tasks, and this one ends with the pipe"
+)]
+fn listen(reader: PipeReader, voice: Voice) -> io::Result<JoinHandle<()>> {
+    let mut pipe = pipe::Receiver::from_owned_fd(OwnedFd::from(reader))?;
+    Ok(tokio::spawn(async move {
+        let mut lines = Lines::default();
+        let mut buffer = vec![0; Lines::LONGEST];
+        while let Ok(length @ 1..) = pipe.read(&mut buffer).await {
+            let octets = buffer.get(..length).unwrap_or_default();
+            lines.take(octets, &voice);
+        }
+        lines.end(&voice);
+    }))
+}
+
+/// Octets that become lines.
+#[derive(Default)]
+struct Lines {
+    begun: Vec<u8>,
+}
+
+impl Lines {
+    /// A longer line is broken.
+    const LONGEST: usize = 4096;
+
+    fn take(&mut self, octets: &[u8], voice: &Voice) {
+        for piece in octets.split_inclusive(|&octet| octet == b'\n') {
+            self.begun.extend_from_slice(piece);
+            if piece.ends_with(b"\n") || self.begun.len() >= Self::LONGEST {
+                self.end(voice);
+            }
+        }
+    }
+
+    fn end(&mut self, voice: &Voice) {
+        let line = self.begun.strip_suffix(b"\n").unwrap_or(&self.begun);
+        let line = line.strip_suffix(b"\r").unwrap_or(line);
+        if !self.begun.is_empty() {
+            voice.say(&String::from_utf8_lossy(line));
+        }
+        self.begun.clear();
+    }
+}

@@ -1,0 +1,92 @@
+//! How the system is, for other programs: a JSON file that is replaced as a whole with every
+//! change.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value as Json, json};
+
+use super::supervisor::{Exit, State};
+use super::system::Part;
+
+/// The file, and what stands in it.
+pub(super) struct StatusFile {
+    path: PathBuf,
+    written: Json,
+    /// Whether the last change could not be written.
+    failed: bool,
+}
+
+impl StatusFile {
+    pub(super) const fn new(path: PathBuf) -> Self {
+        Self {
+            path,
+            written: Json::Null,
+            failed: false,
+        }
+    }
+
+    /// Writes how the parts are, if that is news. Says once why it cannot.
+    pub(super) fn update(&mut self, parts: &[Json]) -> Option<String> {
+        let status = json!({ "supervisor": std::process::id(), "parts": parts });
+        if status == self.written {
+            return None;
+        }
+        match replace(&self.path, &format!("{status:#}\n")) {
+            Ok(()) => {
+                self.written = status;
+                self.failed = false;
+                None
+            }
+            Err(_) if std::mem::replace(&mut self.failed, true) => None,
+            Err(error) => Some(format!("--status {}: {error}", self.path.display())),
+        }
+    }
+}
+
+/// Puts a file in the place of another, so that readers see the old or the new one.
+fn replace(path: &Path, text: &str) -> std::io::Result<()> {
+    let mut new = path.as_os_str().to_owned();
+    new.push(".new");
+    fs::write(&new, text)?;
+    fs::rename(&new, path)
+}
+
+/// One part.
+pub(super) fn of_part(
+    part: &Part,
+    state: State,
+    starts: u32,
+    last: Option<Exit>,
+    process: Option<i32>,
+) -> Json {
+    json!({
+        "name": part.name,
+        "program": part.program.display().to_string(),
+        "state": match state {
+            State::Waiting { .. } => "waiting",
+            State::Starting => "starting",
+            State::Running { .. } => "running",
+            State::Stopping { .. } => "stopping",
+            State::Ended => "ended",
+            State::GivenUp => "given up",
+            State::Stopped => "stopped",
+        },
+        "process": process,
+        "starts": starts,
+        "last_end": last.map(in_words),
+    })
+}
+
+/// How a process came to its end.
+pub(super) fn in_words(exit: Exit) -> String {
+    use nix::sys::signal::Signal;
+    match exit {
+        Exit::Status(status) => format!("status {status}"),
+        Exit::Signal(number) => match Signal::try_from(number) {
+            Ok(signal) => signal.to_string(),
+            Err(_) => format!("signal {number}"),
+        },
+        Exit::NotStarted => "not started".to_owned(),
+    }
+}
