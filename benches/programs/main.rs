@@ -1,0 +1,126 @@
+//! What a program of one component costs a small board: its size without symbols, its memory when
+//! it has nothing to do, and how long it takes from its start until others know its services.
+//!
+//! ```text
+//! cargo bench --bench programs
+//! ```
+//!
+//! It prints a Markdown table. Everything stays on loopback. Sizes are those of the profile `bench`,
+//! which has the settings of `release`. What was measured is kept in `docs/performance.md`.
+#![expect(
+    clippy::expect_used,
+    clippy::disallowed_methods,
+    reason = "a benchmark: it owns the clock, and ends at the first surprise"
+)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::component::{Change, Component, Kind};
+use jaus::node::{Config, Node};
+
+/// Starts of each program.
+const STARTS: usize = 7;
+/// When a program counts as idle.
+const SETTLED: Duration = Duration::from_secs(4);
+
+/// The programs, each with flags that keep its files apart.
+const PROGRAMS: &[(&str, &[&str])] = &[];
+
+#[tokio::main(flavor = "current_thread")]
+async fn main() {
+    let node = Node::start(Config::loopback(42, 1)).expect("a node");
+    let watcher = Component::builder(Kind::OperatorControlUnit, "Watcher").attach(&node, 1);
+    let watcher = watcher.expect("a free number");
+    println!("| program | stripped | resident, idle | start to discovered, median (most) |");
+    println!("|---|---|---|---|");
+    for (number, (program, flags)) in (1..).zip(PROGRAMS) {
+        let mut starts = Vec::new();
+        let mut resident = 0.0;
+        for start in 0..STARTS {
+            let id = JausId::new(101, number, 1 + start as u8);
+            let began = Instant::now();
+            let process = Process::start(program, flags, id);
+            starts.push(known(&watcher, id).await.duration_since(began));
+            if start == 0 {
+                tokio::time::sleep(SETTLED).await;
+                resident = process.resident();
+            }
+        }
+        starts.sort();
+        let name = Path::new(program).file_name().expect("a program");
+        println!(
+            "| {} | {:.2} MiB | {resident:.1} MiB | {:.0} ms ({:.0}) |",
+            name.display(),
+            stripped(program),
+            millis(starts[STARTS / 2]),
+            millis(starts[STARTS - 1])
+        );
+    }
+}
+
+fn millis(time: Duration) -> f64 {
+    time.as_secs_f64() * 1000.0
+}
+
+/// Waits until a component has told its services, and says when that was.
+async fn known(watcher: &Component, id: JausId) -> Instant {
+    let mut changes = watcher.watch();
+    while let Some(change) = changes.next().await {
+        if change == Change::Services(id) {
+            break;
+        }
+    }
+    Instant::now()
+}
+
+/// The size without symbols in MiB, as `strip` (binutils) leaves it.
+fn stripped(program: &str) -> f64 {
+    let lean = std::env::temp_dir().join(format!("jaus-lean-{}", std::process::id()));
+    let mut strip = Command::new("strip");
+    let status = strip.arg("-o").arg(&lean).arg(program).status();
+    let made = status.is_ok_and(|status| status.success());
+    let file = if made {
+        lean.as_path()
+    } else {
+        Path::new(program)
+    };
+    let octets = fs::metadata(file).expect("a file").len();
+    // It may never have been made.
+    let _ = fs::remove_file(&lean);
+    octets as f64 / f64::from(1 << 20)
+}
+
+/// A running program; killed when dropped.
+struct Process(Child);
+
+impl Process {
+    fn start(program: &str, flags: &[&str], id: JausId) -> Self {
+        let mut command = Command::new(program);
+        command
+            .args(["--loopback", "--id", &id.to_string()])
+            .args(flags);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        Self(command.spawn().expect("a program"))
+    }
+
+    /// Memory in use in MiB.
+    fn resident(&self) -> f64 {
+        let status = fs::read_to_string(format!("/proc/{}/status", self.0.id()));
+        let status = status.expect("Linux");
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+        let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
+        kib.expect("a number") / 1024.0
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
