@@ -17,6 +17,7 @@ use super::awaiting::{Awaiting, Waiter};
 use super::error::SendError;
 use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
+use super::tap::Taps;
 use crate::address::JausId;
 use crate::endpoint::{AttachError, Endpoint, Event, MessageHandle, Outgoing, Received};
 use crate::link::Slab;
@@ -81,6 +82,7 @@ pub(super) struct Core {
     /// Gone when the node has stopped, which ends the listeners' streams.
     events: Option<broadcast::Sender<Event>>,
     slab: Slab,
+    pub(super) taps: Taps,
     /// Components that do not read in time: nothing is acknowledged in their name until they do.
     busy: BTreeSet<JausId>,
     /// Messages sent since the last [`pump`](Self::pump).
@@ -103,6 +105,7 @@ impl Core {
             limits,
             events: Some(broadcast::Sender::new(EVENTS)),
             slab: Slab::new(),
+            taps: Taps::default(),
             busy: BTreeSet::new(),
             gathered: 0,
             driver: None,
@@ -260,13 +263,17 @@ impl Core {
         self.gathered = 0;
         while let Some(transmit) = self.endpoint.poll_transmit() {
             if let Some(link) = self.links.get_mut(transmit.link) {
+                self.taps.transmit(link.framing(), &transmit);
                 link.transmit(&transmit);
             }
             transmitted = true;
         }
         while let Some(event) = self.endpoint.poll_event() {
             match event {
-                Event::Received(message) => self.deliver(message),
+                Event::Received(message) => {
+                    self.taps.message(&message);
+                    self.deliver(message);
+                }
                 news => {
                     self.awaiting.handle_event(&news);
                     self.announce(news);
@@ -310,7 +317,8 @@ impl Core {
         self.look_after_the_busy();
         let mut more = false;
         for (id, link) in self.links.iter_mut() {
-            more |= link.receive(cx, now, id, &mut self.slab, &mut self.endpoint);
+            let into = (&mut self.endpoint, &mut self.taps);
+            more |= link.receive(cx, now, id, &mut self.slab, into);
         }
         more
     }
@@ -337,6 +345,7 @@ impl Core {
             self.endpoint.remove_link(id);
         }
         self.links.close();
+        self.taps.end();
         self.events = None;
     }
 

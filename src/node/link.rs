@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 use std::task::{Context, Poll};
 use std::time::Instant;
 
+use super::tap::Taps;
 use crate::endpoint::{Endpoint, LinkId, LinkProfile, Path, Remote, Transmit};
 use crate::link::Slab;
 #[cfg(feature = "serial")]
@@ -54,14 +55,34 @@ impl Link {
                 ..LinkProfile::judp(own)
             },
             Self::Tcp(_) => LinkProfile {
-                framing: Framing::Jtcp,
+                framing: self.framing(),
                 ..LinkProfile::default()
             },
             #[cfg(feature = "serial")]
             Self::Serial(_) => LinkProfile {
-                framing: Framing::Jserial,
+                framing: self.framing(),
                 ..LinkProfile::default()
             },
+        }
+    }
+
+    /// How it frames messages.
+    pub(super) const fn framing(&self) -> Framing {
+        match self {
+            Self::Udp(_) => Framing::Judp,
+            Self::Tcp(_) => Framing::Jtcp,
+            #[cfg(feature = "serial")]
+            Self::Serial(_) => Framing::Jserial,
+        }
+    }
+
+    /// What people call it: an interface's or a device's name.
+    pub(super) fn name(&self) -> String {
+        match self {
+            Self::Udp(link) => link.interface().name.clone(),
+            Self::Tcp(_) => "tcp".to_owned(),
+            #[cfg(feature = "serial")]
+            Self::Serial(link) => link.settings().device.clone(),
         }
     }
 
@@ -94,14 +115,14 @@ impl Link {
         }
     }
 
-    /// Gives the endpoint what has arrived; whether there was more than the link's share.
+    /// Gives the endpoint, and who looks on, what has arrived; whether there was more than the link's share.
     pub(super) fn receive(
         &mut self,
         cx: &mut Context<'_>,
         now: Instant,
         id: LinkId,
         slab: &mut Slab,
-        endpoint: &mut Endpoint,
+        (endpoint, taps): (&mut Endpoint, &mut Taps),
     ) -> bool {
         let from = |peer| Path { link: id, peer };
         match self {
@@ -110,19 +131,24 @@ impl Link {
                     let Poll::Ready((peer, datagram)) = link.poll_recv(cx, slab) else {
                         return false;
                     };
-                    endpoint.handle_datagram(now, from(Remote::Socket(peer)), datagram);
+                    let path = from(Remote::Socket(peer));
+                    taps.datagram(path, &datagram);
+                    endpoint.handle_datagram(now, path, datagram);
                 }
                 true
             }
             Self::Tcp(link) => link.receive(cx, now, |arrival| match arrival {
                 Arrival::Frame(peer, frame) => {
-                    endpoint.handle_frame(now, from(Remote::Socket(peer)), &frame);
+                    let path = from(Remote::Socket(peer));
+                    taps.frame(path, &frame);
+                    endpoint.handle_frame(now, path, &frame);
                 }
                 Arrival::Closed(peer, _) => endpoint.forget_path(from(Remote::Socket(peer))),
             }),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.receive(cx, now, |arrival| match arrival {
                 serial::Arrival::Frame(frame) => {
+                    taps.frame(from(Remote::Line), &frame);
                     endpoint.handle_frame(now, from(Remote::Line), &frame);
                 }
                 serial::Arrival::Lost => endpoint.forget_path(from(Remote::Line)),

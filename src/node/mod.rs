@@ -44,6 +44,7 @@ mod links;
 mod local;
 mod mailbox;
 mod port;
+mod tap;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -59,6 +60,7 @@ pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::host::{Host, HostEvent, HostEvents};
 pub use self::mailbox::{MailboxCounters, MailboxLimits};
 pub use self::port::{Port, Sender};
+pub use self::tap::{Content, Passage, Tap, Tapped, Way};
 pub use crate::endpoint::AttachError;
 pub use crate::link::local::{Address, Local, Process};
 
@@ -217,6 +219,23 @@ impl Node {
     #[must_use]
     pub fn component_events(&self) -> ComponentEvents {
         ComponentEvents(self.shared().lock().attendance.subscribe())
+    }
+
+    /// A look at everything that passes the node from now on, and from which `limit` passages may
+    /// wait to be read (at least 1, and 16 MiB at most); then the oldest go, and are counted.
+    #[must_use]
+    pub fn tap(&self, limit: usize) -> Tap {
+        self.shared().lock().taps.open(limit)
+    }
+
+    /// What a link is called: its interface, its serial device, or `tcp` for the connections.
+    /// `None` if it has gone.
+    #[must_use]
+    pub fn link_name(&self, link: LinkId) -> Option<String> {
+        let core = self.shared().lock();
+        core.links
+            .iter()
+            .find_map(|(id, open)| (id == link).then(|| open.name()))
     }
 
     /// News from now on: peers learned and moved, id conflicts, acknowledgements.

@@ -1,0 +1,406 @@
+//! Looking on: what passes a node, for people and logs.
+//!
+//! A [`Tap`] is told of everything that comes from a link, goes to a link, or goes from one of the
+//! node's components to another. It sees what is on the links and not what the endpoint makes of it:
+//! fragments, repetitions and acknowledgements too, and what is dropped afterwards. To make whole
+//! messages of that is the viewer's business, and so is reading the octets at all.
+//!
+//! The traffic never waits for a tap. What passes is put into the tap's own bounded queue as shared
+//! octets; when that is full the oldest goes and is counted. While nobody taps, all this is one test
+//! of an empty list.
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::future::poll_fn;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::task::{Context, Poll, Waker};
+use std::time::SystemTime;
+
+use bytes::Bytes;
+
+use crate::address::JausId;
+use crate::endpoint::{LinkId, Path, Received, To, Transmit};
+use crate::link::backlog::{Backlog, Bounds};
+use crate::wire::{Flags, Frame, Framing, Priority, jserial, jtcp, judp};
+
+/// Octets that may wait for one tap, whatever the number of messages.
+const OCTETS: usize = 16 << 20;
+
+/// Something that passed a node.
+#[derive(Clone, Debug)]
+pub struct Passage {
+    /// When, by the clock on the wall.
+    pub time: SystemTime,
+    /// From where, or whereto.
+    pub way: Way,
+    /// What.
+    pub content: Content,
+}
+
+/// Which way something passed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// It came from there.
+    In(Path),
+    /// It went through this link; what others have sent is passed on so, too.
+    Out(LinkId, To),
+    /// From one component of the node to another, which is named: a message to several passes
+    /// several times.
+    Local(JausId),
+}
+
+/// What passed: octets as they were on the link, shared with whoever else has them.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// A datagram that came, or what a link was given to send.
+    Octets {
+        /// What they are framed as.
+        framing: Framing,
+        /// The octets themselves.
+        octets: Bytes,
+        /// If set, they are several datagrams of so many octets each, the last perhaps shorter.
+        segment: Option<usize>,
+    },
+    /// A message from a link that finds the messages itself: TCP, serial lines.
+    Frame(Frame),
+    /// A message between components of the node.
+    Message(Received),
+}
+
+/// What a [`Tap`] gives.
+#[derive(Clone, Debug)]
+pub enum Tapped {
+    /// Something passed.
+    Passage(Passage),
+    /// So many passed that this tap was too slow for, here.
+    Lost(u64),
+}
+
+impl Passage {
+    /// The messages in it. What cannot be read gives none.
+    #[must_use]
+    pub fn frames(&self) -> Vec<Frame> {
+        match &self.content {
+            Content::Frame(frame) => vec![frame.clone()],
+            Content::Message(message) => vec![Frame {
+                flags: Flags::new(message.priority).with_broadcast(message.broadcast),
+                ..Frame::new(message.source, message.destination, message.payload.clone())
+            }],
+            Content::Octets {
+                framing: Framing::Jtcp,
+                octets,
+                ..
+            } => {
+                let mut decoder = jtcp::Decoder::new();
+                decoder.input().extend_from_slice(octets);
+                std::iter::from_fn(|| decoder.next_frame().ok().flatten()).collect()
+            }
+            Content::Octets {
+                framing: Framing::Jserial,
+                octets,
+                ..
+            } => {
+                let mut decoder = jserial::Decoder::new();
+                decoder.push(octets);
+                std::iter::from_fn(|| decoder.next_frame()).collect()
+            }
+            Content::Octets {
+                framing: Framing::Judp,
+                ..
+            } => {
+                let datagrams = self.datagrams();
+                let frames = datagrams.into_iter().filter_map(|d| judp::frames(d).ok());
+                frames.flatten().map_while(Result::ok).collect()
+            }
+        }
+    }
+
+    /// The datagrams in it, if it passed as such.
+    #[must_use]
+    pub fn datagrams(&self) -> Vec<Bytes> {
+        let Content::Octets {
+            framing: Framing::Judp,
+            octets,
+            segment,
+        } = &self.content
+        else {
+            return Vec::new();
+        };
+        let length = segment.unwrap_or(octets.len()).max(1);
+        let starts = (0..octets.len()).step_by(length);
+        starts
+            .map(|start| octets.slice(start..(start + length).min(octets.len())))
+            .collect()
+    }
+
+    /// Octets that it holds on to.
+    fn len(&self) -> usize {
+        match &self.content {
+            Content::Octets { octets, .. } => octets.len(),
+            Content::Frame(frame) => frame.payload.len(),
+            Content::Message(message) => message.payload.len(),
+        }
+    }
+}
+
+/// A look at everything that passes a node; see the [module's](self) words on what that is.
+///
+/// Dropping it ends it.
+pub struct Tap(Arc<Queue>);
+
+impl fmt::Debug for Tap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let waiting = self.0.lock().waiting.len();
+        f.debug_struct("Tap").field("waiting", &waiting).finish()
+    }
+}
+
+impl Tap {
+    /// Waits for what passes next; `None` when the node has stopped and everything was read.
+    pub async fn next(&mut self) -> Option<Tapped> {
+        poll_fn(|cx| self.0.poll_pop(cx)).await
+    }
+
+    /// What passed and was not read yet, if there is anything.
+    pub fn try_next(&mut self) -> Option<Tapped> {
+        self.0.lock().pop()
+    }
+}
+
+/// What waits for one tap.
+#[derive(Debug)]
+struct Queue(Mutex<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    waiting: Backlog<Passage>,
+    lost: u64,
+    ended: bool,
+    reader: Option<Waker>,
+}
+
+impl Inner {
+    fn pop(&mut self) -> Option<Tapped> {
+        // The oldest go, so what was lost stood before all that waits.
+        match std::mem::take(&mut self.lost) {
+            0 => self.waiting.pop().map(Tapped::Passage),
+            lost => Some(Tapped::Lost(lost)),
+        }
+    }
+}
+
+impl Queue {
+    fn push(&self, passage: Passage) {
+        let mut inner = self.lock();
+        let length = passage.len();
+        // All alike: a tap is to see things in the order in which they passed.
+        inner.lost += inner.waiting.push(Priority::Standard, length, passage);
+        if let Some(reader) = inner.reader.take() {
+            reader.wake();
+        }
+    }
+
+    fn poll_pop(&self, cx: &Context<'_>) -> Poll<Option<Tapped>> {
+        let mut inner = self.lock();
+        if let Some(tapped) = inner.pop() {
+            return Poll::Ready(Some(tapped));
+        }
+        if inner.ended {
+            return Poll::Ready(None);
+        }
+        inner.reader = Some(cx.waker().clone());
+        Poll::Pending
+    }
+
+    fn end(&self) {
+        let mut inner = self.lock();
+        inner.ended = true;
+        if let Some(reader) = inner.reader.take() {
+            reader.wake();
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The taps of a node.
+#[derive(Debug, Default)]
+pub(super) struct Taps {
+    queues: VecDeque<Weak<Queue>>,
+    ended: bool,
+}
+
+impl Taps {
+    /// One more, for which `limit` passages may wait.
+    pub(super) fn open(&mut self, limit: usize) -> Tap {
+        let bounds = Bounds {
+            items: limit.max(1),
+            octets: OCTETS,
+        };
+        let queue = Arc::new(Queue(Mutex::new(Inner {
+            waiting: Backlog::new(bounds),
+            lost: 0,
+            ended: self.ended,
+            reader: None,
+        })));
+        if !self.ended {
+            self.queues.push_back(Arc::downgrade(&queue));
+        }
+        Tap(queue)
+    }
+
+    /// Tells of a datagram that came.
+    pub(super) fn datagram(&mut self, path: Path, octets: &Bytes) {
+        self.tell(Way::In(path), || Content::Octets {
+            framing: Framing::Judp,
+            octets: octets.clone(),
+            segment: None,
+        });
+    }
+
+    /// Tells of a message that came.
+    pub(super) fn frame(&mut self, path: Path, frame: &Frame) {
+        self.tell(Way::In(path), || Content::Frame(frame.clone()));
+    }
+
+    /// Tells of what goes to a link.
+    pub(super) fn transmit(&mut self, framing: Framing, transmit: &Transmit) {
+        self.tell(Way::Out(transmit.link, transmit.to), || Content::Octets {
+            framing,
+            octets: transmit.payload.clone(),
+            segment: transmit.segment,
+        });
+    }
+
+    /// Tells of a message for one of our components, if it is from another one of them.
+    pub(super) fn message(&mut self, message: &Received) {
+        if message.path.is_none() {
+            self.tell(Way::Local(message.to), || Content::Message(message.clone()));
+        }
+    }
+
+    /// Nothing more will pass.
+    pub(super) fn end(&mut self) {
+        self.ended = true;
+        for queue in self.queues.drain(..).filter_map(|queue| queue.upgrade()) {
+            queue.end();
+        }
+    }
+
+    /// The one branch that there is while nobody taps.
+    #[inline]
+    fn tell(&mut self, way: Way, content: impl FnOnce() -> Content) {
+        if !self.queues.is_empty() {
+            self.tell_all(way, content());
+        }
+    }
+
+    #[cold]
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "people want the time of day, and only when they look"
+    )]
+    fn tell_all(&mut self, way: Way, content: Content) {
+        let passage = Passage {
+            time: SystemTime::now(),
+            way,
+            content,
+        };
+        self.queues.retain(|queue| {
+            let queue = queue.upgrade();
+            if let Some(queue) = &queue {
+                queue.push(passage.clone());
+            }
+            queue.is_some()
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(number: u8) -> Received {
+        let own = JausId::new(1, 1, 1);
+        Received {
+            source: own,
+            destination: own,
+            to: own,
+            priority: Priority::Standard,
+            broadcast: crate::wire::Broadcast::None,
+            payload: vec![0, 0, number].into(),
+            path: None,
+        }
+    }
+
+    fn numbers(tap: &mut Tap) -> Vec<Result<u8, u64>> {
+        std::iter::from_fn(|| tap.try_next())
+            .map(|tapped| match tapped {
+                Tapped::Passage(passage) => Ok(passage.frames()[0].payload[2]),
+                Tapped::Lost(lost) => Err(lost),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_slow_tap_loses_the_oldest_and_is_told_how_many() {
+        let mut taps = Taps::default();
+        let (mut slow, mut fast) = (taps.open(3), taps.open(100));
+        (0..10).for_each(|number| taps.message(&message(number)));
+        assert_eq!(numbers(&mut slow), [Err(7), Ok(7), Ok(8), Ok(9)]);
+        assert_eq!(numbers(&mut fast), (0..10).map(Ok).collect::<Vec<_>>());
+        taps.message(&message(10));
+        assert_eq!(numbers(&mut slow), [Ok(10)], "and is told once");
+    }
+
+    #[test]
+    fn nothing_is_kept_for_a_tap_that_has_gone() {
+        let mut taps = Taps::default();
+        drop(taps.open(10));
+        taps.message(&message(1));
+        assert!(taps.queues.is_empty());
+    }
+
+    #[test]
+    fn large_messages_in_a_queue_are_bounded_by_their_octets() {
+        let mut taps = Taps::default();
+        let mut tap = taps.open(1_000_000);
+        let octets = Bytes::from(vec![0; 60_000]);
+        let path = Path {
+            link: LinkId(0),
+            peer: std::net::SocketAddr::from(([127, 0, 0, 1], 1)).into(),
+        };
+        (0..1000).for_each(|_| taps.datagram(path, &octets));
+        let held = tap.0.lock().waiting.octets();
+        assert!(held <= OCTETS, "{held}");
+        assert!(matches!(tap.try_next(), Some(Tapped::Lost(lost)) if lost > 700));
+    }
+
+    #[test]
+    fn messages_are_found_in_every_framing_and_in_trains_of_datagrams() {
+        let (source, destination) = (JausId::new(1, 1, 1), JausId::new(2, 1, 1));
+        let frame = Frame::new(source, destination, vec![0, 0x2B, 2].into());
+        for framing in [Framing::Judp, Framing::Jtcp, Framing::Jserial] {
+            let one = framing.encode(&frame).unwrap();
+            let mut content = vec![(one.clone(), None, 1)];
+            if framing == Framing::Judp {
+                let train = [&one[..], &one[..]].concat();
+                content.push((train.into(), Some(one.len()), 2));
+            }
+            for (octets, segment, count) in content {
+                let passage = Passage {
+                    time: SystemTime::UNIX_EPOCH,
+                    way: Way::Out(LinkId(0), To::Group),
+                    content: Content::Octets {
+                        framing,
+                        octets,
+                        segment,
+                    },
+                };
+                assert_eq!(passage.frames(), vec![frame.clone(); count], "{framing:?}");
+            }
+        }
+    }
+}
