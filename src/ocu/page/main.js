@@ -1,0 +1,154 @@
+// Puts the page together: what the server says goes to the panels, what the operator wants goes to
+// the server.
+
+import { get, mark, plain, say, show, toast, typing } from "./dom.js";
+import { Drive } from "./drive.js";
+import { Emergency } from "./emergency.js";
+import { Link } from "./link.js";
+import { MapView } from "./map.js";
+import { Messages } from "./messages.js";
+import { Mission } from "./mission.js";
+import { part, showControl, showLink, showStatus, showVehicles } from "./status.js";
+import { followTheme } from "./theme.js";
+import { showSystem } from "./tree.js";
+
+const link = new Link();
+const map = new MapView((place) => choose(place));
+const mission = new Mission(ask, map);
+const emergency = new Emergency(link);
+const drive = new Drive(link, () => emergency.stop());
+new Messages(link);
+followTheme(() => map.recolour());
+
+let state = null;
+/** Whether the server takes wishes from this page: it wants no token, or has taken ours. */
+let trusted = false;
+/** The authority that the operator's node asks for control with. */
+let authority = null;
+
+// What the server says.
+
+link.addEventListener("hello", async ({ detail }) => {
+  trusted = !detail.token_needed;
+  authority = detail.authority;
+  if (!trusted && link.token) await offer(link.token);
+  else show(get("token-sheet"), !trusted && !watching());
+  render();
+});
+link.addEventListener("state", ({ detail }) => {
+  state = detail;
+  render();
+});
+link.addEventListener("close", () => {
+  trusted = false;
+  render();
+});
+link.addEventListener("refused", ({ detail }) => toast("bad", detail));
+
+/** Shows the state; also without news, because ages grow. */
+function render() {
+  showLink(link, state);
+  const live = link.condition === "live";
+  const operable = live && trusted && Boolean(state?.vehicle);
+  emergency.update(state, link);
+  drive.update(state, obstacle(live));
+  const mode = part(state, "primitive_driver")?.state;
+  get("resume").disabled = !operable || !state.control?.held || mode === "ready";
+  get("standby").disabled = !operable || !state.control?.held || mode !== "ready";
+  if (!state) return;
+  showVehicles(state);
+  showControl(state, authority, operable);
+  showStatus(state, Number.isFinite(link.age) ? link.age : 0);
+  map.update(state, live, link.token);
+  mission.update(state, operable);
+  showSystem(state);
+}
+
+/** Why nobody can drive from here now, in words; empty if one can. */
+function obstacle(live) {
+  if (!live) return "Not connected";
+  if (!trusted) return "Watching only: enter the token to drive";
+  if (!state.vehicle) return "No vehicle";
+  if (state.vehicle.emergency) return "Emergency: clear it before driving";
+  if (!state.control?.held) return "Take control before driving";
+  return "";
+}
+
+// What the operator wants.
+
+/** Sends a wish; shows a refusal, or what was done. */
+async function ask(wish, done) {
+  const reason = await link.ask(wish);
+  if (reason !== null) toast("bad", reason);
+  else if (done) toast("good", done);
+  return reason;
+}
+
+function choose(place) {
+  mission.choose(place);
+  select("mission");
+}
+
+get("control-button").addEventListener("click", () => {
+  const on = !(state?.control?.held || state?.control?.wanted);
+  ask({ type: "control", on });
+});
+get("resume").addEventListener("click", () => ask({ type: "resume" }));
+get("standby").addEventListener("click", () => ask({ type: "standby" }));
+get("vehicle-select").addEventListener("change", (event) => {
+  ask({ type: "select", subsystem: Number(event.target.value) });
+  event.target.blur();
+});
+
+// The token.
+
+const watching = () => sessionStorage.getItem("jaus-watch") === "yes";
+
+async function offer(token) {
+  const reason = await link.useToken(token);
+  trusted = reason === null;
+  show(get("token-sheet"), !trusted);
+  if (!trusted) {
+    say(get("token-text"), `The token was not taken: ${plain(reason, 200)}`);
+    get("token").focus();
+  }
+  render();
+}
+
+get("token-form").addEventListener("submit", (event) => {
+  event.preventDefault();
+  sessionStorage.removeItem("jaus-watch");
+  offer(get("token").value.trim());
+  get("token").value = "";
+});
+get("token-no").addEventListener("click", () => {
+  sessionStorage.setItem("jaus-watch", "yes");
+  show(get("token-sheet"), false);
+});
+get("control-text").addEventListener("click", () => {
+  if (!trusted && link.open) show(get("token-sheet"), true);
+});
+
+// Views of small screens, and keys.
+
+function select(view) {
+  const { body } = document;
+  body.dataset.view = view;
+  if (view === "system" || view === "messages") body.dataset.inspect = view;
+  for (const button of document.querySelectorAll("[data-show]")) {
+    mark(button, "aria-pressed", String(button.dataset.show === view));
+    button.classList.toggle("inspected", button.dataset.show === body.dataset.inspect);
+  }
+}
+for (const button of document.querySelectorAll("[data-show]")) {
+  button.addEventListener("click", () => select(button.dataset.show));
+}
+select("mission");
+
+addEventListener("keydown", (event) => {
+  if (emergency.key(event) || typing()) return;
+  if (drive.keyDown(event) || (!event.ctrlKey && !event.metaKey && !event.altKey && map.key(event.key))) event.preventDefault();
+});
+
+setInterval(render, 250);
+link.start();

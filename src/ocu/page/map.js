@@ -1,0 +1,434 @@
+// The map: raster, grid, trail, planned path, destination and vehicle on a canvas that is moved by
+// one finger, zoomed by two, and tapped to choose a destination. North (X) is up, east (Y) right.
+
+import { figure, get, list, mark, number, say, show } from "./dom.js";
+import { Raster } from "./raster.js";
+
+const SMALLEST_SCALE = 0.05;
+const LARGEST_SCALE = 400;
+const TRAIL = 2_000;
+/** A pointer that moves less, in pixels, taps. */
+const TAP = 9;
+
+export class MapView {
+  #canvas = get("map");
+  #context = this.#canvas.getContext("2d");
+  #raster = new Raster();
+  #camera = { x: 0, y: 0, scale: 24 };
+  #placed = false;
+  #following = true;
+  #pointers = new Map();
+  #tap = null;
+  #trail = [];
+  #path = [];
+  #over = false;
+  #pose = null;
+  #poseFresh = false;
+  #destination = null;
+  #draft = null;
+  #vehicle = null;
+  #drawn = 0;
+  #pick;
+  #colours = {};
+
+  /** Calls `pick` with {x, y} in metres when somebody taps a place. */
+  constructor(pick) {
+    this.#pick = pick;
+    new ResizeObserver(() => this.#resize()).observe(this.#canvas);
+    this.#listen();
+    this.recolour();
+  }
+
+  /** Takes a state, and whether it is live. */
+  update(state, live, token) {
+    const vehicle = state.vehicle;
+    if (vehicle?.subsystem !== this.#vehicle) {
+      this.#vehicle = vehicle?.subsystem;
+      this.#trail = [];
+      this.#placed = false;
+    }
+    const pose = vehicle?.pose;
+    const known = number(pose?.x) !== null && number(pose?.y) !== null;
+    this.#pose = known ? { x: pose.x, y: pose.y, yaw: number(pose.yaw) } : null;
+    this.#poseFresh = live && known && pose.age_ms < 1_000;
+    if (known) this.#extendTrail(pose);
+    const mission = state.mission;
+    this.#path = list(mission?.path).filter((p) => number(p?.[0]) !== null && number(p?.[1]) !== null);
+    this.#over = ["failed", "stopped", "idle"].includes(mission?.stage);
+    const [x, y] = list(mission?.destination);
+    this.#destination = number(x) !== null && number(y) !== null ? { x, y } : null;
+    this.#raster.update(state.map, token, () => this.#draw());
+    const empty = get("map-empty");
+    show(empty, !this.#raster.picture);
+    say(empty, this.#raster.problem || "Waiting for the map");
+    if (!this.#placed) this.#place();
+    else if (this.#following) this.#follow();
+    this.#draw();
+  }
+
+  /** The place that somebody chose and that no mission has yet, or null. */
+  set draft(place) {
+    this.#draft = place;
+    this.#draw();
+  }
+
+  /** Whether a place can be driven on, as far as the map knows: false, true, or null outside. */
+  passable(place) {
+    const value = this.#raster.at(place.x, place.y);
+    return value === null ? null : value > 0;
+  }
+
+  /** Reads the colours again, after the style has changed. */
+  recolour() {
+    const style = getComputedStyle(document.documentElement);
+    for (const name of ["ground", "grid", "grid-strong", "trail", "path", "destination", "vehicle", "vehicle-edge", "stale", "ink", "halo"]) {
+      this.#colours[name] = style.getPropertyValue(`--map-${name}`).trim();
+    }
+    this.#raster.paint(() => {});
+    this.#draw();
+  }
+
+  #extendTrail({ x, y }) {
+    const last = this.#trail.at(-1);
+    const far = last ? Math.hypot(x - last.x, y - last.y) : Infinity;
+    if (far < 0.1) return;
+    // A vehicle does not jump: its reckoning has begun anew.
+    if (last && far > 25) this.#trail = [];
+    this.#trail.push({ x, y });
+    if (this.#trail.length > TRAIL) this.#trail.splice(0, TRAIL / 4);
+  }
+
+  // Where things are.
+
+  get #size() {
+    return { width: this.#canvas.clientWidth, height: this.#canvas.clientHeight };
+  }
+
+  #toScreen({ x, y }) {
+    const { width, height } = this.#size;
+    const { x: north, y: east, scale } = this.#camera;
+    return [width / 2 + (y - east) * scale, height / 2 - (x - north) * scale];
+  }
+
+  #toWorld(px, py) {
+    const { width, height } = this.#size;
+    const { x, y, scale } = this.#camera;
+    return { x: x - (py - height / 2) / scale, y: y + (px - width / 2) / scale };
+  }
+
+  /** The first view: the whole map, or else the surroundings of the vehicle. */
+  #place() {
+    if (this.#raster.info) this.#showAll();
+    else if (this.#pose) Object.assign(this.#camera, { x: this.#pose.x, y: this.#pose.y, scale: 24 });
+    else return;
+    this.#placed = Boolean(this.#raster.info);
+  }
+
+  #showAll() {
+    const { width, height } = this.#size;
+    const info = this.#raster.info;
+    if (!info || !width || !height) return;
+    const [tall, wide] = [info.rows * info.cell_m, info.columns * info.cell_m];
+    this.#camera = {
+      x: info.x + tall / 2,
+      y: info.y + wide / 2,
+      scale: clampScale(Math.min((width - 48) / wide, (height - 48) / tall)),
+    };
+    this.#draw();
+  }
+
+  /** Keeps the vehicle in the middle half of the view. */
+  #follow() {
+    if (!this.#pose) return;
+    const { width, height } = this.#size;
+    const { scale } = this.#camera;
+    const [reachX, reachY] = [height / scale / 4, width / scale / 4];
+    this.#camera.x = clamp(this.#camera.x, this.#pose.x - reachX, this.#pose.x + reachX);
+    this.#camera.y = clamp(this.#camera.y, this.#pose.y - reachY, this.#pose.y + reachY);
+  }
+
+  #setFollowing(following) {
+    this.#following = following;
+    mark(get("follow"), "aria-pressed", String(following));
+    if (following && this.#pose) Object.assign(this.#camera, { x: this.#pose.x, y: this.#pose.y });
+    this.#draw();
+  }
+
+  /** Zooms about a place of the screen, which stays where it is. */
+  #zoom(factor, px = this.#size.width / 2, py = this.#size.height / 2) {
+    const fixed = this.#toWorld(px, py);
+    this.#camera.scale = clampScale(this.#camera.scale * factor);
+    const moved = this.#toWorld(px, py);
+    this.#camera.x += fixed.x - moved.x;
+    this.#camera.y += fixed.y - moved.y;
+    this.#draw();
+  }
+
+  // Fingers, mouse and keys.
+
+  #listen() {
+    const canvas = this.#canvas;
+    canvas.addEventListener("pointerdown", (event) => this.#pointerDown(event));
+    canvas.addEventListener("pointermove", (event) => this.#pointerMove(event));
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => this.#pointerUp(event));
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.#zoom(Math.exp(-clamp(event.deltaY, -100, 100) / 300), event.offsetX, event.offsetY);
+    }, { passive: false });
+    canvas.addEventListener("pointerleave", () => this.#readout(null));
+    get("zoom-in").addEventListener("click", () => this.#zoom(1.5));
+    get("zoom-out").addEventListener("click", () => this.#zoom(1 / 1.5));
+    get("zoom-all").addEventListener("click", () => {
+      this.#setFollowing(false);
+      this.#showAll();
+    });
+    get("follow").addEventListener("click", () => this.#setFollowing(!this.#following));
+  }
+
+  /** A key that nobody else wanted; true if it was for the map. */
+  key(key) {
+    switch (key) {
+      case "+": case "=": this.#zoom(1.5); return true;
+      case "-": this.#zoom(1 / 1.5); return true;
+      case "0": get("zoom-all").click(); return true;
+      case "f": this.#setFollowing(!this.#following); return true;
+    }
+    return false;
+  }
+
+  #pointerDown(event) {
+    if (event.button > 0) return;
+    this.#canvas.setPointerCapture(event.pointerId);
+    this.#pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
+    this.#tap = this.#pointers.size === 1 ? [event.offsetX, event.offsetY] : null;
+  }
+
+  #pointerMove(event) {
+    const to = [event.offsetX, event.offsetY];
+    this.#readout(this.#toWorld(...to));
+    const from = this.#pointers.get(event.pointerId);
+    if (!from) return;
+    if (this.#tap && Math.hypot(to[0] - this.#tap[0], to[1] - this.#tap[1]) < TAP) return;
+    this.#tap = null;
+    const before = spread([...this.#pointers.values()]);
+    this.#pointers.set(event.pointerId, to);
+    const after = spread([...this.#pointers.values()]);
+    this.#camera.x += (after.y - before.y) / this.#camera.scale;
+    this.#camera.y -= (after.x - before.x) / this.#camera.scale;
+    if (this.#following) this.#setFollowingOff();
+    if (before.size > 0 && after.size > 0) this.#zoom(after.size / before.size, after.x, after.y);
+    this.#draw();
+  }
+
+  #setFollowingOff() {
+    this.#following = false;
+    mark(get("follow"), "aria-pressed", "false");
+  }
+
+  #pointerUp(event) {
+    if (!this.#pointers.delete(event.pointerId)) return;
+    if (this.#tap && event.type === "pointerup") this.#pick(this.#toWorld(...this.#tap));
+    this.#tap = null;
+  }
+
+  #readout(place) {
+    const element = get("map-readout");
+    show(element, place !== null);
+    if (place) say(element, `N ${figure(place.x, 1)}  E ${figure(place.y, 1)} m`);
+  }
+
+  // Drawing.
+
+  #resize() {
+    const ratio = Math.min(devicePixelRatio || 1, 2);
+    const { width, height } = this.#size;
+    this.#canvas.width = Math.max(1, Math.round(width * ratio));
+    this.#canvas.height = Math.max(1, Math.round(height * ratio));
+    if (!this.#following || !this.#placed) this.#showAll();
+    this.#draw();
+  }
+
+  #draw() {
+    if (this.#drawn) return;
+    this.#drawn = requestAnimationFrame(() => {
+      this.#drawn = 0;
+      this.#paint();
+    });
+  }
+
+  #paint() {
+    const context = this.#context;
+    const { width, height } = this.#size;
+    const ratio = this.#canvas.width / Math.max(1, width);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.fillStyle = this.#colours.ground;
+    context.fillRect(0, 0, width, height);
+    this.#paintRaster();
+    this.#paintGrid(width, height);
+    context.globalAlpha = this.#over ? 0.4 : 1;
+    this.#paintLine(this.#path.map(([x, y]) => ({ x, y })), "path", 5, []);
+    context.globalAlpha = 1;
+    this.#paintLine(this.#trail, "trail", 3, [1, 6]);
+    if (this.#destination) this.#paintPin(this.#destination, true);
+    if (this.#draft) this.#paintPin(this.#draft, false);
+    if (this.#pose) this.#paintVehicle();
+    this.#paintScale(height);
+    this.#paintNorth(width);
+  }
+
+  #paintRaster() {
+    const { picture, info } = this.#raster;
+    if (!picture) return;
+    const [left, bottom] = this.#toScreen(info);
+    const { scale } = this.#camera;
+    const [wide, tall] = [info.columns * info.cell_m * scale, info.rows * info.cell_m * scale];
+    this.#context.imageSmoothingEnabled = info.cell_m * scale < 1;
+    this.#context.drawImage(picture, left, bottom - tall, wide, tall);
+    this.#context.strokeStyle = this.#colours["grid-strong"];
+    this.#context.lineWidth = 1.5;
+    this.#context.strokeRect(left, bottom - tall, wide, tall);
+  }
+
+  #paintGrid(width, height) {
+    const step = roundStep(44 / this.#camera.scale);
+    const [top, bottom] = [this.#toWorld(0, 0), this.#toWorld(width, height)];
+    const context = this.#context;
+    context.lineWidth = 1;
+    const line = (index, from, to) => {
+      context.strokeStyle = this.#colours[index % 5 === 0 ? "grid-strong" : "grid"];
+      context.beginPath();
+      context.moveTo(...from);
+      context.lineTo(...to);
+      context.stroke();
+    };
+    for (let index = Math.ceil(bottom.x / step); index * step <= top.x; index++) {
+      const y = Math.round(this.#toScreen({ x: index * step, y: 0 })[1]) + 0.5;
+      line(index, [0, y], [width, y]);
+    }
+    for (let index = Math.ceil(top.y / step); index * step <= bottom.y; index++) {
+      const x = Math.round(this.#toScreen({ x: 0, y: index * step })[0]) + 0.5;
+      line(index, [x, 0], [x, height]);
+    }
+  }
+
+  #paintLine(places, colour, width, dash) {
+    if (places.length < 2) return;
+    const context = this.#context;
+    context.lineJoin = context.lineCap = "round";
+    context.beginPath();
+    for (const place of places) context.lineTo(...this.#toScreen(place));
+    context.setLineDash([]);
+    if (!dash.length) {
+      context.strokeStyle = this.#colours.halo;
+      context.lineWidth = width + 4;
+      context.stroke();
+    }
+    context.setLineDash(dash);
+    context.strokeStyle = this.#colours[colour];
+    context.lineWidth = width;
+    context.stroke();
+    context.setLineDash([]);
+  }
+
+  /** A pin whose tip is the place: filled for the mission's, hollow for one that is only chosen. */
+  #paintPin(place, filled) {
+    const context = this.#context;
+    const [x, y] = this.#toScreen(place);
+    context.beginPath();
+    context.moveTo(x, y);
+    context.bezierCurveTo(x - 4, y - 12, x - 13, y - 16, x - 13, y - 26);
+    context.arc(x, y - 26, 13, Math.PI, 0);
+    context.bezierCurveTo(x + 13, y - 16, x + 4, y - 12, x, y);
+    context.fillStyle = filled ? this.#colours.destination : this.#colours.halo;
+    context.strokeStyle = filled ? this.#colours.halo : this.#colours.destination;
+    context.lineWidth = filled ? 2 : 3.5;
+    context.fill();
+    context.stroke();
+    context.beginPath();
+    context.arc(x, y - 26, 5, 0, 2 * Math.PI);
+    context.fillStyle = filled ? this.#colours.halo : this.#colours.destination;
+    context.fill();
+  }
+
+  #paintVehicle() {
+    const context = this.#context;
+    context.save();
+    context.translate(...this.#toScreen(this.#pose));
+    context.beginPath();
+    if (this.#pose.yaw === null) {
+      context.arc(0, 0, 11, 0, 2 * Math.PI);
+    } else {
+      context.rotate(this.#pose.yaw);
+      context.moveTo(0, -21);
+      context.lineTo(14, 15);
+      context.lineTo(0, 8);
+      context.lineTo(-14, 15);
+      context.closePath();
+    }
+    context.lineJoin = "round";
+    context.lineWidth = 3;
+    context.fillStyle = this.#poseFresh ? this.#colours.vehicle : this.#colours.stale;
+    context.strokeStyle = this.#colours["vehicle-edge"];
+    context.fill();
+    context.stroke();
+    context.restore();
+  }
+
+  #paintScale(height) {
+    const context = this.#context;
+    const length = roundStep(70 / this.#camera.scale);
+    const [x, y, wide] = [16, height - 18, length * this.#camera.scale];
+    const bar = () => {
+      context.beginPath();
+      context.moveTo(x, y - 7);
+      context.lineTo(x, y);
+      context.lineTo(x + wide, y);
+      context.lineTo(x + wide, y - 7);
+      context.stroke();
+    };
+    const label = length >= 1000 ? `${length / 1000} km` : length >= 1 ? `${length} m` : `${length * 100} cm`;
+    context.font = "600 14px system-ui, sans-serif";
+    context.textAlign = "left";
+    context.lineCap = context.lineJoin = "round";
+    [context.strokeStyle, context.lineWidth] = [this.#colours.halo, 6];
+    bar();
+    context.lineWidth = 4;
+    context.strokeText(label, x + 6, y - 7);
+    [context.strokeStyle, context.lineWidth, context.fillStyle] = [this.#colours.ink, 2, this.#colours.ink];
+    bar();
+    context.fillText(label, x + 6, y - 7);
+  }
+
+  #paintNorth(width) {
+    const context = this.#context;
+    const x = width / 2;
+    context.font = "700 14px system-ui, sans-serif";
+    context.textAlign = "center";
+    [context.strokeStyle, context.lineWidth, context.fillStyle] = [this.#colours.halo, 4, this.#colours.ink];
+    context.strokeText("N", x, 28);
+    context.fillText("N", x, 28);
+    context.beginPath();
+    context.moveTo(x, 4);
+    context.lineTo(x + 6, 14);
+    context.lineTo(x - 6, 14);
+    context.closePath();
+    context.fill();
+  }
+}
+
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+const clampScale = (scale) => clamp(scale, SMALLEST_SCALE, LARGEST_SCALE);
+
+/** The middle of pointers, and how far apart they are (0 for one). */
+function spread(places) {
+  const x = places.reduce((sum, place) => sum + place[0], 0) / places.length;
+  const y = places.reduce((sum, place) => sum + place[1], 0) / places.length;
+  const size = places.length > 1 ? Math.hypot(places[0][0] - places[1][0], places[0][1] - places[1][1]) : 0;
+  return { x, y, size };
+}
+
+/** The next of 1, 2, 5 times a power of ten. */
+function roundStep(least) {
+  const power = 10 ** Math.floor(Math.log10(least));
+  return [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= least * 0.999);
+}

@@ -1,0 +1,155 @@
+// The mission: its stages one after the other as the waterfall has them, progress, attempts and
+// reasons; choosing a destination, approving and stopping.
+
+import { figure, get, make, mark, number, plain, say, show, words } from "./dom.js";
+
+/** The stages as the protocol and as people name them. */
+const STAGES = [
+  ["map", "Map"],
+  ["planning", "Planning"],
+  ["awaiting_approval", "Approval"],
+  ["path", "Path"],
+  ["vector", "Vector"],
+  ["primitive", "Primitive"],
+  ["driving", "Driving"],
+  ["arrived", "Arrived"],
+];
+const OVER = ["idle", "arrived", "failed", "stopped"];
+
+export class Mission {
+  #ask;
+  #map;
+  #stages = new Map();
+  #mission = null;
+  #furthest = { mission: null, index: -1 };
+  #operable = false;
+
+  /** `ask` sends a wish and reports what is refused; `map` shows the chosen place. */
+  constructor(ask, map) {
+    this.#ask = ask;
+    this.#map = map;
+    for (const [key, name] of STAGES) {
+      const item = make("li", { "data-state": "ahead" }, make("span", { className: "stage-mark", "aria-hidden": "true" }), make("span", { className: "stage-name" }, name), make("span", { className: "visually-hidden" }));
+      this.#stages.set(key, item);
+    }
+    get("stages").append(...this.#stages.values());
+    get("approve").addEventListener("click", () => this.#ask({ type: "approve", mission: this.#mission?.mission }, "Mission approved"));
+    get("stop").addEventListener("click", () => this.#ask({ type: "stop" }, "Mission stopped"));
+    const form = get("destination");
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#plan();
+    });
+    form.addEventListener("input", () => this.#draft(this.#place()));
+  }
+
+  /** A place that somebody tapped. */
+  choose({ x, y }) {
+    get("destination-x").value = x.toFixed(2);
+    get("destination-y").value = y.toFixed(2);
+    this.#draft({ x, y });
+  }
+
+  /** Shows the place that is chosen but not planned yet. */
+  #draft(place) {
+    this.#map.draft = place;
+    mark(document.body, "data-draft", place ? "yes" : null);
+    this.#hint(place);
+  }
+
+  /** Whether there is an approval that waits for the operator. */
+  get waits() {
+    return this.#mission?.stage === "awaiting_approval";
+  }
+
+  update(state, operable) {
+    const mission = state.mission && typeof state.mission === "object" ? state.mission : null;
+    this.#mission = mission;
+    this.#operable = operable;
+    const stage = plain(mission?.stage ?? "idle", 30);
+    this.#showStages(mission, stage);
+    this.#showLine(mission, stage);
+    const progress = mission ? Math.round(Math.min(100, Math.max(0, number(mission.progress) ?? 0))) : 0;
+    mark(get("progress"), "aria-valuenow", progress);
+    mark(get("progress"), "data-state", stage);
+    get("progress-bar").style.transform = `scaleX(${progress / 100})`;
+    const attempts = number(mission?.attempts) ?? 0;
+    show(get("attempt"), attempts > 0 && !OVER.includes(stage));
+    say(get("attempt"), `Attempt ${number(mission?.attempt) ?? 0} of ${attempts}`);
+    get("approve").disabled = !operable || !this.waits;
+    get("stop").disabled = !operable || !mission || OVER.includes(stage);
+    get("plan").disabled = !operable;
+    document.body.dataset.mission = OVER.includes(stage) ? "over" : "under-way";
+  }
+
+  #showStages(mission, stage) {
+    const index = STAGES.findIndex(([key]) => key === stage);
+    if (this.#furthest.mission !== (mission?.mission ?? null)) this.#furthest = { mission: mission?.mission ?? null, index: -1 };
+    // A mission that ended does not say where: it was where it was seen last.
+    if (index >= 0) this.#furthest.index = index;
+    const reached = index >= 0 ? index : stage === "idle" ? -1 : this.#furthest.index;
+    const ended = { failed: "failed", stopped: "stopped" }[stage];
+    STAGES.forEach(([key, name], position) => {
+      let how = position < reached ? "done" : position > reached ? "ahead" : "active";
+      if (position === reached && ended) how = ended;
+      if (position === reached && stage === "arrived") how = "done";
+      if (position === reached && stage === "awaiting_approval") how = "waiting";
+      const item = this.#stages.get(key);
+      mark(item, "data-state", how);
+      mark(item, "aria-current", how === "active" || how === "waiting" ? "step" : null);
+      say(item.lastChild, `: ${how}`);
+      item.title = name;
+    });
+  }
+
+  #showLine(mission, stage) {
+    const line = get("mission-line");
+    mark(line, "data-state", stage);
+    if (!mission || stage === "idle") return say(line, plain(mission?.reason, 255) || "No mission");
+    const what = {
+      map: "Asking for the map",
+      planning: "Looking for a way",
+      awaiting_approval: "A route is planned: approve it to drive",
+      path: "Handing the path to the path driver",
+      vector: "The path driver engages the vector driver",
+      primitive: "The vector driver engages the primitive driver",
+      driving: "Driving",
+      arrived: "Arrived",
+      failed: "Failed",
+      stopped: "Stopped",
+    }[stage] ?? words(stage);
+    const left = number(mission.remaining_m);
+    const far = left !== null && !OVER.includes(stage) ? `, ${figure(left, 1)} m to go` : "";
+    const reason = plain(mission.reason, 255);
+    say(line, `${what}${far}${reason ? `: ${reason}` : ""}`);
+  }
+
+  #place() {
+    const [x, y] = ["destination-x", "destination-y"].map((id) => get(id).valueAsNumber);
+    return Number.isFinite(x) && Number.isFinite(y) ? { x, y } : null;
+  }
+
+  #hint(place) {
+    const passable = place && this.#map.passable(place);
+    const text = !place
+      ? "Tap the map, or type metres north and east of the origin."
+      : passable === null
+        ? "This place is outside the map."
+        : passable === false
+          ? "The map says that this place is blocked."
+          : "Plan a route to look at it before anything moves.";
+    say(get("destination-hint"), text);
+    mark(get("destination-hint"), "data-warn", place && !passable ? "yes" : null);
+  }
+
+  async #plan() {
+    const place = this.#place();
+    if (!place || !this.#operable) return;
+    const speed = get("destination-speed").valueAsNumber;
+    const wish = { type: "destination", ...place, ...(Number.isFinite(speed) ? { speed } : {}) };
+    if ((await this.#ask(wish, "Planning a route")) === null) {
+      this.#draft(null);
+    }
+  }
+}
+

@@ -1,0 +1,53 @@
+//! The operator's page: plain HTML, CSS and JavaScript modules, embedded in the binary. Nothing of
+//! it is built, and nothing is loaded from elsewhere, so that it works on a vehicle's own network
+//! without the Internet, and so that the browser can be told to run nothing else.
+
+/// One file of the page.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct File {
+    /// Where the server offers it, `/` first.
+    pub(crate) path: &'static str,
+    /// Its media type, as the server must say it.
+    pub(crate) content_type: &'static str,
+    /// What it holds.
+    pub(crate) body: &'static str,
+}
+
+/// What the browser may do with the page, as the header `Content-Security-Policy`: run its scripts
+/// and talk to the server that it came from, nothing else; not even styles or handlers written
+/// into the document, so that a name from the network can never become a program.
+pub(crate) const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
+    img-src 'self'; connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; \
+    frame-ancestors 'none'";
+
+const HTML: &str = "text/html; charset=utf-8";
+const CSS: &str = "text/css; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const IMAGE: &str = "image/svg+xml";
+
+macro_rules! files {
+    ($($path:literal $content_type:ident $file:literal,)*) => {
+        &[$(File { path: $path, content_type: $content_type, body: include_str!($file) },)*]
+    };
+}
+
+/// All files of the page.
+pub(crate) const FILES: &[File] = files! {
+    "/" HTML "index.html",
+    "/style.css" CSS "style.css",
+    "/panels.css" CSS "panels.css",
+    "/icon.svg" IMAGE "icon.svg",
+    "/main.js" SCRIPT "main.js",
+    "/dom.js" SCRIPT "dom.js",
+    "/link.js" SCRIPT "link.js",
+    "/status.js" SCRIPT "status.js",
+    "/map.js" SCRIPT "map.js",
+    "/raster.js" SCRIPT "raster.js",
+    "/mission.js" SCRIPT "mission.js",
+    "/drive.js" SCRIPT "drive.js",
+    "/gamepad.js" SCRIPT "gamepad.js",
+    "/emergency.js" SCRIPT "emergency.js",
+    "/theme.js" SCRIPT "theme.js",
+    "/tree.js" SCRIPT "tree.js",
+    "/messages.js" SCRIPT "messages.js",
+};

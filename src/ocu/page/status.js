@@ -1,0 +1,112 @@
+// The top bar and the status panel: which vehicle, how good the connection is, who is in control,
+// and how the vehicle moves.
+
+import { duration, figure, get, list, make, mark, number, plain, say, show, words } from "./dom.js";
+
+const FRESH = 1_000;
+
+/** The part of a role, or undefined. */
+export const part = (state, role) => list(state?.vehicle?.parts, 64).find((one) => one?.role === role);
+
+/** Shows how good the connection is, everywhere that it matters. */
+export function showLink(link, state) {
+  const condition = link.condition;
+  document.body.dataset.link = condition;
+  const age = Number.isFinite(link.age) ? duration(link.age) : "";
+  const [word, detail] = {
+    connecting: ["Connecting", ""],
+    live: ["Live", ""],
+    stale: ["Stale", age],
+    lost: ["Reconnecting", link.retryIn > 950 ? `in ${Math.ceil(link.retryIn / 1000)} s` : "now"],
+  }[condition];
+  say(get("link-word"), word);
+  say(get("link-detail"), detail);
+  const banner = get("banner");
+  const text = {
+    stale: `No news for ${age}: what you see is old.`,
+    lost: state ? `No connection: what you see is ${age} old.` : "No connection to the operator's node.",
+  }[condition];
+  show(banner, Boolean(text));
+  if (text) say(banner, text);
+}
+
+/** Shows the vehicles that there are, and which one is operated. */
+export function showVehicles(state) {
+  const select = get("vehicle-select");
+  const vehicles = list(state.tree, 64).filter((one) => one?.kind === "vehicle" && number(one.subsystem) !== null);
+  const chosen = number(state.vehicle?.subsystem);
+  if (chosen !== null && !vehicles.some((one) => one.subsystem === chosen)) vehicles.unshift(state.vehicle);
+  const key = JSON.stringify([chosen, vehicles.map((one) => [one.subsystem, one.name])]);
+  if (select.dataset.key === key || document.activeElement === select) return;
+  select.dataset.key = key;
+  const options = vehicles.map((one) =>
+    make("option", { value: one.subsystem }, `${plain(one.name, 40) || "Vehicle"} · ${one.subsystem}`));
+  select.replaceChildren(...(options.length ? options : [make("option", {}, "No vehicle found")]));
+  if (chosen !== null) select.value = String(chosen);
+  select.disabled = !options.length;
+}
+
+/** Shows who controls, and offers to take or release control. */
+export function showControl(state, authority, operable) {
+  const { held, wanted, reason } = state.control ?? {};
+  const driver = part(state, "primitive_driver");
+  const [word, detail] = held
+    ? ["You have control", number(authority) === null ? "" : `authority ${authority}`]
+    : wanted
+      ? ["Taking control", plain(reason)]
+      : ["Not in control", plain(reason) || holder(driver)];
+  say(get("control-word"), word);
+  say(get("control-detail"), detail);
+  document.body.dataset.control = held ? "held" : wanted ? "wanted" : "none";
+  const button = get("control-button");
+  say(button, held || wanted ? "Release" : "Take control");
+  button.classList.toggle("primary", !held && !wanted);
+  button.disabled = !operable;
+}
+
+function holder(driver) {
+  if (!driver) return "";
+  return driver.controller ? `${plain(driver.controller, 16)} drives` : "nobody drives";
+}
+
+/** Shows state, velocity and pose; what is old is said to be. `late` is the age of the state itself. */
+export function showStatus(state, late) {
+  const { vehicle } = state;
+  const driver = part(state, "primitive_driver");
+  const mode = vehicle?.emergency ? "emergency" : driver?.state;
+  const box = get("state");
+  mark(box, "data-state", mode ? plain(mode, 20) : "unknown");
+  say(get("state-word"), mode ? words(mode) : vehicle ? "Unknown" : "No vehicle");
+  say(get("state-detail"), driver ? authority(driver) : vehicle ? "no primitive driver" : "");
+  const [pose, velocity] = [vehicle?.pose, vehicle?.velocity];
+  fill("speed", velocity?.x, 2, velocity, late);
+  fill("turn-rate", degrees(velocity?.yaw_rate), 0, velocity, late);
+  fill("heading", bearing(pose?.yaw), 0, pose, late);
+  fill("north", pose?.x, 2, pose, late);
+  fill("east", pose?.y, 2, pose, late);
+  const ages = [["pose", pose], ["velocity", velocity]].filter(([, one]) => number(one?.age_ms) !== null);
+  const old = ages.filter(([, one]) => one.age_ms + late > FRESH);
+  say(get("state-old"), old.map(([name, one]) => `${name} ${duration(one.age_ms + late)} old`).join(", "));
+}
+
+/** Who commands a part, in words. */
+export function authority({ ours, controller, authority: level }) {
+  if (!ours && !controller) return "control: nobody";
+  const by = number(level) !== null ? ` (${level})` : "";
+  return `control: ${ours ? "you" : plain(controller, 16)}${by}`;
+}
+
+function fill(id, value, decimals, source, late) {
+  const element = get(id);
+  say(element, figure(value, decimals));
+  const old = number(value) === null || (number(source?.age_ms) ?? 0) + late > FRESH;
+  mark(element.closest("div"), "data-old", old ? "yes" : null);
+}
+
+const degrees = (value) => (number(value) === null ? null : (value * 180) / Math.PI);
+
+/** A yaw as a compass shows it: 0 to 359. */
+function bearing(yaw) {
+  const value = degrees(yaw);
+  return value === null ? null : Math.round(((value % 360) + 360) % 360) % 360;
+}

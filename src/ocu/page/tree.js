@@ -1,0 +1,130 @@
+// The tree of subsystems, nodes, components and services, kept up to date in place so that what
+// is folded stays folded; and the vehicle's parts with their states.
+
+import { get, list, make, mark, number, plain, say, show, words } from "./dom.js";
+import { authority } from "./status.js";
+
+const PERIOD = 400;
+let shown = 0;
+
+/** Shows the tree of a state; not more often than anybody can read. */
+export function showSystem(state, urgent) {
+  const now = performance.now();
+  if (!urgent && now - shown < PERIOD) return;
+  shown = now;
+  const subsystems = list(state.tree, 256);
+  const counts = { nodes: 0, components: 0 };
+  update(get("tree"), subsystems.map((one) => subsystem(one, counts)));
+  say(get("system-count"), `${counts.components} components on ${counts.nodes} nodes`);
+  showParts(list(state.vehicle?.parts, 64));
+}
+
+// What the tree is to be: branches with key, title, badge and children.
+
+function subsystem(one, counts) {
+  const nodes = list(one?.nodes, 255);
+  counts.nodes += nodes.length;
+  return {
+    key: `s${plain(one?.subsystem, 8)}`,
+    id: plain(one?.subsystem, 8),
+    title: plain(one?.name, 60) || words(one?.kind ?? "subsystem"),
+    note: one?.kind ? words(one.kind) : "",
+    open: true,
+    children: nodes.map((n) => node(n, one?.subsystem, counts)),
+  };
+}
+
+function node(one, subsystem, counts) {
+  const components = list(one?.components, 255);
+  counts.components += components.length;
+  return {
+    key: `n${plain(one?.node, 8)}`,
+    id: `${plain(subsystem, 8)}.${plain(one?.node, 8)}`,
+    title: plain(one?.name, 60) || "Node",
+    note: "",
+    open: true,
+    children: components.map(component),
+  };
+}
+
+function component(one) {
+  const services = list(one?.services, 255);
+  return {
+    key: `c${plain(one?.id, 16)}`,
+    id: plain(one?.id, 16),
+    title: plain(one?.name, 60) || "Component",
+    note: `${services.length}`,
+    open: false,
+    children: services.map((service, index) => {
+      const urn = plain(service?.urn, 160);
+      return {
+        key: `v${index}${urn}`,
+        id: plain(service?.version, 8),
+        title: urn.split(":").at(-1) || "Service",
+        note: urn.split(":").slice(0, -1).join(":"),
+        children: null,
+      };
+    }),
+  };
+}
+
+/** Makes the children of an element what the branches say, reusing those with the same key. */
+function update(parent, branches) {
+  const old = new Map([...parent.children].filter((child) => child.dataset.key).map((child) => [child.dataset.key, child]));
+  let place = parent.querySelector(":scope > [data-key]");
+  for (const branch of branches) {
+    const element = old.get(branch.key) ?? create(branch);
+    old.delete(branch.key);
+    if (element === place) place = place.nextElementSibling;
+    else parent.insertBefore(element, place);
+    const head = branch.children ? element.firstChild : element;
+    const [id, title, note] = head.children;
+    say(id, branch.id);
+    say(title, branch.title);
+    say(note, branch.note);
+    if (branch.children) update(element, branch.children);
+  }
+  for (const gone of old.values()) gone.remove();
+}
+
+function create(branch) {
+  const line = [
+    make("code", { className: "tree-id" }),
+    make("bdi", { className: "tree-title" }),
+    make("bdi", { className: "tree-note" }),
+  ];
+  if (!branch.children) {
+    const leaf = make("div", { className: "leaf" }, ...line);
+    leaf.dataset.key = branch.key;
+    return leaf;
+  }
+  const element = make("details", {}, make("summary", {}, ...line));
+  element.dataset.key = branch.key;
+  element.open = branch.open;
+  return element;
+}
+
+function showParts(parts) {
+  const area = get("parts");
+  show(area, parts.length > 0);
+  const old = new Map([...area.children].map((child) => [child.dataset.key, child]));
+  for (const part of parts) {
+    const key = plain(part?.id, 16);
+    let row = old.get(key);
+    old.delete(key);
+    if (!row) {
+      row = make("div", { className: "part" }, make("span", { className: "dot", "aria-hidden": "true" }), make("b"), make("span", { className: "part-state" }), make("small"));
+      row.dataset.key = key;
+      area.append(row);
+    }
+    const [, name, mode, detail] = row.children;
+    mark(row, "data-state", plain(part?.state ?? "unknown", 20));
+    mark(row, "data-old", (number(part?.age_ms) ?? 0) > 3_000 ? "yes" : null);
+    say(name, words(part?.role ?? part?.id));
+    say(mode, words(part?.state ?? "unknown"));
+    const stage = part?.stage?.state ? ` · ${words(part.stage.state).toLowerCase()}` : "";
+    const reason = plain(part?.stage?.reason, 160);
+    say(detail, `${key} · ${authority(part ?? {})}${stage}${reason ? `: ${reason}` : ""}`);
+  }
+  for (const gone of old.values()) gone.remove();
+}
