@@ -36,7 +36,10 @@ pub struct Topic {
 
 impl Topic {
     /// Whether the wire can carry what is asked for.
-    pub(crate) fn check(&self) -> Result<(), CannotSubscribe> {
+    ///
+    /// # Errors
+    /// What can not be, as [`Stack::subscribe`](crate::service::Stack::subscribe) would say.
+    pub fn check(&self) -> Result<(), CannotSubscribe> {
         create_event(self, 0)?.encode()?;
         Ok(())
     }
