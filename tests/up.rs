@@ -375,6 +375,10 @@ fn what_is_wrong_is_told_before_anything_starts() {
             assert!(run.stderr.contains(part), "{part}: {}", run.stderr);
         }
     }
+    folder.system("# Two.\n[parts.a]\nprogram = \"sh\"\n[parts.b]\nprogram = \"jaus\"\narguments = [\"node\"]\nflags = { prot = 1 }\n");
+    let flag = told(&["--check"]);
+    let wrong = format!("jaus: {file}:4: [parts.b]: unexpected argument '--prot' found; tip: ");
+    assert!(flag.status == 2 && flag.stderr.contains(&wrong), "{flag:?}");
     let missing = run(&["up", "/no/such.toml"], b"");
     assert!(
         missing.status == 2 && missing.stderr.contains("/no/such.toml: "),

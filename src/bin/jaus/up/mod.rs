@@ -1,5 +1,6 @@
 //! `jaus up`: a whole system as processes of one machine.
 
+mod check;
 mod child;
 mod console;
 pub(crate) mod leash;
@@ -15,11 +16,10 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::cli::failure::{Failure, Outcome};
-use jaus::cli::output::Output;
 use jaus::cli::runtime;
 
 use programs::Programs;
-use system::{Part, System};
+use system::System;
 
 /// Start a whole system from a file, keep it running, and stop it cleanly
 ///
@@ -93,41 +93,8 @@ impl Up {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         let system = System::read(&self.file, &Programs::usual())?.only(&self.only)?;
         if self.check {
-            return tell(&system);
+            return check::check(&self.file, &system);
         }
         runtime::run(run::run(self, system))
     }
-}
-
-/// Says what would be started.
-fn tell(system: &System) -> Result<Outcome, Failure> {
-    let mut output = Output::new();
-    for part in &system.parts {
-        output.line(format_args!("{}: {}", part.name, command_line(part)))?;
-        if let Some(directory) = &part.directory {
-            output.line(format_args!("    in {}", directory.display()))?;
-        }
-        for (name, value) in &part.environment {
-            output.line(format_args!("    with {name}={value}"))?;
-        }
-    }
-    output.line(format_args!(
-        "{} parts, nothing is wrong",
-        system.parts.len()
-    ))?;
-    Ok(Outcome::Done)
-}
-
-/// The command as one would type it.
-fn command_line(part: &Part) -> String {
-    let program = part.program.display().to_string();
-    let words = std::iter::once(&program).chain(&part.arguments);
-    let quoted = words.map(|word| {
-        let plain = |c: char| c.is_alphanumeric() || "-_=./:,@+%".contains(c);
-        match !word.is_empty() && word.chars().all(plain) {
-            true => word.clone(),
-            false => format!("'{}'", word.replace('\'', "'\\''")),
-        }
-    });
-    quoted.collect::<Vec<_>>().join(" ")
 }

@@ -10,13 +10,13 @@ use jaus::cli::failure::{Failure, Outcome};
 use nix::sys::signal::Signal;
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::Up;
 use super::child::Child;
 use super::console::{Console, Voice};
 use super::status::{self, StatusFile, in_words};
 use super::supervisor::{Exit, News, Order, Supervisor};
 use super::system::{OURSELVES, System};
 use super::warden::Guard;
+use super::{Up, check};
 
 /// Runs a system to its end.
 pub(super) async fn run(flags: &Up, system: System) -> Result<Outcome, Failure> {
@@ -28,7 +28,8 @@ pub(super) async fn run(flags: &Up, system: System) -> Result<Outcome, Failure> 
     let mut running = Running::new(flags, system, &console)?;
     drop(console);
     let parts = running.system.parts.len();
-    running.say(&format!("{parts} parts; Ctrl-C ends them"));
+    let words = check::parts_in_words(parts);
+    running.say(&format!("{parts} {words}; Ctrl-C ends all"));
     loop {
         running.settle();
         if running.supervisor.is_over() {

@@ -30,6 +30,8 @@ pub(super) struct Part {
     /// Where it runs; made when it does not exist.
     pub(super) directory: Option<PathBuf>,
     pub(super) restart: Restart,
+    /// The line of the file on which it begins.
+    pub(super) line: usize,
 }
 
 /// Whether a part that has ended is started again.
@@ -193,6 +195,8 @@ impl Reader<'_> {
         all: &Common,
     ) -> Option<Part> {
         self.check_keys(entry, &PART, &format!("parts.{name}."));
+        let before = self.text.get(..place.start).unwrap_or_default();
+        let line = before.matches('\n').count() + 1;
         let mut common = all.clone();
         self.common(entry, &mut common);
         let mut arguments = Vec::new();
@@ -219,6 +223,7 @@ impl Reader<'_> {
             environment: common.environment.into_iter().collect(),
             directory: common.directory,
             restart: common.restart,
+            line,
         })
     }
 
