@@ -14,6 +14,8 @@
 //! `endpoint` downwards nothing opens a socket or reads a clock.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "ground")]
+pub mod actuator;
 pub mod address;
 #[cfg(feature = "cli")]
 pub mod cli;

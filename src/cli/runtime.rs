@@ -72,6 +72,14 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 
 const MOST: Duration = Duration::from_secs(365 * 86_400);
 
+/// A flag's number between two bounds.
+pub fn between(text: &str, least: f64, most: f64) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (least..=most).contains(&number) => Ok(number),
+        _ => Err(format!("write a number from {least} to {most}")),
+    }
+}
+
 /// The time since a command began, printed as `  12.34 s`.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock(Instant);

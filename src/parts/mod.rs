@@ -5,11 +5,24 @@
 //! until it is dropped. Parts find each other by discovery alone, in any order of start, and go on
 //! when another one is started again.
 
+mod drivers;
+mod pose_file;
+mod pose_sensor;
+mod primitive_driver;
+mod velocity_sensor;
+
 use std::convert::Infallible;
 use std::future::Future;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use crate::component::{self, Builder, Component, Kind};
 use crate::node::{Node, Port};
+
+pub use pose_sensor::PoseSensor;
+#[cfg(all(feature = "gpio", target_os = "linux"))]
+pub use primitive_driver::GpioMotors;
+pub use primitive_driver::{Motors, PrimitiveDriver};
+pub use velocity_sensor::VelocitySensor;
 
 /// A ready component: what it is to do, not yet running.
 pub trait Part: Send + 'static {
@@ -50,4 +63,14 @@ pub enum PartError {
     /// What it needs is not there, or is broken: what is wrong and what to do, for people.
     #[error("{0}")]
     Broken(String),
+}
+
+/// The time since the beginning of 1970; 0 on a computer whose clock is before that.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "parts run in real time, and their reports carry the time of day"
+)]
+fn time_of_day() -> Duration {
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+    since_1970.unwrap_or_default()
 }

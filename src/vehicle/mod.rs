@@ -52,9 +52,11 @@
 mod curve;
 mod frame;
 mod motion;
+mod observed;
 mod pilot;
 mod platform;
 mod random;
+mod reckoning;
 mod skid_steer;
 mod steering;
 
@@ -64,7 +66,11 @@ mod tests;
 pub use curve::Curve;
 pub use frame::{Frame, GlobalPose};
 pub use motion::{Acceleration, Motion, Pose, Velocity, wrap};
+pub use observed::Observed;
 pub use pilot::{Goal, Pilot, Ticket};
 pub use platform::{Drive, Effort, Limits, Platform};
+#[cfg(feature = "ground")]
+pub(crate) use random::Random;
+pub use reckoning::{DeadReckoning, Gone, Speedometer, WheelCount};
 pub use skid_steer::{SkidSteer, SkidSteerConfig};
 pub use steering::Waypoint;

@@ -99,11 +99,13 @@ impl Velocity {
         }
     }
 
-    /// Whether this is as good as standing still: below 1 mm/s and 1 mrad/s.
+    /// Whether this is as good as standing still: below 1 mm/s and 1 mrad/s. So is what is not known
+    /// (NaN).
     #[must_use]
     pub fn is_rest(&self) -> bool {
         let all = [self.x, self.y, self.z, self.roll, self.pitch, self.yaw];
-        all.iter().all(|value| value.abs() < 0.001)
+        all.iter()
+            .all(|value| value.is_nan() || value.abs() < 0.001)
     }
 }
 

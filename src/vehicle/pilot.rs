@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::steering::{along, towards, turn_rate};
+use super::steering::{towards, turn_rate};
 use super::{
     Curve, Drive, Effort, Frame, GlobalPose, Limits, Motion, Platform, Pose, Velocity, Waypoint,
     wrap,
@@ -63,6 +63,15 @@ pub struct Pilot {
     tickets: u64,
     steps: u64,
     time: Option<Instant>,
+    /// How long a goal is pursued that nobody sets again.
+    patience: Option<Duration>,
+    left_alone: bool,
+}
+
+/// What a course wants of the platform.
+enum Wish {
+    Drive(Drive),
+    Head { heading: f64, speed: f64 },
 }
 
 /// A goal that is pursued.
@@ -70,6 +79,8 @@ pub struct Pilot {
 struct Course {
     goal: Goal,
     ticket: Ticket,
+    /// When it was set, once that is known.
+    since: Option<Instant>,
     has_arrived: bool,
     /// Whether it is at its waypoint, and only turns.
     is_turning: bool,
@@ -99,7 +110,17 @@ impl Pilot {
             tickets: 0,
             steps: 0,
             time: None,
+            patience: None,
+            left_alone: false,
         }
+    }
+
+    /// Gives a goal up, and stops, when it has not been set again for so long: whoever commands has
+    /// to go on saying so.
+    #[must_use]
+    pub const fn give_up_after(mut self, patience: Duration) -> Self {
+        self.patience = Some(patience);
+        self
     }
 
     /// It is `now`. May be called as often as one likes.
@@ -119,6 +140,7 @@ impl Pilot {
         while time + Self::STEP <= now {
             time += Self::STEP;
             self.steps += 1;
+            self.note_silence(time);
             self.control();
             self.platform.handle_time(time);
         }
@@ -131,6 +153,7 @@ impl Pilot {
     /// Pursues another goal from now on, instead of any earlier one.
     pub fn pursue(&mut self, goal: Goal) -> Ticket {
         self.tickets += 1;
+        self.left_alone = false;
         let ticket = Ticket(self.tickets);
         let ahead = match &goal {
             Goal::Path { curve, .. } => self.ahead_on(curve),
@@ -139,6 +162,7 @@ impl Pilot {
         self.course = Some(Course {
             goal,
             ticket,
+            since: self.time,
             has_arrived: false,
             is_turning: false,
             ahead,
@@ -158,6 +182,32 @@ impl Pilot {
             points.drain(..index);
         }
         points
+    }
+
+    /// Whether there is a goal that has not been reached.
+    #[must_use]
+    pub fn is_under_way(&self) -> bool {
+        let course = self.course.as_ref();
+        course.is_some_and(|course| !course.has_arrived)
+    }
+
+    /// Whether the last goal was [given up](Self::give_up_after) because nobody set it again.
+    #[must_use]
+    pub const fn was_left_alone(&self) -> bool {
+        self.left_alone
+    }
+
+    /// Gives up a goal that has not been set again for too long.
+    fn note_silence(&mut self, time: Instant) {
+        let since = self.course.as_ref().and_then(|course| course.since);
+        let Some((since, patience)) = since.zip(self.patience) else {
+            return;
+        };
+        if time.saturating_duration_since(since) > patience {
+            tracing::info!(?patience, "stopped: nobody has said to go on");
+            self.left_alone = true;
+            self.course = None;
+        }
     }
 
     /// Gives up whatever goal there is, and stops.
@@ -284,11 +334,17 @@ impl Pilot {
     fn control(&mut self) {
         let pose = self.motion().pose;
         let limits = self.limits;
-        let command = match &mut self.course {
+        let wish = match &mut self.course {
             Some(course) => course.command(&pose, &limits),
-            None => Drive::Stop,
+            None => Wish::Drive(Drive::Stop),
         };
-        self.drive(command);
+        match wish {
+            Wish::Drive(command) => self.drive(command),
+            Wish::Head { heading, speed } => {
+                self.command = Drive::Velocity(Velocity::forward(speed, 0.0));
+                self.platform.head(heading, speed, &limits);
+            }
+        }
     }
 
     fn drive(&mut self, command: Drive) {
@@ -300,6 +356,11 @@ impl Pilot {
     }
 }
 
+fn head_for(pose: &Pose, to: (f64, f64), speed: f64, way: f64, limits: &Limits) -> Wish {
+    let (heading, speed) = towards(pose, to, speed, way, limits);
+    Wish::Head { heading, speed }
+}
+
 impl Drop for Pilot {
     /// A platform that nobody drives any more stands still.
     fn drop(&mut self) {
@@ -309,16 +370,15 @@ impl Drop for Pilot {
 
 impl Course {
     /// What to do now; notes the arrival.
-    fn command(&mut self, pose: &Pose, limits: &Limits) -> Drive {
-        let velocity = match self.goal {
-            Goal::Effort(effort) => return Drive::Effort(effort),
-            Goal::Velocity(velocity) => velocity,
-            Goal::Vector { speed, heading } => {
-                along(pose.yaw, heading.unwrap_or(self.straight), speed, limits)
-            }
-            Goal::Waypoint { to, speed, goes_on } => {
-                return self.reach(pose, to, speed, goes_on, limits);
-            }
+    fn command(&mut self, pose: &Pose, limits: &Limits) -> Wish {
+        match self.goal {
+            Goal::Effort(effort) => Wish::Drive(Drive::Effort(effort)),
+            Goal::Velocity(velocity) => Wish::Drive(Drive::Velocity(velocity)),
+            Goal::Vector { speed, heading } => Wish::Head {
+                heading: heading.unwrap_or(self.straight),
+                speed,
+            },
+            Goal::Waypoint { to, speed, goes_on } => self.reach(pose, to, speed, goes_on, limits),
             Goal::Path {
                 curve,
                 speed,
@@ -329,10 +389,9 @@ impl Course {
                     tolerance,
                     ..Waypoint::at(curve.end.0, curve.end.1)
                 };
-                return self.follow(pose, end, speed, goes_on, limits);
+                self.follow(pose, end, speed, goes_on, limits)
             }
-        };
-        Drive::Velocity(velocity)
+        }
     }
 
     fn reach(
@@ -342,31 +401,32 @@ impl Course {
         speed: f64,
         goes_on: bool,
         limits: &Limits,
-    ) -> Drive {
+    ) -> Wish {
         self.has_arrived |= to.is_reached(pose) && (goes_on || to.heading.is_none());
         match to.heading {
             Some(heading) if !goes_on && (self.is_turning || to.is_reached(pose)) => {
                 self.turn(pose, heading, limits)
             }
-            _ if self.has_arrived && !goes_on => Drive::Stop,
+            _ if self.has_arrived && !goes_on => Wish::Drive(Drive::Stop),
             _ => {
                 let distance = pose.distance(to.x, to.y);
                 let way = if goes_on { f64::INFINITY } else { distance };
-                Drive::Velocity(towards(pose, (to.x, to.y), speed, way, limits))
+                head_for(pose, (to.x, to.y), speed, way, limits)
             }
         }
     }
 
     /// At the waypoint, turns to the heading that is wanted there.
-    fn turn(&mut self, pose: &Pose, heading: f64, limits: &Limits) -> Drive {
+    fn turn(&mut self, pose: &Pose, heading: f64, limits: &Limits) -> Wish {
         // From here on it turns, even should it slip out of the tolerance.
         self.is_turning = true;
         let error = wrap(heading - pose.yaw).abs();
         self.has_arrived |= error <= Waypoint::HEADING_TOLERANCE;
         if self.has_arrived {
-            return Drive::Stop;
+            return Wish::Drive(Drive::Stop);
         }
-        Drive::Velocity(Velocity::forward(0.0, turn_rate(pose.yaw, heading, limits)))
+        let turn = Velocity::forward(0.0, turn_rate(pose.yaw, heading, limits));
+        Wish::Drive(Drive::Velocity(turn))
     }
 
     fn follow(
@@ -376,10 +436,10 @@ impl Course {
         speed: f64,
         goes_on: bool,
         limits: &Limits,
-    ) -> Drive {
+    ) -> Wish {
         self.has_arrived |= self.ahead.len() <= 2 && end.is_reached(pose);
         if self.has_arrived && !goes_on {
-            return Drive::Stop;
+            return Wish::Drive(Drive::Stop);
         }
         let look = Self::LOOK_AHEAD.max(speed * Self::LOOK_AHEAD_TIME);
         self.pass(pose, look);
@@ -389,7 +449,7 @@ impl Course {
         } else {
             pose.distance(end.x, end.y)
         };
-        Drive::Velocity(towards(pose, target, speed, way, limits))
+        head_for(pose, target, speed, way, limits)
     }
 
     /// How far ahead on a curve it aims, in metres.

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use super::steering::along;
 use super::{Motion, Pose, Velocity};
 
 /// A vehicle, real or simulated.
@@ -22,6 +23,14 @@ pub trait Platform: Send {
 
     /// What it is to do until it is told something else.
     fn drive(&mut self, command: Drive);
+
+    /// To keep a heading in radians clockwise from the local X axis, at a speed in metres per second,
+    /// until it is told something else. Most platforms leave it at this: they are told, every
+    /// [`Pilot::STEP`](super::Pilot::STEP), the velocity within `limits` that turns to the heading.
+    fn head(&mut self, heading: f64, speed: f64, limits: &Limits) {
+        let velocity = along(self.motion().pose.yaw, heading, speed, limits);
+        self.drive(Drive::Velocity(limits.clamp(velocity)));
+    }
 
     /// What it can do at most.
     fn limits(&self) -> Limits;

@@ -70,19 +70,20 @@ pub(super) fn along(yaw: f64, heading: f64, speed: f64, limits: &Limits) -> Velo
     Velocity::forward(speed * share, turn_rate(yaw, heading, limits))
 }
 
-/// Drives to a point, at most with a speed, so that it could stop after `way` more metres.
+/// The heading and the speed that lead to a point: at most with a speed, so that it could stop after
+/// `way` more metres.
 pub(super) fn towards(
     pose: &Pose,
     (x, y): (f64, f64),
     speed: f64,
     way: f64,
     limits: &Limits,
-) -> Velocity {
+) -> (f64, f64) {
     let heading = pose.bearing(x, y);
     let error = wrap(heading - pose.yaw);
     let stoppable = (2.0 * MARGIN * limits.deceleration * way).sqrt();
     // The speed at which the circle through the point can be driven.
     let turnable = pose.distance(x, y) * MARGIN * limits.yaw_rate / (2.0 * error.sin().abs());
     let speed = speed.min(stoppable).min(turnable);
-    along(pose.yaw, heading, speed, limits)
+    (heading, speed)
 }

@@ -12,7 +12,7 @@ use jaus::address::JausId;
 use jaus::cli::failure::{Failure, Outcome};
 use jaus::cli::network::Network;
 use jaus::cli::output::Output;
-use jaus::cli::runtime::{self, Clock};
+use jaus::cli::runtime::{self, Clock, between};
 use jaus::cli::tree;
 use jaus::component::{
     AccessControl, Builder, Component, Condition, Kind, Management, Standing, State, Time,
@@ -282,13 +282,5 @@ fn place(text: &str) -> Result<Frame, String> {
             "write latitude and longitude in degrees such as 52.5,13.4, the latitude from -85 to 85"
                 .to_owned(),
         ),
-    }
-}
-
-/// Reads a flag's number between two bounds.
-fn between(text: &str, least: f64, most: f64) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if (least..=most).contains(&number) => Ok(number),
-        _ => Err(format!("write a number from {least} to {most}")),
     }
 }

@@ -64,6 +64,28 @@ impl Vehicle {
         self
     }
 
+    /// Has it move on to `now`, for who reads it without a message.
+    pub fn handle_time(&self, now: Instant) {
+        drop(self.at(now));
+    }
+
+    /// Gives up whatever it is driven to, and stops.
+    pub fn stop(&self) {
+        self.lock().pilot.stop();
+    }
+
+    /// Whether it has something to do that is not done.
+    #[must_use]
+    pub fn is_under_way(&self) -> bool {
+        self.lock().pilot.is_under_way()
+    }
+
+    /// Whether it has stopped because its [pilot](Pilot::give_up_after) was left alone.
+    #[must_use]
+    pub fn was_left_alone(&self) -> bool {
+        self.lock().pilot.was_left_alone()
+    }
+
     /// Where it was last and how it moved.
     #[must_use]
     pub fn motion(&self) -> Motion {
