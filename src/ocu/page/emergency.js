@@ -19,7 +19,6 @@ export class Emergency {
     get("estop-clear").addEventListener("click", () => this.#openSheet());
     get("clear-no").addEventListener("click", () => this.#closeSheet());
     get("clear-yes").addEventListener("click", () => this.#clear());
-    link.addEventListener("hello", () => this.#wanted && this.#send());
     setInterval(() => this.#wanted && this.#send(), REPEAT);
     this.#render();
   }
@@ -43,6 +42,7 @@ export class Emergency {
     return true;
   }
 
+  /** Takes a state. */
   update(state) {
     this.#confirmed = state?.vehicle?.emergency === true;
     if (this.#confirmed) this.#wanted = false;
@@ -50,7 +50,7 @@ export class Emergency {
   }
 
   async #send() {
-    if (!this.#link.open) return;
+    if (!this.#link.open || !this.#link.settled) return;
     const reason = await this.#link.ask({ type: "emergency", on: true });
     if (reason === null || !this.#wanted) return;
     if (this.#refusal !== reason) toast("bad", `Emergency stop: ${reason}`);

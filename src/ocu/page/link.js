@@ -24,6 +24,8 @@ export class Link extends EventTarget {
   #ids = 0;
   #waiting = new Map();
   #token = takeToken();
+  /** Whether the server has said hello and, if it wants a token, has judged ours. */
+  settled = false;
 
   /** `connecting`, `live`, `stale` or `lost`. */
   get condition() {
@@ -102,6 +104,7 @@ export class Link extends EventTarget {
     const socket = new WebSocket(`${scheme}//${location.host}/ws`);
     this.#socket = socket;
     this.#heard = performance.now();
+    this.settled = false;
     socket.addEventListener("open", () => {
       this.#opened = this.#heard = performance.now();
     });

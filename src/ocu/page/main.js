@@ -33,6 +33,7 @@ link.addEventListener("hello", async ({ detail }) => {
   authority = detail.authority;
   if (!trusted && link.token) await offer(link.token);
   else show(get("token-sheet"), !trusted && !watching());
+  link.settled = true;
   render();
 });
 link.addEventListener("state", ({ detail }) => {
@@ -50,7 +51,7 @@ function render() {
   showLink(link, state);
   const live = link.condition === "live";
   const operable = live && trusted && Boolean(state?.vehicle);
-  emergency.update(state, link);
+  emergency.update(state);
   drive.update(state, obstacle(live));
   const mode = part(state, "primitive_driver")?.state;
   get("resume").disabled = !operable || !state.control?.held || mode === "ready";
