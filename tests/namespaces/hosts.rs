@@ -1,10 +1,12 @@
 //! Two hosts to test on, and nodes in processes of their own on them.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
+
+use crate::networks::{ip, on_hosts};
 
 /// Longer than anything takes; reached only when a test fails.
 pub(crate) const LIMIT: Duration = Duration::from_secs(30);
@@ -14,9 +16,6 @@ pub(crate) const ROLE: &str = "JAUS_TEST_ROLE";
 
 /// Set for a process that plays a node with other settings than the usual.
 pub(crate) const SETTINGS: &str = "JAUS_TEST_SETTINGS";
-
-/// Set for a test that was started again in a user namespace.
-const INSIDE: &str = "JAUS_TEST_IN_USER_NAMESPACE";
 
 /// Two network namespaces, joined by a cable; gone when dropped.
 pub(crate) struct TwoHosts {
@@ -142,64 +141,9 @@ impl Drop for TwoHosts {
     }
 }
 
-/// Runs a test's body on two hosts: made here; or else in a user namespace, where this test binary
-/// is started again for the same test; or not at all, said loudly.
+/// Runs a test's body on two hosts, or says loudly that it cannot.
 pub(crate) fn on_two_hosts(test: &str, body: impl FnOnce(&TwoHosts)) {
-    let reason = match TwoHosts::new() {
-        Ok(hosts) => return body(&hosts),
-        Err(reason) => reason,
-    };
-    if std::env::var_os(INSIDE).is_none()
-        && in_user_namespace(&["true"])
-            .status()
-            .is_ok_and(|s| s.success())
-    {
-        let again = std::env::current_exe().unwrap();
-        let again = [again.to_str().unwrap(), "--exact", test, "--nocapture"];
-        assert!(
-            in_user_namespace(&again)
-                .status()
-                .is_ok_and(|s| s.success()),
-            "{test} failed in a user namespace"
-        );
-        return;
-    }
-    say_skipped(test, &format!("no network namespaces here: {reason}"));
-}
-
-/// Says it past the test harness, which would keep the words of a test that passes.
-pub(crate) fn say_skipped(test: &str, reason: &str) {
-    let words = format!(
-        "\n*** SKIPPED {test}: {reason}\n\
-         *** To run it: as root, with iproute2 installed.\n\n"
-    );
-    std::io::stderr().write_all(words.as_bytes()).unwrap();
-}
-
-/// A command as root of namespaces of its own, which a plain user may often be.
-fn in_user_namespace(command: &[&str]) -> Command {
-    let mut unshare = Command::new("unshare");
-    unshare
-        .args(["--user", "--map-root-user", "--net", "--mount", "sh", "-c"])
-        .args(["mount -t tmpfs none /run && exec \"$@\"", "sh"])
-        .args(command)
-        .env(INSIDE, "1");
-    unshare
-}
-
-fn ip(arguments: &[&str]) -> Result<(), String> {
-    run("ip", arguments)
-}
-
-pub(crate) fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
-    let output = Command::new(program).args(arguments).output();
-    let output = output.map_err(|e| format!("{program}: {e}"))?;
-    let said = String::from_utf8_lossy(&output.stderr);
-    if output.status.success() {
-        Ok(())
-    } else {
-        Err(said.trim().replace('\n', "; "))
-    }
+    on_hosts(test, TwoHosts::new, body);
 }
 
 /// A node in a process of its own; killed when dropped.

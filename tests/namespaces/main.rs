@@ -16,13 +16,16 @@ mod hosts;
 #[cfg(feature = "cli")]
 mod judge;
 mod links;
+#[path = "../support/networks.rs"]
+mod networks;
 mod roles;
 #[path = "../support/vehicle_process.rs"]
 mod vehicle_process;
 
 use std::time::{Duration, Instant};
 
-use hosts::{LIMIT, ROLE, on_two_hosts, run, say_skipped};
+use hosts::{LIMIT, ROLE, on_two_hosts};
+use networks::{run, say_skipped};
 
 #[test]
 fn nodes_on_two_hosts_meet_by_multicast_and_go_on_by_unicast() {

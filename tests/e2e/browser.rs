@@ -1,0 +1,380 @@
+//! A headless Chromium, spoken to in its own protocol over a pipe: no driver program, no port, and
+//! it can live in a network namespace. What people do is done with real input: fingers on places,
+//! keys that go down and up.
+
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+/// Longer than anything takes; reached only when a test fails.
+const LIMIT: Duration = Duration::from_secs(60);
+/// How often a condition is looked at.
+const PERIOD: Duration = Duration::from_millis(50);
+
+/// A screen to look at the page on.
+#[derive(Clone, Copy)]
+pub(crate) struct Screen {
+    pub(crate) name: &'static str,
+    pub(crate) size: (u32, u32),
+    pub(crate) dark: bool,
+}
+
+/// The screens that the page is made for.
+pub(crate) const SCREENS: [Screen; 5] = [
+    Screen {
+        name: "tablet",
+        size: (1280, 800),
+        dark: false,
+    },
+    Screen {
+        name: "tablet-dark",
+        size: (1280, 800),
+        dark: true,
+    },
+    Screen {
+        name: "tablet-upright",
+        size: (800, 1280),
+        dark: false,
+    },
+    Screen {
+        name: "phone",
+        size: (390, 844),
+        dark: true,
+    },
+    Screen {
+        name: "desktop",
+        size: (1920, 1080),
+        dark: false,
+    },
+];
+
+/// Why there is no browser here, if there is none.
+pub(crate) fn missing() -> Option<String> {
+    let found = Command::new("chromium").arg("--version").output();
+    found.err().map(|error| format!("chromium: {error}"))
+}
+
+/// One browser with one page; killed when dropped.
+pub(crate) struct Browser {
+    child: Child,
+    commands: ChildStdin,
+    said: Receiver<Value>,
+    session: Option<String>,
+    number: u64,
+    profile: PathBuf,
+    complaints: Vec<String>,
+}
+
+impl Browser {
+    /// Starts the browser, in a network namespace if one is given.
+    pub(crate) fn start(network: Option<&str>) -> Self {
+        let profile =
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("chromium-{}", std::process::id()));
+        let mut command = match network {
+            Some(network) => {
+                let mut command = Command::new("ip");
+                command.args(["netns", "exec", network, "sh"]);
+                command
+            }
+            None => Command::new("sh"),
+        };
+        // The browser reads commands from file 3 and answers on file 4.
+        command.args([
+            "-c",
+            "exec chromium \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>&1",
+            "sh",
+        ]);
+        command.args([
+            "--headless=new",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--remote-debugging-pipe",
+        ]);
+        command.args([
+            "--no-first-run",
+            "--disable-extensions",
+            "--disable-component-update",
+            "--disable-background-networking",
+        ]);
+        command.args(["--disable-dev-shm-usage", "--hide-scrollbars"]);
+        command
+            .arg(format!("--user-data-dir={}", profile.display()))
+            .arg("about:blank");
+        let mut child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let commands = child.stdin.take().unwrap();
+        let mut answers = BufReader::new(child.stdout.take().unwrap());
+        let (sender, said) = channel();
+        std::thread::spawn(move || {
+            let mut line = Vec::new();
+            while answers.read_until(0, &mut line).is_ok_and(|read| read > 0) {
+                line.pop();
+                let value = serde_json::from_slice(&line).unwrap();
+                line.clear();
+                if sender.send(value).is_err() {
+                    break;
+                }
+            }
+        });
+        let mut browser = Self {
+            child,
+            commands,
+            said,
+            session: None,
+            number: 0,
+            profile,
+            complaints: Vec::new(),
+        };
+        browser.attach();
+        browser
+    }
+
+    fn attach(&mut self) {
+        let target = self.call("Target.createTarget", &json!({ "url": "about:blank" }));
+        let target = json!({ "targetId": target["targetId"], "flatten": true });
+        let session = self.call("Target.attachToTarget", &target);
+        self.session = Some(session["sessionId"].as_str().unwrap().to_owned());
+        for domain in ["Runtime", "Log", "Page"] {
+            self.call(&format!("{domain}.enable"), &json!({}));
+        }
+    }
+
+    /// Says a command and waits for its answer.
+    #[track_caller]
+    fn call(&mut self, method: &str, parameters: &Value) -> Value {
+        self.number += 1;
+        let mut command = json!({ "id": self.number, "method": method, "params": parameters });
+        if let Some(session) = &self.session {
+            command["sessionId"] = json!(session);
+        }
+        let mut octets = command.to_string().into_bytes();
+        octets.push(0);
+        self.commands.write_all(&octets).unwrap();
+        loop {
+            let said = self
+                .said
+                .recv_timeout(LIMIT)
+                .unwrap_or_else(|error| panic!("{method}: the browser is silent: {error}"));
+            if said["id"] == self.number {
+                assert_eq!(said["error"], Value::Null, "{method}");
+                return said["result"].clone();
+            }
+            self.note(&said);
+        }
+    }
+
+    /// Remembers what goes wrong in the page. That a connection fails is what some tests are about.
+    fn note(&mut self, said: &Value) {
+        let parameters = &said["params"];
+        match said["method"].as_str() {
+            Some("Runtime.exceptionThrown") => self
+                .complaints
+                .push(parameters["exceptionDetails"].to_string()),
+            Some("Log.entryAdded") if parameters["entry"]["source"] != "network" => {
+                let entry = parameters["entry"]["text"].as_str().unwrap_or_default();
+                if !entry.contains("WebSocket connection to") {
+                    self.complaints.push(entry.to_owned());
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// What the page complained about: exceptions, violations of its policy.
+    pub(crate) fn complaints(&mut self) -> &[String] {
+        while let Ok(said) = self.said.try_recv() {
+            self.note(&said);
+        }
+        &self.complaints
+    }
+
+    /// Shows the page on a screen.
+    pub(crate) fn look_on(&mut self, screen: Screen) {
+        let (width, height) = screen.size;
+        let metrics =
+            json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
+        self.call("Emulation.setDeviceMetricsOverride", &metrics);
+        let scheme = if screen.dark { "dark" } else { "light" };
+        let features = json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] });
+        self.call("Emulation.setEmulatedMedia", &features);
+    }
+
+    pub(crate) fn open(&mut self, address: &str) {
+        let answer = self.call("Page.navigate", &json!({ "url": address }));
+        assert_eq!(answer["errorText"], Value::Null, "{address}");
+        self.wait("document.readyState === 'complete'");
+    }
+
+    /// The value of a JavaScript expression in the page.
+    #[track_caller]
+    pub(crate) fn value(&mut self, expression: &str) -> Value {
+        let wanted =
+            json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
+        let answer = self.call("Runtime.evaluate", &wanted);
+        assert_eq!(answer["exceptionDetails"], Value::Null, "{expression}");
+        answer["result"]["value"].clone()
+    }
+
+    /// The text of the first element that a selector finds.
+    #[track_caller]
+    pub(crate) fn text(&mut self, selector: &str) -> String {
+        let value = self.value(&format!(
+            "document.querySelector({})?.textContent ?? ''",
+            json!(selector)
+        ));
+        value.as_str().unwrap_or_default().to_owned()
+    }
+
+    /// Waits until an expression holds.
+    #[track_caller]
+    pub(crate) fn wait(&mut self, expression: &str) {
+        assert!(
+            self.holds_within(LIMIT, expression),
+            "never: {expression}\n{}",
+            self.situation()
+        );
+    }
+
+    /// Whether an expression holds before a time is over.
+    #[track_caller]
+    pub(crate) fn holds_within(&mut self, limit: Duration, expression: &str) -> bool {
+        let deadline = Instant::now() + limit;
+        while self.value(&format!("Boolean({expression})")) != true {
+            if Instant::now() > deadline {
+                return false;
+            }
+            std::thread::sleep(PERIOD);
+        }
+        true
+    }
+
+    /// What the page shows now, in words, for those who read why a test failed.
+    fn situation(&mut self) -> String {
+        self.screenshot("failed");
+        let page = self.value("document.body.innerText.replace(/\\n+/g, ' | ')");
+        format!(
+            "{}\n{:?}",
+            page.as_str().unwrap_or_default(),
+            self.complaints
+        )
+    }
+
+    /// Touches the middle of an element, which must be there to be touched.
+    #[track_caller]
+    pub(crate) fn press(&mut self, selector: &str) {
+        let place = format!("document.querySelector({})", json!(selector));
+        self.wait(&format!(
+            "{place} && !{place}.disabled && {place}.getClientRects().length"
+        ));
+        let middle = format!(
+            "(() => {{ const e = {place}; e.scrollIntoView({{block: 'nearest'}}); const b = e.getBoundingClientRect(); \
+             const [x, y] = [b.x + b.width / 2, b.y + b.height / 2]; \
+             const top = document.elementFromPoint(x, y); \
+             return {{ x, y, free: e === top || e.contains(top) }}; }})()"
+        );
+        let middle = self.value(&middle);
+        assert_eq!(
+            middle["free"], true,
+            "{selector} is covered or not on the screen"
+        );
+        self.touch(middle["x"].as_f64().unwrap(), middle["y"].as_f64().unwrap());
+    }
+
+    /// Touches a place of the screen.
+    pub(crate) fn touch(&mut self, x: f64, y: f64) {
+        for kind in ["mousePressed", "mouseReleased"] {
+            let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "clickCount": 1 });
+            self.call("Input.dispatchMouseEvent", &event);
+        }
+    }
+
+    /// Puts a finger on the middle of an element and moves it, by shares of half its size to the
+    /// right and down; it stays there.
+    #[track_caller]
+    pub(crate) fn hold(&mut self, selector: &str, (right, down): (f64, f64)) {
+        let place = format!(
+            "document.querySelector({}).getBoundingClientRect()",
+            json!(selector)
+        );
+        let place = self.value(&format!("{place}.toJSON()"));
+        let [left, top, width, height] =
+            ["x", "y", "width", "height"].map(|it| place[it].as_f64().unwrap());
+        let (x, y) = (left + width / 2.0, top + height / 2.0);
+        let down_here =
+            json!({ "type": "mousePressed", "x": x, "y": y, "button": "left", "clickCount": 1 });
+        self.call("Input.dispatchMouseEvent", &down_here);
+        let (x, y) = (x + right * width / 2.0, y + down * height / 2.0);
+        let there = json!({ "type": "mouseMoved", "x": x, "y": y, "button": "left", "buttons": 1 });
+        self.call("Input.dispatchMouseEvent", &there);
+    }
+
+    /// Takes the finger away.
+    pub(crate) fn let_go(&mut self) {
+        let event =
+            json!({ "type": "mouseReleased", "x": 1, "y": 1, "button": "left", "clickCount": 1 });
+        self.call("Input.dispatchMouseEvent", &event);
+    }
+
+    /// Writes into a field.
+    #[track_caller]
+    pub(crate) fn write(&mut self, selector: &str, text: &str) {
+        let field = json!(selector);
+        self.value(&format!(
+            "document.querySelector({field}).focus(); document.querySelector({field}).select()"
+        ));
+        self.call("Input.insertText", &json!({ "text": text }));
+        self.value("document.activeElement.blur()");
+    }
+
+    pub(crate) fn key_down(&mut self, code: &str, key: &str) {
+        self.call(
+            "Input.dispatchKeyEvent",
+            &json!({ "type": "keyDown", "code": code, "key": key }),
+        );
+    }
+
+    pub(crate) fn key_up(&mut self, code: &str, key: &str) {
+        self.call(
+            "Input.dispatchKeyEvent",
+            &json!({ "type": "keyUp", "code": code, "key": key }),
+        );
+    }
+
+    /// Keeps a picture of the page in `target/e2e-screenshots`.
+    pub(crate) fn screenshot(&mut self, name: &str) {
+        let shot = self.call("Page.captureScreenshot", &json!({ "format": "png" }));
+        let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("e2e-screenshots");
+        std::fs::create_dir_all(&directory).unwrap();
+        let octets = from_base64(shot["data"].as_str().unwrap());
+        std::fs::write(directory.join(name).with_extension("png"), octets).unwrap();
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        let _ = std::fs::remove_dir_all(&self.profile);
+    }
+}
+
+/// Base 64, which is how pictures come.
+fn from_base64(text: &str) -> Vec<u8> {
+    let alphabet = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let digits = text
+        .bytes()
+        .filter_map(|letter| alphabet.iter().position(|it| *it == letter));
+    let digits: Vec<usize> = digits.collect();
+    let groups = digits.chunks(4).flat_map(|group| {
+        let bits = group.iter().fold(0, |bits, digit| bits << 6 | digit) << (6 * (4 - group.len()));
+        (0..group.len() - 1).map(move |octet| (bits >> (16 - 8 * octet)) as u8)
+    });
+    groups.collect()
+}

@@ -1,0 +1,101 @@
+//! Driving by hand: the page and its station with the simulated vehicle of `jaus vehicle`, all on
+//! this host.
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use crate::browser::{Browser, SCREENS};
+use crate::steps::{emergency, take_control};
+use crate::system::program;
+
+/// A program that runs until it is dropped.
+struct Running(Child);
+
+impl Running {
+    /// Starts a program on a multicast group of this test's own, and waits until it says something
+    /// that begins so, apart from blanks; gives the rest of that line.
+    fn start(name: &str, flags: &[&str], beginning: &str) -> (Self, String) {
+        let group = format!("239.255.77.2:{}", 20_000 + std::process::id() % 40_000);
+        let mut command = Command::new(program(name));
+        command.args(flags).args(["--loopback", "--group", &group]);
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (stdout, stderr) = (child.stdout.take().unwrap(), child.stderr.take().unwrap());
+        let (sender, lines) = std::sync::mpsc::channel();
+        let read = |source: Box<dyn std::io::Read + Send>| {
+            let sender = sender.clone();
+            std::thread::spawn(move || {
+                // The program may go on talking when nobody listens any more.
+                for line in BufReader::new(source).lines().map_while(Result::ok) {
+                    let _ = sender.send(line);
+                }
+            })
+        };
+        read(Box::new(stdout));
+        read(Box::new(stderr));
+        drop(sender);
+        let running = Self(child);
+        let found = lines
+            .iter()
+            .find_map(|line| Some(line.split_once(beginning)?.1.trim().to_owned()));
+        (
+            running,
+            found.unwrap_or_else(|| panic!("{name} did not say `{beginning}`")),
+        )
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Takes control, drives by key and stick, stops in an emergency, and sees what a lost station
+/// looks like and that the page finds the next one.
+pub(crate) fn run() {
+    let (_vehicle, _) = Running::start("jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
+    let (station, address) =
+        Running::start("jaus-ocu", &["--listen", "127.0.0.1:0"], "page is at ");
+    let mut page = Browser::start(None);
+    page.look_on(SCREENS[0]);
+    page.open(&address);
+    page.wait("document.body.dataset.link === 'live'");
+    page.wait("document.querySelector('#vehicle-select').textContent.includes('G-Bat')");
+    take_control(&mut page);
+
+    page.press("[data-show=drive]");
+    page.key_down("ArrowUp", "ArrowUp");
+    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.screenshot("by-hand-keys");
+    page.key_up("ArrowUp", "ArrowUp");
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
+
+    page.hold("#stick", (0.0, -0.6));
+    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.screenshot("by-hand-stick");
+    emergency(&mut page);
+    page.let_go();
+
+    let port = address
+        .trim_end_matches('/')
+        .rsplit(':')
+        .next()
+        .unwrap()
+        .to_owned();
+    drop(station);
+    page.wait("document.body.dataset.link === 'lost'");
+    page.screenshot("by-hand-lost");
+    let (_station, _) = Running::start(
+        "jaus-ocu",
+        &["--listen", &format!("127.0.0.1:{port}")],
+        "page is at ",
+    );
+    page.wait("document.body.dataset.link === 'live'");
+    take_control(&mut page);
+    assert!(page.complaints().is_empty(), "{:?}", page.complaints());
+}

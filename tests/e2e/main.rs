@@ -1,0 +1,151 @@
+//! The whole system through the operator's page: real programs as processes on four hosts with two
+//! networks, and a real browser that is used as people use it. Pictures of the page are kept in
+//! `target/e2e-screenshots`.
+//!
+//! It needs Chromium and network namespaces. Where they lack, the tests say so loudly and pass, but
+//! fail if the environment says `CI`.
+#![cfg(all(feature = "cli", target_os = "linux"))]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test with processes"
+)]
+
+mod browser;
+mod by_hand;
+#[path = "../support/networks.rs"]
+mod networks;
+mod steps;
+mod system;
+
+use std::time::Duration;
+
+use browser::{Browser, SCREENS};
+use networks::{on_hosts, say_skipped};
+use steps::{emergency, look_from_all_screens, take_control};
+use system::{PAGE, System};
+
+#[test]
+fn a_mission_through_the_page_survives_the_death_of_every_part() {
+    let test = "a_mission_through_the_page_survives_the_death_of_every_part";
+    if let Some(reason) = browser::missing() {
+        return skip(test, &reason);
+    }
+    let missing = system::missing();
+    if !missing.is_empty() {
+        return say_skipped(test, &format!("not built: {}", missing.join(", ")));
+    }
+    if !on_hosts(test, System::new, run) {
+        must_not_skip(test);
+    }
+}
+
+#[test]
+fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
+    let test = "a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once";
+    if let Some(reason) = browser::missing() {
+        return skip(test, &reason);
+    }
+    if !system::program("jaus-ocu").exists() {
+        return say_skipped(test, "not built: jaus-ocu");
+    }
+    by_hand::run();
+}
+
+fn skip(test: &str, reason: &str) {
+    say_skipped(test, reason);
+    must_not_skip(test);
+}
+
+/// Where everything is installed for the tests, one that does not run is one that fails.
+fn must_not_skip(test: &str) {
+    assert!(std::env::var_os("CI").is_none(), "{test} has to run in CI");
+}
+
+fn run(system: &System) {
+    system.start_all();
+    let mut page = Browser::start(Some(system.operator()));
+    page.look_on(SCREENS[0]);
+    open(&mut page);
+    look_from_all_screens(&mut page, "1-start");
+
+    take_control(&mut page);
+    plan(&mut page, 4.0, 1.0);
+    look_from_all_screens(&mut page, "2-approval");
+    approve(&mut page);
+    page.wait("+document.querySelector('#progress').ariaValueNow > 5");
+    look_from_all_screens(&mut page, "3-driving");
+
+    take_over_by_keyboard(&mut page);
+    emergency(&mut page);
+
+    for program in system.programs() {
+        system.kill(program);
+        page.screenshot(&format!("5-without-{program}"));
+        system.start(program);
+    }
+    open(&mut page);
+    arrive(&mut page);
+    look_from_all_screens(&mut page, "6-arrived");
+    assert!(page.complaints().is_empty(), "{:?}", page.complaints());
+}
+
+/// Opens the page and waits for a vehicle that is all there.
+fn open(page: &mut Browser) {
+    for attempt in 0.. {
+        page.open(PAGE);
+        if page.holds_within(
+            Duration::from_secs(10),
+            "document.body.dataset.link === 'live'",
+        ) {
+            break;
+        }
+        assert!(attempt < 5, "the page never came to life");
+    }
+    page.wait("document.querySelectorAll('#parts .part').length >= 4");
+    page.wait("document.querySelector('#north').textContent !== '–'");
+    page.wait("document.querySelector('#map-empty').hidden");
+}
+
+/// Touches the map, corrects the place by hand, and waits for a route.
+fn plan(page: &mut Browser, north: f64, east: f64) {
+    page.press("[data-show=mission]");
+    page.press("#map");
+    page.wait("document.querySelector('#destination-x').value !== ''");
+    page.write("#destination-x", &north.to_string());
+    page.write("#destination-y", &east.to_string());
+    page.press("#plan");
+    page.wait("!document.querySelector('#approve').disabled");
+}
+
+fn approve(page: &mut Browser) {
+    page.press("#approve");
+    page.wait(
+        "document.querySelector('#stages [aria-current] .stage-name')?.textContent === 'Driving'",
+    );
+}
+
+/// Holding a key drives the vehicle, mission or not; letting go stops it.
+fn take_over_by_keyboard(page: &mut Browser) {
+    page.press("[data-show=drive]");
+    page.key_down("KeyW", "w");
+    page.wait(
+        "document.querySelector('#drive-line').textContent.includes('the vehicle is driven')",
+    );
+    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.screenshot("4-keyboard");
+    page.wait("document.body.dataset.mission === 'over'");
+    page.key_up("KeyW", "w");
+    page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
+}
+
+/// A mission to its end.
+fn arrive(page: &mut Browser) {
+    take_control(page);
+    plan(page, 2.0, -2.0);
+    approve(page);
+    page.wait("document.querySelector('#mission-line').dataset.state === 'arrived'");
+}
