@@ -6,6 +6,7 @@
 //! when another one is started again.
 
 mod drivers;
+mod planner;
 mod pose_file;
 mod pose_sensor;
 mod primitive_driver;
@@ -18,6 +19,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use crate::component::{self, Builder, Component, Kind};
 use crate::node::{Node, Port};
 
+pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 pub use primitive_driver::GpioMotors;

@@ -1,0 +1,143 @@
+//! Watches a driver of the chain: how its stage is, who controls it, and whether it has been stopped.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here a lost driver is waited for"
+)]
+
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+
+use super::find;
+use crate::address::JausId;
+use crate::component::{Component, Subscription, Update, When};
+use crate::messages::core::report_status::Status;
+use crate::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
+use crate::messages::ground::report_stage::State;
+use crate::messages::ground::{QueryStage, ReportStage, stage};
+use crate::messages::mobility::{local_path_segment_driver, local_vector_driver, primitive_driver};
+use crate::mission::{Link, LinkState};
+
+/// What has become of a driver of the chain.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum News {
+    /// It was found, or lost.
+    Found(Link, Option<JausId>),
+    /// Its stage, and how much of what it was told is done, from 0 to 100 %.
+    Stage(Link, LinkState, u8),
+    /// Who controls it.
+    Controller(Link, Option<JausId>),
+    /// It has been stopped by an emergency.
+    Emergency(Link),
+}
+
+/// Between two attempts to subscribe.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// The service that makes a component this driver, beside Stage.
+pub(super) const fn service(link: Link) -> &'static str {
+    match link {
+        Link::Path => local_path_segment_driver::URN,
+        Link::Vector => local_vector_driver::URN,
+        Link::Primitive => primitive_driver::URN,
+    }
+}
+
+/// Watches a driver, whoever it is, and goes on when it is another one. Ends when the component
+/// has stopped.
+pub(super) async fn watch(component: &Component, link: Link, tell: &mpsc::Sender<News>) {
+    while let Some(peer) = find(component, &[service(link), stage::URN]).await {
+        tracing::info!("the {link} is {peer}");
+        if tell.send(News::Found(link, Some(peer))).await.is_err() {
+            return;
+        }
+        watch_peer(component, link, peer, tell).await;
+        let lost = [
+            News::Found(link, None),
+            News::Stage(link, LinkState::Silent, 0),
+        ];
+        for news in lost {
+            if tell.send(news).await.is_err() {
+                return;
+            }
+        }
+        tokio::time::sleep(PAUSE).await;
+    }
+}
+
+/// Watches one component until it is lost.
+async fn watch_peer(
+    component: &Component,
+    link: Link,
+    peer: JausId,
+    tell: &mpsc::Sender<News>,
+) -> Option<()> {
+    let mut stages: Subscription<ReportStage> = component
+        .subscribe(peer, &QueryStage {}, When::OnChange)
+        .await
+        .ok()?;
+    let mut controls: Subscription<ReportControl> = component
+        .subscribe(peer, &QueryControl {}, When::OnChange)
+        .await
+        .ok()?;
+    let mut states: Subscription<ReportStatus> = component
+        .subscribe(peer, &QueryStatus {}, When::OnChange)
+        .await
+        .ok()?;
+    loop {
+        let news = tokio::select! {
+            stage = stages.next() => match stage? {
+                Update::Report(report) => stage_news(link, &report),
+                Update::Up => stage_news(link, &ask(component, peer, &QueryStage {}).await?),
+                Update::Down { .. } => return None,
+            },
+            control = controls.next() => match control? {
+                Update::Report(report) => News::Controller(link, controller(&report)),
+                Update::Up => {
+                    let report = ask(component, peer, &QueryControl {}).await?;
+                    News::Controller(link, controller(&report))
+                }
+                Update::Down { .. } => return None,
+            },
+            state = states.next() => match state? {
+                Update::Report(report) if report.status == Status::EMERGENCY => {
+                    News::Emergency(link)
+                }
+                Update::Report(_) | Update::Up => continue,
+                Update::Down { .. } => return None,
+            },
+        };
+        tell.send(news).await.ok()?;
+    }
+}
+
+async fn ask<R: crate::codec::Message, Q: crate::codec::Message>(
+    component: &Component,
+    peer: JausId,
+    query: &Q,
+) -> Option<R> {
+    component.query(peer, query).await.ok()
+}
+
+fn stage_news(link: Link, report: &ReportStage) -> News {
+    News::Stage(link, state(report), report.progress)
+}
+
+/// How a driver is, as it reports.
+pub(super) fn state(report: &ReportStage) -> LinkState {
+    match report.state {
+        State::IDLE => LinkState::Idle,
+        State::ENGAGING => LinkState::Engaging,
+        State::ACTIVE => LinkState::Active,
+        State::DONE => LinkState::Done,
+        State::BLOCKED if report.reason.is_empty() => LinkState::Blocked("blocked".to_owned()),
+        State::BLOCKED => LinkState::Blocked(report.reason.to_string_lossy().into_owned()),
+        State(other) => LinkState::Blocked(format!("in the unknown state {other}")),
+    }
+}
+
+/// Who is in control.
+pub(super) fn controller(report: &ReportControl) -> Option<JausId> {
+    let id = JausId::new(report.subsystem_id, report.node_id, report.component_id);
+    id.is_unicast().then_some(id)
+}
