@@ -10,6 +10,7 @@ mod planner;
 mod pose_file;
 mod pose_sensor;
 mod primitive_driver;
+pub mod tester;
 mod velocity_sensor;
 
 use std::convert::Infallible;

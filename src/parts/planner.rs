@@ -6,10 +6,10 @@
 //! again and again if need be.
 #![expect(clippy::disallowed_methods, reason = "here patience is counted")]
 
-mod chain;
+pub(super) mod chain;
 mod desk;
 mod hand_over;
-mod map;
+pub(super) mod map;
 
 use std::convert::Infallible;
 use std::sync::Arc;

@@ -35,7 +35,7 @@ pub(super) enum News {
 const PAUSE: Duration = Duration::from_secs(1);
 
 /// The service that makes a component this driver, beside Stage.
-pub(super) const fn service(link: Link) -> &'static str {
+pub(in crate::parts) const fn service(link: Link) -> &'static str {
     match link {
         Link::Path => local_path_segment_driver::URN,
         Link::Vector => local_vector_driver::URN,
@@ -137,7 +137,7 @@ pub(super) fn state(report: &ReportStage) -> LinkState {
 }
 
 /// Who is in control.
-pub(super) fn controller(report: &ReportControl) -> Option<JausId> {
+pub(in crate::parts) fn controller(report: &ReportControl) -> Option<JausId> {
     let id = JausId::new(report.subsystem_id, report.node_id, report.component_id);
     id.is_unicast().then_some(id)
 }

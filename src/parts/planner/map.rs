@@ -19,14 +19,14 @@ const TRIES: u32 = 3;
 
 /// A map as it was at some time.
 #[derive(Debug, Clone)]
-pub(super) struct Map {
+pub(in crate::parts) struct Map {
     store: JausId,
     about: MapRec,
-    pub(super) terrain: Arc<Terrain>,
+    pub(in crate::parts) terrain: Arc<Terrain>,
 }
 
 /// The map that is called so, or the only one; `known` if it has not changed.
-pub(super) async fn fetch(
+pub(in crate::parts) async fn fetch(
     component: &Component,
     name: &str,
     known: Option<Map>,

@@ -1,0 +1,12 @@
+//! The tester: load for a communicator, measured, and a mission through the whole chain, checked
+//! message by message. What the program `jaus-tester` runs.
+
+pub mod figure;
+mod latencies;
+pub mod load;
+mod mission;
+pub mod plot;
+pub mod steps;
+
+pub use latencies::Latencies;
+pub use mission::MissionTest;

@@ -1,0 +1,123 @@
+//! The steps of a test: what was checked, what came of it, and how long it took.
+
+use std::fmt::{self, Display, Write};
+use std::time::Duration;
+
+/// What came of a step.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// It is as it should be; what was seen.
+    Pass(String),
+    /// It is not; what is wrong.
+    Fail(String),
+    /// It could not be checked because an earlier step failed.
+    Skipped,
+}
+
+/// One step.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Step {
+    /// What was checked.
+    pub name: String,
+    /// What came of it.
+    pub verdict: Verdict,
+    /// How long it took.
+    pub took: Duration,
+}
+
+impl Display for Step {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (word, detail) = match &self.verdict {
+            Verdict::Pass(detail) => ("pass", detail.as_str()),
+            Verdict::Fail(detail) => ("FAIL", detail.as_str()),
+            Verdict::Skipped => ("skip", ""),
+        };
+        let milliseconds = self.took.as_secs_f64() * 1e3;
+        let name = &self.name;
+        write!(f, "{word}  {milliseconds:>9.1} ms  {name:<44} {detail}")
+    }
+}
+
+/// Whether all of them passed.
+#[must_use]
+pub fn all_pass(steps: &[Step]) -> bool {
+    steps
+        .iter()
+        .all(|step| matches!(step.verdict, Verdict::Pass(_)))
+}
+
+/// The steps as a JUnit report, which build servers read.
+#[must_use]
+pub fn junit(suite: &str, steps: &[Step]) -> String {
+    let count =
+        |wanted: fn(&Verdict) -> bool| steps.iter().filter(|step| wanted(&step.verdict)).count();
+    let time: Duration = steps.iter().map(|step| step.took).sum();
+    let mut text = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuite name=\"{}\" tests=\"{}\" \
+         failures=\"{}\" skipped=\"{}\" time=\"{:.3}\">\n",
+        Plain(suite),
+        steps.len(),
+        count(|verdict| matches!(verdict, Verdict::Fail(_))),
+        count(|verdict| matches!(verdict, Verdict::Skipped)),
+        time.as_secs_f64()
+    );
+    for step in steps {
+        let inside = match &step.verdict {
+            Verdict::Pass(detail) => format!("<system-out>{}</system-out>", Plain(detail)),
+            Verdict::Fail(detail) => format!("<failure message=\"{}\"/>", Plain(detail)),
+            Verdict::Skipped => "<skipped/>".to_owned(),
+        };
+        text.push_str(&format!(
+            "  <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\">{inside}</testcase>\n",
+            Plain(suite),
+            Plain(&step.name),
+            step.took.as_secs_f64()
+        ));
+    }
+    text.push_str("</testsuite>\n");
+    text
+}
+
+/// Text without what means something in XML, and without what XML can not hold.
+pub(super) struct Plain<'a>(pub(super) &'a str);
+
+impl Display for Plain<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for letter in self.0.chars() {
+            match letter {
+                '<' => f.write_str("&lt;")?,
+                '>' => f.write_str("&gt;")?,
+                '&' => f.write_str("&amp;")?,
+                '"' => f.write_str("&quot;")?,
+                other if other.is_control() => f.write_char(' ')?,
+                other => f.write_char(other)?,
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_counts_what_failed_and_what_was_skipped() {
+        let step = |name: &str, verdict| Step {
+            name: name.to_owned(),
+            verdict,
+            took: Duration::from_millis(1500),
+        };
+        let steps = [
+            step("a", Verdict::Pass("x > y\u{0}".to_owned())),
+            step("b & c", Verdict::Fail("\"no\"".to_owned())),
+            step("d", Verdict::Skipped),
+        ];
+        let text = junit("mission", &steps);
+        assert!(text.contains("tests=\"3\" failures=\"1\" skipped=\"1\" time=\"4.500\""));
+        assert!(text.contains("name=\"b &amp; c\""));
+        assert!(text.contains("<failure message=\"&quot;no&quot;\"/>"));
+        assert!(text.contains("<system-out>x &gt; y </system-out>"));
+        assert!(!all_pass(&steps) && all_pass(&steps[..1]));
+    }
+}
