@@ -30,6 +30,8 @@ pub mod messages;
 pub mod mission;
 #[cfg(feature = "node")]
 pub mod node;
+#[cfg(feature = "web")]
+pub mod ocu;
 #[cfg(feature = "parts")]
 pub mod parts;
 pub mod service;

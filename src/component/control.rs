@@ -140,7 +140,11 @@ impl Control {
         self.component.bring(self.peer, command, wanted).await
     }
 
-    fn check(&self) -> Result<(), ControlError> {
+    /// The same as [`is_held`](Self::is_held), with the reason.
+    ///
+    /// # Errors
+    /// If control is lost: why.
+    pub fn check(&self) -> Result<(), ControlError> {
         match *self.condition.borrow() {
             Condition::Held if self.condition.has_changed().is_ok() => Ok(()),
             Condition::Lost(why) => Err(ControlError::Lost {

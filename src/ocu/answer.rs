@@ -1,0 +1,30 @@
+//! What the station says to a page.
+
+use serde::Serialize;
+
+use super::state::State;
+
+/// One frame to a page.
+#[derive(Debug, Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub(super) enum Said<'a> {
+    /// The first frame.
+    Hello {
+        /// Of this protocol.
+        version: u32,
+        token_needed: bool,
+        operator: String,
+        authority: u8,
+    },
+    State(&'a State),
+    /// A wish was carried out.
+    Done {
+        id: u64,
+    },
+    /// It was not.
+    Refused {
+        #[serde(skip_serializing_if = "Option::is_none")]
+        id: Option<u64>,
+        reason: &'a str,
+    },
+}

@@ -1,0 +1,328 @@
+//! The desk's grip on the vehicle: which parts it wants under control, which it holds, and what is
+//! in the way of the others.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::Reply;
+use super::hands::{self, Hands};
+use crate::address::JausId;
+use crate::component::{Control, ControlError};
+use crate::ocu::picture::{Part, Picture};
+use crate::ocu::role::Role;
+use crate::ocu::state;
+
+/// What is wanted and what is held.
+#[derive(Default)]
+pub(super) struct Grip {
+    wanted: Wanted,
+    /// Whether what is held is to act on commands, also after it was started again.
+    ready: bool,
+    holds: BTreeMap<JausId, Hold>,
+    /// Who asked for control and waits for the answers of the parts.
+    waiting: Vec<Reply>,
+}
+
+/// Of what control is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Wanted {
+    #[default]
+    Nothing,
+    /// Of all drivers and the planner: the operator drives.
+    Everything,
+    /// Of the planner, which controls the drivers itself.
+    Planner,
+}
+
+enum Hold {
+    Asking,
+    Held {
+        control: Arc<Control>,
+        since: Instant,
+    },
+    /// Why it is not held, and when it may be asked for again.
+    Not {
+        why: String,
+        again: Instant,
+    },
+}
+
+impl Wanted {
+    const fn takes_in(self, role: Role) -> bool {
+        match self {
+            Self::Nothing => false,
+            Self::Everything => role.is_commanded(),
+            Self::Planner => matches!(role, Role::Planner),
+        }
+    }
+}
+
+impl Grip {
+    /// Before a part that could not be controlled is asked again, if nobody else controls it.
+    const AGAIN: Duration = Duration::from_secs(1);
+    /// A part that has just granted control may still report that it is free.
+    const SETTLED: Duration = Duration::from_secs(1);
+    /// How many may wait for control; more are answered at once.
+    const MOST_WAITING: usize = 64;
+
+    pub(super) const fn wanted(&self) -> Wanted {
+        self.wanted
+    }
+
+    pub(super) const fn is_ready(&self) -> bool {
+        self.ready
+    }
+
+    /// The control over a part, if it is held.
+    pub(super) fn held(&self, part: JausId) -> Option<Arc<Control>> {
+        match self.holds.get(&part)? {
+            Hold::Held { control, .. } if control.is_held() => Some(Arc::clone(control)),
+            _ => None,
+        }
+    }
+
+    /// Everything that is held.
+    pub(super) fn all_held(&self) -> Vec<Arc<Control>> {
+        self.holds
+            .keys()
+            .filter_map(|part| self.held(*part))
+            .collect()
+    }
+
+    /// Why a part is not held though it is wanted.
+    pub(super) fn obstacle(&self, part: JausId) -> Option<String> {
+        match self.holds.get(&part)? {
+            Hold::Not { why, .. } => Some(why.clone()),
+            Hold::Asking | Hold::Held { .. } => None,
+        }
+    }
+
+    /// An operator takes control; the answer comes when every part has answered.
+    pub(super) fn take(
+        &mut self,
+        now: Instant,
+        wanted: Wanted,
+        reply: Reply,
+        picture: &Picture,
+        hands: &mut Hands,
+    ) {
+        self.wanted = wanted;
+        // Whoever has it: it is asked for anew.
+        self.holds
+            .retain(|_, hold| !matches!(hold, Hold::Not { .. }));
+        if self.waiting.len() < Self::MOST_WAITING {
+            self.waiting.push(reply);
+        } else {
+            reply(Err("too many ask for control".to_owned()));
+        }
+        let wanted = self.wanted_parts(picture);
+        for (part, _) in wanted {
+            self.ask(part, hands);
+        }
+        self.handle_time(now, picture, hands);
+    }
+
+    /// What is wanted changes without anybody waiting for it. What is not wanted any more is handed
+    /// out, to be given back.
+    pub(super) fn want(&mut self, wanted: Wanted, picture: &Picture) -> Vec<Arc<Control>> {
+        self.wanted = wanted;
+        self.let_go(picture)
+    }
+
+    /// Everything is to be given back.
+    pub(super) fn release(&mut self, picture: &Picture) -> Vec<Arc<Control>> {
+        self.ready = false;
+        self.want(Wanted::Nothing, picture)
+    }
+
+    /// Whether what is held is to act on commands.
+    pub(super) const fn set_ready(&mut self, ready: bool) {
+        self.ready = ready;
+    }
+
+    /// A part has granted control, or not.
+    pub(super) fn handle_taken(
+        &mut self,
+        now: Instant,
+        part: JausId,
+        result: Result<Control, ControlError>,
+        hands: &mut Hands,
+    ) {
+        // Otherwise it is not wanted any more, and given back by dropping it.
+        let Some(hold @ Hold::Asking) = self.holds.get_mut(&part) else {
+            return;
+        };
+        match result {
+            Ok(control) => {
+                let control = Arc::new(control);
+                if self.ready {
+                    resume(&control, hands);
+                }
+                tracing::info!("in control of {part}");
+                *hold = Hold::Held {
+                    control,
+                    since: now,
+                };
+            }
+            Err(error) => *hold = not(now, &error),
+        }
+    }
+
+    /// Asks for what is wanted and not held, lets go of what is not wanted, and notices what was
+    /// lost.
+    pub(super) fn handle_time(&mut self, now: Instant, picture: &Picture, hands: &mut Hands) {
+        drop(self.let_go(picture));
+        let own = hands.component().id();
+        let wanted = self.wanted_parts(picture);
+        for (id, part) in wanted {
+            match self.holds.get_mut(&id) {
+                Some(Hold::Asking) => {}
+                Some(hold @ Hold::Held { .. }) => look_after(now, own, part, hold),
+                Some(Hold::Not { again, .. }) => {
+                    // Whoever else took it had a reason.
+                    let free = part.controller().is_none_or(|id| id == own);
+                    if free && *again <= now {
+                        self.ask(id, hands);
+                    }
+                }
+                None => self.ask(id, hands),
+            }
+        }
+        self.answer(picture);
+    }
+
+    fn ask(&mut self, part: JausId, hands: &mut Hands) {
+        if !matches!(
+            self.holds.get(&part),
+            Some(Hold::Asking | Hold::Held { .. })
+        ) {
+            self.holds.insert(part, Hold::Asking);
+            hands.take(part);
+        }
+    }
+
+    fn wanted_parts<'p>(&self, picture: &'p Picture) -> Vec<(JausId, &'p Part)> {
+        let parts = picture.parts().iter();
+        let wanted = parts.filter(|(_, part)| self.wanted.takes_in(part.role));
+        wanted.map(|(id, part)| (*id, part)).collect()
+    }
+
+    /// Forgets what is not wanted or not there, and hands out what was held of it.
+    fn let_go(&mut self, picture: &Picture) -> Vec<Arc<Control>> {
+        let mut free = Vec::new();
+        let wanted = self.wanted;
+        self.holds.retain(|id, hold| {
+            let part = picture.parts().get(id);
+            let keeps = part.is_some_and(|part| wanted.takes_in(part.role));
+            if let (false, Hold::Held { control, .. }) = (keeps, hold) {
+                free.push(Arc::clone(control));
+            }
+            keeps
+        });
+        free
+    }
+
+    /// Tells those who asked for control, once every part has answered.
+    fn answer(&mut self, picture: &Picture) {
+        let asking = |hold: &Hold| matches!(hold, Hold::Asking);
+        if self.waiting.is_empty() || self.holds.values().any(asking) {
+            return;
+        }
+        let state = self.state(picture);
+        for reply in self.waiting.drain(..) {
+            reply(if state.held {
+                Ok(())
+            } else if self.wanted == Wanted::Nothing {
+                Err("control was released meanwhile".to_owned())
+            } else {
+                Err(state.reason.clone())
+            });
+        }
+    }
+
+    /// The part without which the operator can do nothing.
+    fn principal(&self, picture: &Picture) -> Option<JausId> {
+        let driver = || picture.find(Role::PrimitiveDriver);
+        let planner = || picture.find(Role::Planner);
+        match self.wanted {
+            Wanted::Planner => planner(),
+            Wanted::Everything | Wanted::Nothing => driver().or_else(planner),
+        }
+    }
+
+    /// As pages show it.
+    pub(super) fn state(&self, picture: &Picture) -> state::Control {
+        let principal = self.principal(picture);
+        let held = principal.is_some_and(|part| self.held(part).is_some());
+        let wanted = self.wanted != Wanted::Nothing;
+        let reason = if wanted && principal.is_none() {
+            "the vehicle has no primitive driver and no planner at present".to_owned()
+        } else {
+            self.reasons(picture)
+        };
+        state::Control {
+            held,
+            wanted,
+            reason,
+        }
+    }
+
+    fn reasons(&self, picture: &Picture) -> String {
+        let reasons = self.holds.iter().filter_map(|(id, hold)| match hold {
+            Hold::Not { why, .. } => {
+                let role = picture.parts().get(id).map_or(Role::Other, |it| it.role);
+                Some(format!("{}: {why}", role.words()))
+            }
+            Hold::Asking | Hold::Held { .. } => None,
+        });
+        reasons.collect::<Vec<_>>().join("; ")
+    }
+}
+
+/// Notices that control is lost, also when only the part knows it, because it was started again.
+fn look_after(now: Instant, own: JausId, part: &Part, hold: &mut Hold) {
+    let Hold::Held { control, since } = hold else {
+        return;
+    };
+    if let Err(error) = control.check() {
+        tracing::info!("{error}");
+        *hold = not(now, &error);
+    } else if let Some(controller) = part.disowns(own, *since + Grip::SETTLED) {
+        let why = match controller {
+            Some(id) => format!("{id} controls it now"),
+            None => {
+                "it has forgotten who controls it, probably because it was started again".into()
+            }
+        };
+        tracing::info!("control over {} is lost: {why}", control.peer());
+        *hold = Hold::Not { why, again: now };
+    }
+}
+
+fn not(now: Instant, error: &ControlError) -> Hold {
+    Hold::Not {
+        why: error.to_string(),
+        again: now + Grip::AGAIN,
+    }
+}
+
+/// Makes a part act on commands as the others do; nobody waits for it.
+fn resume(control: &Arc<Control>, hands: &mut Hands) {
+    let control = Arc::clone(control);
+    hands.tell(
+        Box::new(|result| {
+            if let Err(reason) = result {
+                tracing::info!("not ready: {reason}");
+            }
+        }),
+        async move { control.resume().await.map_err(|error| error.to_string()) },
+    );
+}
+
+/// Gives control of all these back, and waits until that is confirmed.
+pub(super) async fn release_all(controls: Vec<Arc<Control>>) {
+    for control in controls {
+        hands::release(control).await;
+    }
+}

@@ -1,0 +1,215 @@
+//! What a page shows: one snapshot of everything, so that a page that connects again needs nothing
+//! else. What is not known is `null`.
+
+use serde::Serialize;
+
+/// Everything a page shows, at one moment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct State {
+    /// Counts the snapshots.
+    pub seq: u64,
+    /// When it was taken, RFC 3339 in UTC.
+    pub time: String,
+    /// The operator's own id.
+    pub operator: String,
+    /// Everybody who is known.
+    pub tree: Vec<Subsystem>,
+    /// The chosen vehicle.
+    pub vehicle: Option<Vehicle>,
+    /// Whether the operator is in control of it.
+    pub control: Control,
+    /// Manual drive.
+    pub drive: Drive,
+    /// The planner's mission.
+    pub mission: Option<Mission>,
+    /// The map to show.
+    pub map: Option<Map>,
+}
+
+/// A subsystem of the tree.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Subsystem {
+    /// Its number.
+    pub subsystem: u16,
+    /// What it is called.
+    pub name: String,
+    /// What it is, for example `vehicle`.
+    pub kind: String,
+    /// Its nodes.
+    pub nodes: Vec<Node>,
+}
+
+/// A node of the tree.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Node {
+    /// Its number.
+    pub node: u8,
+    /// What it is called.
+    pub name: String,
+    /// Its components.
+    pub components: Vec<Component>,
+}
+
+/// A component of the tree.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Component {
+    /// Its id.
+    pub id: String,
+    /// What it is called.
+    pub name: String,
+    /// What it offers.
+    pub services: Vec<Service>,
+}
+
+/// A service that a component offers.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Service {
+    /// Its name.
+    pub urn: String,
+    /// Major and minor version, as `1.0`.
+    pub version: String,
+}
+
+/// The chosen vehicle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Vehicle {
+    /// Its number.
+    pub subsystem: u16,
+    /// What it is called.
+    pub name: String,
+    /// Where it is.
+    pub pose: Option<Pose>,
+    /// How it moves.
+    pub velocity: Option<Velocity>,
+    /// Its components that can be managed or that the operator needs.
+    pub parts: Vec<Part>,
+    /// Whether it is stopped by an emergency: every part that can be, if this operator wants it.
+    pub emergency: bool,
+}
+
+/// Where a vehicle is, in the local frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pose {
+    /// Metres to the north.
+    pub x: f64,
+    /// Metres to the east.
+    pub y: f64,
+    /// Radians clockwise from north; `null` if the vehicle does not tell.
+    pub yaw: Option<f64>,
+    /// Milliseconds since it was reported.
+    pub age_ms: u64,
+}
+
+/// How a vehicle moves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Velocity {
+    /// Metres per second ahead.
+    pub x: f64,
+    /// Radians per second clockwise.
+    pub yaw_rate: f64,
+    /// Milliseconds since it was reported.
+    pub age_ms: u64,
+}
+
+/// A component of the vehicle.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Part {
+    /// Its id.
+    pub id: String,
+    /// What it does in the vehicle, for example `primitive_driver`.
+    pub role: &'static str,
+    /// Its state in Management, for example `ready`.
+    pub state: Option<&'static str>,
+    /// Who controls it.
+    pub controller: Option<String>,
+    /// With which authority.
+    pub authority: Option<u8>,
+    /// Whether this operator controls it.
+    pub ours: bool,
+    /// Why it is not under control though that is wanted.
+    pub obstacle: Option<String>,
+    /// How far its stage of the waterfall is.
+    pub stage: Option<Stage>,
+    /// Milliseconds since it last reported anything.
+    pub age_ms: Option<u64>,
+}
+
+/// How far a stage is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Stage {
+    /// For example `active`.
+    pub state: &'static str,
+    /// Percent.
+    pub progress: u8,
+    /// Why it does not go on.
+    pub reason: String,
+}
+
+/// Whether the operator is in control.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Default)]
+pub struct Control {
+    /// Control of what is needed now is held: of the primitive driver, or of the planner while it
+    /// drives.
+    pub held: bool,
+    /// Whether it is wanted.
+    pub wanted: bool,
+    /// What is in the way.
+    pub reason: String,
+}
+
+/// Manual drive.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
+pub struct Drive {
+    /// Whether somebody drives.
+    pub active: bool,
+    /// Ahead, -1 to 1.
+    pub forward: f64,
+    /// To the right, -1 to 1.
+    pub turn: f64,
+}
+
+/// The planner's mission.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Mission {
+    /// Its number.
+    pub mission: u32,
+    /// How far it is, for example `driving`.
+    pub stage: &'static str,
+    /// Which try this is.
+    pub attempt: u8,
+    /// How many there are at most.
+    pub attempts: u8,
+    /// Percent.
+    pub progress: u8,
+    /// Metres north and east.
+    pub destination: [f64; 2],
+    /// How much of the path lies ahead.
+    pub remaining_m: f64,
+    /// Why it does not go on.
+    pub reason: String,
+    /// The points of its path, metres north and east, at most 500.
+    pub path: Vec<[f64; 2]>,
+    /// Milliseconds since it was reported.
+    pub age_ms: u64,
+}
+
+/// A map of the vehicle's world model; its cells are asked for separately.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Map {
+    /// Its number.
+    pub id: u16,
+    /// What it is called.
+    pub name: String,
+    /// Cells along X.
+    pub rows: u16,
+    /// Cells along Y.
+    pub columns: u16,
+    /// How long and wide a cell is.
+    pub cell_m: f64,
+    /// Metres north of its south-west corner.
+    pub x: f64,
+    /// Metres east of its south-west corner.
+    pub y: f64,
+    /// Raised by every change.
+    pub revision: u32,
+}

@@ -1,0 +1,247 @@
+//! The stick of manual drive: who holds it, what it says, and the dead man's rule, by which the
+//! vehicle stops when nothing more comes from whoever drives.
+
+use std::time::{Duration, Instant};
+
+use super::PageId;
+
+/// Where the stick is pushed, each from -1 to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Push {
+    forward: f64,
+    turn: f64,
+}
+
+/// Another page drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("another page drives now; it has to let go first")]
+pub struct Busy;
+
+/// One stick for all pages: the first to push holds it until it lets go or falls silent.
+#[derive(Debug, Default)]
+pub struct Stick {
+    phase: Phase,
+}
+
+#[derive(Debug, Default)]
+enum Phase {
+    /// Nobody drives, and the vehicle knows that.
+    #[default]
+    Rest,
+    Driven {
+        page: PageId,
+        push: Push,
+        heard: Instant,
+    },
+    /// Nobody drives any more, and the vehicle is being told.
+    Stopping { since: Instant },
+}
+
+impl Push {
+    /// A stick that is let go.
+    pub const NONE: Self = Self {
+        forward: 0.0,
+        turn: 0.0,
+    };
+
+    /// Ahead and to the right are positive; `None` if one of them is not from -1 to 1.
+    #[must_use]
+    pub fn new(forward: f64, turn: f64) -> Option<Self> {
+        let possible = |share: f64| (-1.0..=1.0).contains(&share);
+        (possible(forward) && possible(turn)).then_some(Self { forward, turn })
+    }
+
+    /// Ahead, from -1 to 1.
+    #[must_use]
+    pub const fn forward(self) -> f64 {
+        self.forward
+    }
+
+    /// To the right, clockwise from above, from -1 to 1.
+    #[must_use]
+    pub const fn turn(self) -> f64 {
+        self.turn
+    }
+}
+
+impl Stick {
+    /// Without a push for so long, the vehicle stops.
+    pub const DEAD_MAN: Duration = Duration::from_millis(300);
+    /// The vehicle is told to stop for so long at most, if it never says that it knows: by then its
+    /// own rule has stopped it.
+    pub const STOPPING: Duration = Duration::from_secs(3);
+
+    /// A page pushes the stick.
+    ///
+    /// # Errors
+    /// If another page holds it.
+    pub fn handle_push(&mut self, now: Instant, page: PageId, push: Push) -> Result<(), Busy> {
+        self.handle_time(now);
+        match &self.phase {
+            Phase::Driven { page: holder, .. } if *holder != page => Err(Busy),
+            _ => {
+                self.phase = Phase::Driven {
+                    page,
+                    push,
+                    heard: now,
+                };
+                Ok(())
+            }
+        }
+    }
+
+    /// A page lets go, or is gone. Without effect unless it holds the stick.
+    pub fn handle_release(&mut self, now: Instant, page: PageId) {
+        if matches!(self.phase, Phase::Driven { page: holder, .. } if holder == page) {
+            self.stop(now);
+        }
+    }
+
+    /// The vehicle has acknowledged that nothing pushes it.
+    pub fn handle_stopped(&mut self) {
+        if matches!(self.phase, Phase::Stopping { .. }) {
+            self.phase = Phase::Rest;
+        }
+    }
+
+    /// Time has passed: a stick that nobody seems to hold any more is let go.
+    pub fn handle_time(&mut self, now: Instant) {
+        match self.phase {
+            Phase::Driven { heard, .. } if now >= heard + Self::DEAD_MAN => self.stop(now),
+            Phase::Stopping { since } if now >= since + Self::STOPPING => self.phase = Phase::Rest,
+            _ => {}
+        }
+    }
+
+    /// Takes the stick out of every hand.
+    pub fn stop(&mut self, now: Instant) {
+        if matches!(self.phase, Phase::Driven { .. }) {
+            self.phase = Phase::Stopping { since: now };
+        }
+    }
+
+    /// What the vehicle is to be told now; nothing if it is at rest.
+    #[must_use]
+    pub fn poll_push(&mut self, now: Instant) -> Option<Push> {
+        self.handle_time(now);
+        match self.phase {
+            Phase::Rest => None,
+            Phase::Driven { push, .. } => Some(push),
+            Phase::Stopping { .. } => Some(Push::NONE),
+        }
+    }
+
+    /// What is pushed, if somebody drives.
+    #[must_use]
+    pub const fn driven(&self) -> Option<Push> {
+        match self.phase {
+            Phase::Driven { push, .. } => Some(push),
+            Phase::Rest | Phase::Stopping { .. } => None,
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the tests' time begins somewhere"
+)]
+mod tests {
+    use super::*;
+
+    const ONE: PageId = PageId(1);
+    const OTHER: PageId = PageId(2);
+
+    fn ahead() -> Push {
+        Push::new(0.5, 0.0).unwrap()
+    }
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn what_is_pushed_holds_until_300_ms_of_silence_and_then_the_vehicle_is_stopped() {
+        let start = Instant::now();
+        let mut stick = Stick::default();
+        stick.handle_push(start, ONE, ahead()).unwrap();
+        assert_eq!(stick.poll_push(start + ms(299)), Some(ahead()));
+        assert_eq!(stick.poll_push(start + ms(300)), Some(Push::NONE));
+        assert_eq!(stick.driven(), None);
+    }
+
+    #[test]
+    fn every_push_starts_the_time_of_silence_anew() {
+        let start = Instant::now();
+        let mut stick = Stick::default();
+        for step in 0..50 {
+            let now = start + ms(100 * step);
+            stick.handle_push(now, ONE, ahead()).unwrap();
+            assert_eq!(stick.poll_push(now + ms(99)), Some(ahead()));
+        }
+    }
+
+    #[test]
+    fn the_vehicle_is_told_to_stop_until_it_acknowledges_that() {
+        let start = Instant::now();
+        let mut stick = Stick::default();
+        stick.handle_push(start, ONE, ahead()).unwrap();
+        stick.handle_release(start + ms(10), ONE);
+        assert_eq!(stick.poll_push(start + ms(20)), Some(Push::NONE));
+        assert_eq!(stick.poll_push(start + ms(2000)), Some(Push::NONE));
+        stick.handle_stopped();
+        assert_eq!(stick.poll_push(start + ms(2050)), None);
+    }
+
+    #[test]
+    fn a_vehicle_that_never_acknowledges_is_left_to_its_own_rule() {
+        let start = Instant::now();
+        let mut stick = Stick::default();
+        stick.handle_push(start, ONE, ahead()).unwrap();
+        stick.stop(start);
+        assert_eq!(
+            stick.poll_push(start + Stick::STOPPING - ms(1)),
+            Some(Push::NONE)
+        );
+        assert_eq!(stick.poll_push(start + Stick::STOPPING), None);
+    }
+
+    #[test]
+    fn a_late_acknowledgement_of_a_stop_does_not_stop_who_drives_again() {
+        let start = Instant::now();
+        let mut stick = Stick::default();
+        stick.handle_push(start, ONE, ahead()).unwrap();
+        stick.stop(start);
+        stick.handle_push(start + ms(10), ONE, ahead()).unwrap();
+        stick.handle_stopped();
+        assert_eq!(stick.poll_push(start + ms(20)), Some(ahead()));
+    }
+
+    #[test]
+    fn one_page_drives_at_a_time_and_the_next_may_once_the_first_lets_go_or_is_silent() {
+        let start = Instant::now();
+        let mut stick = Stick::default();
+        stick.handle_push(start, ONE, ahead()).unwrap();
+        assert_eq!(
+            stick.handle_push(start + ms(200), OTHER, ahead()),
+            Err(Busy)
+        );
+        stick.handle_release(start + ms(200), OTHER);
+        assert_eq!(stick.driven(), Some(ahead()), "it is not theirs to let go");
+        stick.handle_push(start + ms(300), OTHER, ahead()).unwrap();
+        assert_eq!(stick.handle_push(start + ms(400), ONE, ahead()), Err(Busy));
+    }
+
+    #[test]
+    fn a_stick_is_pushed_no_further_than_it_goes() {
+        for (forward, turn) in [
+            (1.01, 0.0),
+            (0.0, -1.01),
+            (f64::NAN, 0.0),
+            (0.0, f64::INFINITY),
+        ] {
+            assert_eq!(Push::new(forward, turn), None, "{forward} {turn}");
+        }
+        assert!(Push::new(1.0, -1.0).is_some());
+    }
+}

@@ -1,0 +1,148 @@
+//! The secret that an operator shows before the vehicle obeys.
+
+use std::fmt;
+use std::hint::black_box;
+use std::path::Path;
+
+/// What an operator has to show: from a file, or made up for one run.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Token(String);
+
+/// Why there is no token.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TokenError {
+    /// The file can not be read.
+    #[error("the token file {file} can not be read: {source}")]
+    Unreadable {
+        /// Which file.
+        file: String,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// What it holds is no secret.
+    #[error(
+        "the token file {file} holds {length} characters: write one line of {} to {} letters and \
+         digits into it, such as `openssl rand -hex 16` prints",
+        Token::SHORTEST,
+        Token::LONGEST
+    )]
+    Unsuitable {
+        /// Which file.
+        file: String,
+        /// How many characters it holds, without spaces around them.
+        length: usize,
+    },
+    /// The system has no randomness.
+    #[error("no token can be made up, because the system gives no random numbers: {0}")]
+    NoRandomness(getrandom::Error),
+}
+
+impl Token {
+    /// The shortest that is accepted.
+    pub const SHORTEST: usize = 16;
+    /// The longest that is accepted.
+    pub const LONGEST: usize = 256;
+    /// Octets of randomness in one that is made up.
+    const RANDOM: usize = 16;
+
+    /// Takes the token from a file of one line.
+    ///
+    /// # Errors
+    /// If the file can not be read, or holds something too short, too long, or with other characters
+    /// than letters, digits and `-._~`.
+    pub fn read(file: &Path) -> Result<Self, TokenError> {
+        let name = || file.display().to_string();
+        let text = std::fs::read_to_string(file).map_err(|source| TokenError::Unreadable {
+            file: name(),
+            source,
+        })?;
+        Self::new(text.trim()).ok_or_else(|| TokenError::Unsuitable {
+            file: name(),
+            length: text.trim().chars().count(),
+        })
+    }
+
+    /// A token of one's own; `None` if it is too short, too long, or would have to be quoted in an
+    /// address.
+    #[must_use]
+    pub fn new(text: &str) -> Option<Self> {
+        let plain = |it: u8| it.is_ascii_alphanumeric() || b"-._~".contains(&it);
+        let suits =
+            (Self::SHORTEST..=Self::LONGEST).contains(&text.len()) && text.bytes().all(plain);
+        suits.then(|| Self(text.to_owned()))
+    }
+
+    /// Makes one up: 32 hexadecimal digits.
+    ///
+    /// # Errors
+    /// If the system gives no random numbers.
+    pub fn generate() -> Result<Self, TokenError> {
+        let mut octets = [0; Self::RANDOM];
+        getrandom::fill(&mut octets).map_err(TokenError::NoRandomness)?;
+        Ok(Self(octets.iter().map(|it| format!("{it:02x}")).collect()))
+    }
+
+    /// Whether this is what was shown; how long that takes says nothing about where they differ.
+    #[must_use]
+    pub fn is(&self, shown: &str) -> bool {
+        if shown.len() != self.0.len() {
+            return false;
+        }
+        let pairs = self.0.bytes().zip(shown.bytes());
+        let difference = pairs.fold(0, |difference, (a, b)| black_box(difference | (a ^ b)));
+        difference == 0
+    }
+
+    /// The token itself, to be shown to the operator.
+    #[must_use]
+    pub fn reveal(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Debug for Token {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Token(…)")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_token_is_itself_and_nothing_else() {
+        let token = Token::new("0123456789abcdef").unwrap();
+        assert!(token.is("0123456789abcdef"));
+        for wrong in [
+            "",
+            "0123456789abcdeg",
+            "0123456789abcde",
+            "0123456789abcdef0",
+        ] {
+            assert!(!token.is(wrong), "{wrong}");
+        }
+        assert!(!format!("{token:?}").contains("0123"));
+    }
+
+    #[test]
+    fn what_is_guessed_or_has_to_be_quoted_is_no_token() {
+        for text in [
+            "",
+            "short",
+            "with spaces in it, long",
+            "ümläüt-ümläüt-ümläüt",
+        ] {
+            assert!(Token::new(text).is_none(), "{text}");
+        }
+        assert!(Token::new(&"a".repeat(257)).is_none());
+    }
+
+    #[test]
+    fn no_two_tokens_are_made_up_alike() {
+        let [one, other] = [Token::generate().unwrap(), Token::generate().unwrap()];
+        assert!(!one.is(other.reveal()));
+        assert_eq!(one.reveal().len(), 32);
+    }
+}
