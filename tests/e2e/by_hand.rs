@@ -78,8 +78,11 @@ pub(crate) fn run() {
     page.hold("#stick", (0.0, -0.6));
     page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
     page.screenshot("by-hand-stick");
-    emergency(&mut page);
+    page.key_down("Escape", "Escape");
+    page.wait("document.body.dataset.emergency === 'stopped'");
+    page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
     page.let_go();
+    emergency(&mut page);
 
     let port = address
         .trim_end_matches('/')
