@@ -40,6 +40,8 @@ pub mod vehicle;
 #[cfg(feature = "view")]
 pub mod view;
 pub mod wire;
+#[cfg(feature = "ground")]
+pub mod world;
 
 /// The README's programs compile.
 #[cfg(all(doctest, feature = "node", feature = "mobility"))]

@@ -6,6 +6,7 @@
 //! when another one is started again.
 
 mod drivers;
+mod knowledge_store;
 mod planner;
 mod pose_file;
 mod pose_sensor;
@@ -20,6 +21,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use crate::component::{self, Builder, Component, Kind};
 use crate::node::{Node, Port};
 
+pub use knowledge_store::{Broken, KnowledgeStore};
 pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 #[cfg(all(feature = "gpio", target_os = "linux"))]

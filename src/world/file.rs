@@ -1,0 +1,387 @@
+//! What is kept on the disk, and how: one file, whose every change is whole and lasting or has not
+//! happened.
+//!
+//! The file is a `redb` database: a change is written to free pages first, then made valid by one
+//! write of a checked header, with the disk told to keep both in that order. Which format it has is
+//! kept in it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use redb::{
+    Builder, Database, DatabaseError, ReadableDatabase, ReadableTable, StorageBackend,
+    TableDefinition, TableError, WriteTransaction,
+};
+
+use super::collection::Collection;
+use super::object::{Object, ObjectId};
+use super::raster::{MapId, Raster, Window};
+use super::record;
+use super::tiles::{self, TileId};
+
+/// The format of the file. A newer program reads older ones, or says that it does not.
+const FORMAT: u64 = 1;
+/// Memory for parts of the file, in octets. A map of 1024 x 1024 cells fits.
+const CACHE: usize = 4 << 20;
+
+const NUMBERS: TableDefinition<'_, &str, u64> = TableDefinition::new("numbers");
+const OBJECTS: TableDefinition<'_, u32, &[u8]> = TableDefinition::new("objects");
+const CLASSES: TableDefinition<'_, u16, &str> = TableDefinition::new("classes");
+const RASTERS: TableDefinition<'_, u16, &[u8]> = TableDefinition::new("rasters");
+/// By map, row and column of the tile.
+const TILES: TableDefinition<'_, (u16, u16, u16), &[u8]> = TableDefinition::new("tiles");
+
+/// A number that is counted up and never used again.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Counter {
+    LastObject,
+    LastMap,
+}
+
+impl Counter {
+    const fn key(self) -> &'static str {
+        match self {
+            Self::LastObject => "last object",
+            Self::LastMap => "last map",
+        }
+    }
+}
+
+/// Why a file can not be used. Whatever it is, the file is as it was.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OpenError {
+    /// It can not be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: io::Error,
+    },
+    /// Another process has it.
+    #[error("{}: another process has this store open; end that one or use another file", .0.display())]
+    InUse(PathBuf),
+    /// It is damaged, or no store.
+    #[error("{}: this is no store, or it is damaged: {why}", path.display())]
+    Broken {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// It was written by a newer version of this program.
+    #[error(
+        "{}: the store has format {found}, and this program knows formats up to {FORMAT}; use a newer one",
+        path.display()
+    )]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        found: u64,
+    },
+}
+
+impl OpenError {
+    fn broken(path: &Path, why: impl ToString) -> Self {
+        Self::Broken {
+            path: path.to_owned(),
+            why: why.to_string(),
+        }
+    }
+
+    fn io(path: &Path, source: io::Error) -> Self {
+        Self::Io {
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
+/// Why something could not be kept or read. The file is as it was before; it has to be opened again.
+#[derive(Debug, thiserror::Error)]
+#[error("the store can not be read or written: {0}")]
+pub struct KeepError(String);
+
+impl<E: Into<redb::Error>> From<E> for KeepError {
+    fn from(error: E) -> Self {
+        Self(error.into().to_string())
+    }
+}
+
+impl KeepError {
+    fn record(error: impl ToString) -> Self {
+        Self(error.to_string())
+    }
+
+    /// What is said to whoever still wants something after the first failure.
+    pub(super) fn closed() -> Self {
+        Self("it has failed before and is closed".to_owned())
+    }
+}
+
+/// Everything but cells, as it was kept.
+#[derive(Default)]
+pub(super) struct Loaded {
+    pub(super) objects: Collection,
+    pub(super) classes: Vec<(u16, String)>,
+    pub(super) rasters: Vec<(MapId, Raster)>,
+    pub(super) last_object: u32,
+    pub(super) last_map: u16,
+}
+
+/// An open file.
+#[derive(Debug)]
+pub(super) struct File {
+    database: Database,
+}
+
+impl File {
+    /// Opens a file, and makes it if it is not there.
+    pub(super) fn open(path: &Path) -> Result<(Self, Loaded), OpenError> {
+        match fs::metadata(path) {
+            Ok(_) => Self::check(path, builder().open(path)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Self::create(path),
+            Err(error) => Err(OpenError::io(path, error)),
+        }
+    }
+
+    /// Makes a file under another name first, so that a power cut leaves it whole or not there.
+    fn create(path: &Path) -> Result<(Self, Loaded), OpenError> {
+        let fail = |error| OpenError::io(path, error);
+        let directory = path.parent().filter(|it| !it.as_os_str().is_empty());
+        let directory = directory.unwrap_or(Path::new("."));
+        fs::create_dir_all(directory).map_err(|error| OpenError::io(directory, error))?;
+        let mut unfinished = path.as_os_str().to_owned();
+        unfinished.push(".new");
+        match fs::remove_file(&unfinished) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(fail(error)),
+            _ => {}
+        }
+        let made = Self::check(path, builder().create(&unfinished))?;
+        fs::rename(&unfinished, path).map_err(fail)?;
+        sync(directory).map_err(fail)?;
+        Ok(made)
+    }
+
+    /// Opens what is kept elsewhere than in a file.
+    pub(super) fn on(backend: impl StorageBackend) -> Result<(Self, Loaded), OpenError> {
+        Self::check(
+            Path::new("(not a file)"),
+            builder().create_with_backend(backend),
+        )
+    }
+
+    fn check(
+        path: &Path,
+        opened: Result<Database, DatabaseError>,
+    ) -> Result<(Self, Loaded), OpenError> {
+        let database = opened.map_err(|error| match error {
+            DatabaseError::DatabaseAlreadyOpen => OpenError::InUse(path.to_owned()),
+            DatabaseError::Storage(redb::StorageError::Io(error))
+                if error.kind() != io::ErrorKind::InvalidData
+                    && error.kind() != io::ErrorKind::UnexpectedEof =>
+            {
+                OpenError::io(path, error)
+            }
+            error => OpenError::broken(path, error),
+        })?;
+        let file = Self { database };
+        let format = file
+            .format()
+            .map_err(|error| OpenError::broken(path, error))?;
+        if format > FORMAT {
+            return Err(OpenError::Newer {
+                path: path.to_owned(),
+                found: format,
+            });
+        }
+        let loaded = file
+            .load()
+            .map_err(|error| OpenError::broken(path, error))?;
+        Ok((file, loaded))
+    }
+
+    /// The format of the file, which is written into a new one.
+    fn format(&self) -> Result<u64, KeepError> {
+        const KEY: &str = "format";
+        let reading = self.database.begin_read()?;
+        match reading.open_table(NUMBERS) {
+            Ok(numbers) => match numbers.get(KEY)? {
+                Some(format) => Ok(format.value()),
+                None => Err(KeepError::record("it does not say which format it has")),
+            },
+            Err(TableError::TableDoesNotExist(_)) => {
+                let writing = self.database.begin_write()?;
+                {
+                    writing.open_table(NUMBERS)?.insert(KEY, FORMAT)?;
+                    writing.open_table(OBJECTS)?;
+                    writing.open_table(CLASSES)?;
+                    writing.open_table(RASTERS)?;
+                    writing.open_table(TILES)?;
+                }
+                writing.commit()?;
+                Ok(FORMAT)
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn load(&self) -> Result<Loaded, KeepError> {
+        let reading = self.database.begin_read()?;
+        let mut objects = Vec::new();
+        for entry in reading.open_table(OBJECTS)?.iter()? {
+            let (id, octets) = entry?;
+            let object = record::read_object(octets.value()).map_err(KeepError::record)?;
+            objects.push((ObjectId(id.value()), object));
+        }
+        let mut classes = Vec::new();
+        for entry in reading.open_table(CLASSES)?.iter()? {
+            let (id, text) = entry?;
+            classes.push((id.value(), text.value().to_owned()));
+        }
+        let mut rasters = Vec::new();
+        for entry in reading.open_table(RASTERS)?.iter()? {
+            let (id, octets) = entry?;
+            let raster = record::read_raster(octets.value()).map_err(KeepError::record)?;
+            rasters.push((MapId(id.value()), raster));
+        }
+        let numbers = reading.open_table(NUMBERS)?;
+        let last = |counter: Counter| -> Result<u64, KeepError> {
+            Ok(numbers.get(counter.key())?.map_or(0, |it| it.value()))
+        };
+        Ok(Loaded {
+            objects: Collection::new(objects.into_iter()),
+            classes,
+            rasters,
+            last_object: last(Counter::LastObject)? as u32,
+            last_map: last(Counter::LastMap)? as u16,
+        })
+    }
+
+    /// The cells of a window that is on the map.
+    pub(super) fn cells(&self, map: MapId, fill: u8, window: Window) -> Result<Vec<u8>, KeepError> {
+        let tiles = self.database.begin_read()?.open_table(TILES)?;
+        let mut cells = vec![fill; window.cells()];
+        for overlap in tiles::overlaps(window) {
+            let (row, column) = overlap.tile;
+            if let Some(tile) = tiles.get((map.0, row, column))? {
+                overlap.take(whole(tile.value())?, &mut cells);
+            }
+        }
+        Ok(cells)
+    }
+
+    /// Begins a change, which has not happened until it is [kept](Writing::keep).
+    pub(super) fn begin(&self) -> Result<Writing, KeepError> {
+        Ok(Writing {
+            transaction: self.database.begin_write()?,
+        })
+    }
+}
+
+/// A change on its way to the disk; dropped before its end, it has not happened.
+pub(super) struct Writing {
+    transaction: WriteTransaction,
+}
+
+impl Writing {
+    pub(super) fn put_object(&self, id: ObjectId, object: &Object) -> Result<(), KeepError> {
+        let octets = record::write_object(object).map_err(KeepError::record)?;
+        let mut objects = self.transaction.open_table(OBJECTS)?;
+        objects.insert(id.0, &octets[..])?;
+        Ok(())
+    }
+
+    pub(super) fn remove_object(&self, id: ObjectId) -> Result<(), KeepError> {
+        self.transaction.open_table(OBJECTS)?.remove(id.0)?;
+        Ok(())
+    }
+
+    /// `None` forgets it.
+    pub(super) fn describe(&self, class: u16, text: Option<&str>) -> Result<(), KeepError> {
+        let mut classes = self.transaction.open_table(CLASSES)?;
+        match text {
+            Some(text) => classes.insert(class, text)?,
+            None => classes.remove(class)?,
+        };
+        Ok(())
+    }
+
+    pub(super) fn put_raster(&self, id: MapId, raster: &Raster) -> Result<(), KeepError> {
+        let octets = record::write_raster(raster).map_err(KeepError::record)?;
+        let mut rasters = self.transaction.open_table(RASTERS)?;
+        rasters.insert(id.0, &octets[..])?;
+        Ok(())
+    }
+
+    /// With all its tiles.
+    pub(super) fn remove_raster(&self, id: MapId) -> Result<(), KeepError> {
+        self.transaction.open_table(RASTERS)?.remove(id.0)?;
+        let mut tiles = self.transaction.open_table(TILES)?;
+        tiles.retain_in((id.0, 0, 0)..=(id.0, u16::MAX, u16::MAX), |_, _| false)?;
+        Ok(())
+    }
+
+    /// Sets the cells of a window that is on the map.
+    pub(super) fn put_cells(
+        &self,
+        map: MapId,
+        fill: u8,
+        window: Window,
+        cells: &[u8],
+    ) -> Result<(), KeepError> {
+        let mut tiles = self.transaction.open_table(TILES)?;
+        for overlap in tiles::overlaps(window) {
+            let (row, column): TileId = overlap.tile;
+            let key = (map.0, row, column);
+            let mut tile = [fill; tiles::CELLS];
+            if let Some(before) = tiles.get(key)? {
+                tile.copy_from_slice(whole(before.value())?);
+            }
+            overlap.put(cells, &mut tile);
+            if tile.iter().all(|&cell| cell == fill) {
+                tiles.remove(key)?;
+            } else {
+                tiles.insert(key, &tile[..])?;
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn count(&self, counter: Counter, last: u64) -> Result<(), KeepError> {
+        let mut numbers = self.transaction.open_table(NUMBERS)?;
+        numbers.insert(counter.key(), last)?;
+        Ok(())
+    }
+
+    /// Returns once all of it is on the disk.
+    pub(super) fn keep(self) -> Result<(), KeepError> {
+        Ok(self.transaction.commit()?)
+    }
+}
+
+fn builder() -> Builder {
+    let mut builder = Builder::new();
+    builder.set_cache_size(CACHE);
+    builder.set_check_integrity_on_open(true);
+    builder
+}
+
+fn whole(tile: &[u8]) -> Result<&[u8], KeepError> {
+    if tile.len() == tiles::CELLS {
+        Ok(tile)
+    } else {
+        Err(KeepError::record("a tile has a wrong size"))
+    }
+}
+
+/// Has the disk keep which files there are. Only Unix needs and knows it.
+fn sync(directory: &Path) -> io::Result<()> {
+    if cfg!(unix) {
+        fs::File::open(directory)?.sync_all()?;
+    }
+    Ok(())
+}

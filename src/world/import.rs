@@ -1,0 +1,238 @@
+//! Maps from files that people make: PGM pictures, and text.
+//!
+//! In a PGM picture (`P2` or `P5`) black is impassable and white is free. In text each line is a row:
+//! `#` is impassable, `.` and a blank are free, `0` to `9` are in between. North is at the top.
+
+use super::raster::Raster;
+
+/// The cells of a map, without its place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// From south to north.
+    pub rows: u16,
+    /// From west to east.
+    pub columns: u16,
+    /// Row by row from the south.
+    pub cells: Vec<u8>,
+}
+
+/// Why a file is no map.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// The head of a picture can not be read.
+    #[error(
+        "the picture's head is not that of a PGM file: P2 or P5, width, height, greatest value up to 65535"
+    )]
+    Head,
+    /// There are no cells or too many.
+    #[error("{rows} rows and {columns} columns can not be a map: 1 to 4096 of each can")]
+    Size {
+        /// Of the file.
+        rows: usize,
+        /// Of the file.
+        columns: usize,
+    },
+    /// The picture ends too early, or has something that is no value.
+    #[error("the picture has {found} values that can be read instead of {wanted}")]
+    Cells {
+        /// Width times height.
+        wanted: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// A line is shorter or longer than the first.
+    #[error(
+        "line {line} has {found} cells instead of {wanted} as the first; make them equally long"
+    )]
+    Line {
+        /// From 1.
+        line: usize,
+        /// As the first line has.
+        wanted: usize,
+        /// In this line.
+        found: usize,
+    },
+    /// A character does not stand for a cell.
+    #[error(
+        "line {line}: '{found}' is no cell; write # for impassable, . for free, 0 to 9 for in between"
+    )]
+    Character {
+        /// From 1.
+        line: usize,
+        /// What it is.
+        found: char,
+    },
+}
+
+impl Picture {
+    /// Reads the octets of a file.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    pub fn read(octets: &[u8]) -> Result<Self, ImportError> {
+        match octets {
+            [b'P', b'2' | b'5', b' ' | b'\t' | b'\r' | b'\n' | b'#', ..] => read_pgm(octets),
+            _ => read_text(&String::from_utf8_lossy(octets)),
+        }
+    }
+
+    /// The map of 16 x 16 cells that a vehicle is shown on: two walls with gaps, and rough ground.
+    #[must_use]
+    pub fn demo() -> Self {
+        read_text(DEMO).unwrap_or(Self {
+            rows: 1,
+            columns: 1,
+            cells: vec![u8::MAX],
+        })
+    }
+
+    /// The map at a place.
+    #[must_use]
+    pub fn at(&self, name: String, cell: f32, (x, y): (f64, f64)) -> Raster {
+        Raster {
+            name,
+            rows: self.rows,
+            columns: self.columns,
+            cell,
+            x,
+            y,
+            fill: u8::MAX,
+            revision: 0,
+        }
+    }
+
+    /// From cells whose first row is the northernmost.
+    fn from_north(rows: usize, columns: usize, cells: &[u8]) -> Result<Self, ImportError> {
+        let side = |count: usize| {
+            u16::try_from(count)
+                .ok()
+                .filter(|it| (1..=Raster::MOST_SIDE).contains(it))
+        };
+        let (Some(high), Some(wide)) = (side(rows), side(columns)) else {
+            return Err(ImportError::Size { rows, columns });
+        };
+        Ok(Self {
+            rows: high,
+            columns: wide,
+            cells: cells.chunks(columns).rev().flatten().copied().collect(),
+        })
+    }
+}
+
+const DEMO: &str = "\
+................
+................
+..####....3333..
+..#..#....3333..
+..#..#....3333..
+.....#..........
+.....#######....
+................
+................
+....#######.....
+..........#.....
+..........#..#..
+..333.....####..
+..333...........
+................
+................
+";
+
+fn read_text(text: &str) -> Result<Picture, ImportError> {
+    let mut cells = Vec::new();
+    let mut columns = 0;
+    let mut rows = 0;
+    for (index, line) in text.lines().enumerate() {
+        let (line, before) = (line.trim_end_matches('\r'), cells.len());
+        for found in line.chars() {
+            let cell = cell(found);
+            let number = index + 1;
+            cells.push(cell.ok_or(ImportError::Character {
+                line: number,
+                found,
+            })?);
+        }
+        let found = cells.len() - before;
+        if index == 0 {
+            columns = found;
+        } else if found != columns {
+            let (line, wanted) = (index + 1, columns);
+            return Err(ImportError::Line {
+                line,
+                wanted,
+                found,
+            });
+        }
+        rows += 1;
+    }
+    Picture::from_north(rows, columns, &cells)
+}
+
+fn cell(character: char) -> Option<u8> {
+    match character {
+        '#' => Some(0),
+        '.' | ' ' => Some(u8::MAX),
+        _ => {
+            let digit = character.to_digit(10)?;
+            Some((digit * 255 / 9) as u8)
+        }
+    }
+}
+
+fn read_pgm(octets: &[u8]) -> Result<Picture, ImportError> {
+    let binary = octets[1] == b'5';
+    let mut rest = &octets[2..];
+    let mut head = [0_usize; 3];
+    for number in &mut head {
+        *number = next_number(&mut rest).ok_or(ImportError::Head)?;
+    }
+    let [columns, rows, greatest] = head;
+    if !(1..=65535).contains(&greatest) {
+        return Err(ImportError::Head);
+    }
+    let side = 1..=usize::from(Raster::MOST_SIDE);
+    if !side.contains(&rows) || !side.contains(&columns) {
+        return Err(ImportError::Size { rows, columns });
+    }
+    let wanted = rows * columns;
+    let scaled = |value: usize| (value.min(greatest) * 255 / greatest) as u8;
+    let cells: Vec<u8> = if binary {
+        // One blank ends the head.
+        let values = rest.get(1..).unwrap_or_default();
+        let size = if greatest > 255 { 2 } else { 1 };
+        let values = values.chunks_exact(size);
+        let number = |octets: &[u8]| {
+            octets
+                .iter()
+                .fold(0, |sum, &it| sum * 256 + usize::from(it))
+        };
+        values.take(wanted).map(|it| scaled(number(it))).collect()
+    } else {
+        let values = std::iter::from_fn(|| next_number(&mut rest));
+        values.take(wanted).map(scaled).collect()
+    };
+    if cells.len() != wanted {
+        let found = cells.len();
+        return Err(ImportError::Cells { wanted, found });
+    }
+    Picture::from_north(rows, columns, &cells)
+}
+
+/// The next number of a picture's text, past blanks and comments.
+fn next_number(rest: &mut &[u8]) -> Option<usize> {
+    loop {
+        match rest.first()? {
+            b'#' => {
+                let end = rest.iter().position(|&it| it == b'\n')?;
+                *rest = &rest[end..];
+            }
+            octet if octet.is_ascii_whitespace() => *rest = &rest[1..],
+            _ => break,
+        }
+    }
+    let digits = rest.iter().take_while(|it| it.is_ascii_digit()).count();
+    let (number, after) = rest.split_at(digits);
+    *rest = after;
+    std::str::from_utf8(number).ok()?.parse().ok()
+}

@@ -1,0 +1,132 @@
+//! Maps of equal cells: what is known about one, and which part of it somebody means.
+
+use std::fmt;
+
+/// The number that a store gives a map, from 1 on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MapId(pub u16);
+
+impl fmt::Display for MapId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "map {}", self.0)
+    }
+}
+
+/// A rectangle of the local frame in equal square cells, one octet each: 0 is impassable, 255 free.
+///
+/// Rows grow with X, to the north, columns with Y, to the east.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Raster {
+    /// What it is called: at most 255 octets.
+    pub name: String,
+    /// From south to north, 1 to [`MOST_SIDE`](Self::MOST_SIDE).
+    pub rows: u16,
+    /// From west to east, 1 to [`MOST_SIDE`](Self::MOST_SIDE).
+    pub columns: u16,
+    /// Side of a cell in metres, 0.001 to 1000.
+    pub cell: f32,
+    /// The south-western corner: X in metres.
+    pub x: f64,
+    /// The south-western corner: Y in metres.
+    pub y: f64,
+    /// What cells are that nobody has set.
+    pub fill: u8,
+    /// Counts the changes, from 1 on.
+    pub revision: u32,
+}
+
+impl Raster {
+    /// The most rows, and the most columns.
+    pub const MOST_SIDE: u16 = 4096;
+    /// The most octets of a name.
+    pub const MOST_NAME: usize = 255;
+
+    /// How many cells it has.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        usize::from(self.rows) * usize::from(self.columns)
+    }
+
+    /// All of it.
+    #[must_use]
+    pub const fn whole(&self) -> Window {
+        Window {
+            row: 0,
+            column: 0,
+            rows: self.rows,
+            columns: self.columns,
+        }
+    }
+
+    /// What is wrong with it, if anything.
+    pub(super) fn fault(&self) -> Option<String> {
+        let side = 1..=Self::MOST_SIDE;
+        if !side.contains(&self.rows) || !side.contains(&self.columns) {
+            return Some(format!(
+                "a map of {} x {} cells can not be kept: 1 to {} rows and columns can",
+                self.rows,
+                self.columns,
+                Self::MOST_SIDE
+            ));
+        }
+        if !(0.001..=1000.0).contains(&self.cell) {
+            return Some(format!(
+                "cells of {} m can not be kept: 0.001 to 1000 m can",
+                self.cell
+            ));
+        }
+        if !self.x.is_finite() || !self.y.is_finite() {
+            return Some(format!(
+                "x {} m, y {} m is no place in the local frame",
+                self.x, self.y
+            ));
+        }
+        (self.name.len() > Self::MOST_NAME).then(|| "the name is longer than 255 octets".to_owned())
+    }
+
+    /// A part of the map, with 0 rows or columns for all that follow; `None` if it is not on it.
+    #[must_use]
+    pub fn window(&self, asked: Window) -> Option<Window> {
+        let span = |first: u16, count: u16, all: u16| match count {
+            0 => all.checked_sub(first).filter(|&rest| rest > 0),
+            _ => (u32::from(first) + u32::from(count) <= u32::from(all)).then_some(count),
+        };
+        Some(Window {
+            rows: span(asked.row, asked.rows, self.rows)?,
+            columns: span(asked.column, asked.columns, self.columns)?,
+            ..asked
+        })
+    }
+}
+
+/// A rectangle of cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Window {
+    /// The southernmost row.
+    pub row: u16,
+    /// The westernmost column.
+    pub column: u16,
+    /// How many rows.
+    pub rows: u16,
+    /// How many columns.
+    pub columns: u16,
+}
+
+impl Window {
+    /// How many cells it has.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        usize::from(self.rows) * usize::from(self.columns)
+    }
+}
+
+impl fmt::Display for Window {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (rows, columns) = (self.rows, self.columns);
+        let (row, column) = (self.row, self.column);
+        write!(
+            f,
+            "{rows} x {columns} cells from row {row}, column {column}"
+        )
+    }
+}

@@ -1,0 +1,339 @@
+//! A world: what is known, in memory for answers and in the file for good.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use redb::StorageBackend;
+
+use super::change::{Change, Describe, Done, Refusal};
+use super::collection::Collection;
+use super::file::{Counter, File, KeepError, Loaded, OpenError, Writing};
+use super::object::{Object, ObjectId};
+use super::raster::{MapId, Raster, Window};
+use super::selection::Selection;
+
+/// Objects, feature classes and maps.
+///
+/// Objects and descriptions are in memory, at most some tens of megabytes; cells stay in the file
+/// and are fetched when somebody asks.
+#[derive(Debug)]
+pub struct World {
+    file: File,
+    objects: Collection,
+    classes: BTreeMap<u16, String>,
+    rasters: BTreeMap<MapId, Raster>,
+    last_object: u32,
+    last_map: u16,
+    failed: bool,
+}
+
+impl World {
+    /// The most maps.
+    pub const MOST_MAPS: usize = 256;
+    /// The most cells of all maps together: four of the greatest.
+    pub const MOST_CELLS: usize = 4 * 4096 * 4096;
+    /// The most octets of the description of one feature class.
+    pub const MOST_DESCRIPTION: usize = u16::MAX as usize;
+    /// The most feature classes with a description.
+    pub const MOST_CLASSES: usize = 256;
+
+    /// Opens the file of a world, or makes an empty one. A file that was being written when the power
+    /// failed is put right on the way.
+    ///
+    /// # Errors
+    /// If the file is no store, is damaged, or can not be used; it is left as it is.
+    pub fn open(path: &Path) -> Result<Self, OpenError> {
+        File::open(path).map(Self::new)
+    }
+
+    /// Opens a world that is kept elsewhere than in a file.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn on(backend: impl StorageBackend) -> Result<Self, OpenError> {
+        File::on(backend).map(Self::new)
+    }
+
+    fn new((file, loaded): (File, Loaded)) -> Self {
+        Self {
+            file,
+            objects: loaded.objects,
+            classes: loaded.classes.into_iter().collect(),
+            rasters: loaded.rasters.into_iter().collect(),
+            last_object: loaded.last_object,
+            last_map: loaded.last_map,
+            failed: false,
+        }
+    }
+
+    /// The objects.
+    #[must_use]
+    pub const fn objects(&self) -> &Collection {
+        &self.objects
+    }
+
+    /// One object.
+    #[must_use]
+    pub fn object(&self, id: ObjectId) -> Option<&Arc<Object>> {
+        self.objects.get(id)
+    }
+
+    /// What is known about feature classes.
+    #[must_use]
+    pub const fn classes(&self) -> &BTreeMap<u16, String> {
+        &self.classes
+    }
+
+    /// The maps by number.
+    #[must_use]
+    pub const fn rasters(&self) -> &BTreeMap<MapId, Raster> {
+        &self.rasters
+    }
+
+    /// The cells of a window, row by row from the south.
+    ///
+    /// # Errors
+    /// If there is no such map, the window is not on it, or the file can not be read.
+    pub fn cells(&self, map: MapId, window: Window) -> Result<Result<Vec<u8>, Refusal>, KeepError> {
+        let window = self.raster(map).and_then(|raster| {
+            let on_it = inside(raster, window)?;
+            Ok((raster.fill, on_it))
+        });
+        match window {
+            Ok((fill, window)) => self.file.cells(map, fill, window).map(Ok),
+            Err(refusal) => Ok(Err(refusal)),
+        }
+    }
+
+    /// Whether a change could not be kept. Then what is in memory may not be what is in the file, and
+    /// the world has to be opened again.
+    #[must_use]
+    pub const fn has_failed(&self) -> bool {
+        self.failed
+    }
+
+    /// Makes changes, all in one write; they are on the disk when this returns. One that is refused
+    /// does not keep the others from being made. Takes a few milliseconds, for the disk.
+    ///
+    /// # Errors
+    /// If the file can not be written: then none of them is made, and the world
+    /// [has failed](Self::has_failed).
+    pub fn apply(&mut self, changes: Vec<Change>) -> Result<Vec<Result<Done, Refusal>>, KeepError> {
+        if self.failed {
+            return Err(KeepError::closed());
+        }
+        let kept = self.try_apply(changes);
+        self.failed = kept.is_err();
+        kept
+    }
+
+    fn try_apply(&mut self, changes: Vec<Change>) -> Result<Vec<Result<Done, Refusal>>, KeepError> {
+        let writing = self.file.begin()?;
+        let mut results = Vec::with_capacity(changes.len());
+        for change in changes {
+            results.push(self.carry_out(change, &writing)?);
+        }
+        if results.iter().any(Result::is_ok) {
+            writing.keep()?;
+        }
+        Ok(results)
+    }
+
+    fn carry_out(
+        &mut self,
+        change: Change,
+        writing: &Writing,
+    ) -> Result<Result<Done, Refusal>, KeepError> {
+        match change {
+            Change::AddObjects(objects) => self.add_objects(objects, writing).map(Ok),
+            Change::RemoveObjects(selection) => self.remove_objects(&selection, writing),
+            Change::DescribeClass(class, how) => self.describe(class, how, writing),
+            Change::AddRaster(raster, cells) => self.add_raster(raster, &cells, writing),
+            Change::SetCells(map, window, cells) => self.set_cells(map, window, &cells, writing),
+            Change::RemoveRaster(map) => self.remove_raster(map, writing),
+        }
+    }
+
+    fn add_objects(&mut self, objects: Vec<Object>, writing: &Writing) -> Result<Done, KeepError> {
+        let mut added = Vec::with_capacity(objects.len());
+        for object in objects {
+            let room = self.last_object < ObjectId::LAST.0 && self.objects.has_room_for(&object);
+            if !room || !object.is_sound() {
+                added.push(None);
+                continue;
+            }
+            self.last_object += 1;
+            let id = ObjectId(self.last_object);
+            writing.put_object(id, &object)?;
+            self.objects.insert(id, object);
+            added.push(Some(id));
+        }
+        writing.count(Counter::LastObject, self.last_object.into())?;
+        Ok(Done::Added(added))
+    }
+
+    fn remove_objects(
+        &mut self,
+        selection: &Selection,
+        writing: &Writing,
+    ) -> Result<Result<Done, Refusal>, KeepError> {
+        if !selection.is_sound() {
+            return Ok(Err(Refusal::Region));
+        }
+        let meant = self.objects.select(selection);
+        for &id in &meant {
+            writing.remove_object(id)?;
+            self.objects.remove(id);
+        }
+        Ok(Ok(Done::Removed(meant.len())))
+    }
+
+    fn describe(
+        &mut self,
+        class: u16,
+        how: Describe,
+        writing: &Writing,
+    ) -> Result<Result<Done, Refusal>, KeepError> {
+        let before = self.classes.get(&class).map_or("", String::as_str);
+        let text = match how {
+            Describe::Append(text) => Some(format!("{before}{text}")),
+            Describe::Prepend(text) => Some(format!("{text}{before}")),
+            Describe::Overwrite(text) => Some(text),
+            Describe::Erase => None,
+        };
+        let new = text.is_some() && !self.classes.contains_key(&class);
+        if text
+            .as_ref()
+            .is_some_and(|it| it.len() > Self::MOST_DESCRIPTION)
+        {
+            return Ok(Err(Refusal::Full("a description has at most 65535 octets")));
+        }
+        if new && self.classes.len() >= Self::MOST_CLASSES {
+            return Ok(Err(Refusal::Full("at most 256 classes are described")));
+        }
+        writing.describe(class, text.as_deref())?;
+        match text {
+            Some(text) => self.classes.insert(class, text),
+            None => self.classes.remove(&class),
+        };
+        Ok(Ok(Done::Described))
+    }
+
+    fn add_raster(
+        &mut self,
+        raster: Raster,
+        cells: &[u8],
+        writing: &Writing,
+    ) -> Result<Result<Done, Refusal>, KeepError> {
+        if let Err(refusal) = self.check_new(&raster, cells) {
+            return Ok(Err(refusal));
+        }
+        let id = self.next_map();
+        let raster = Raster {
+            revision: 1,
+            ..raster
+        };
+        self.last_map = id.0;
+        writing.put_raster(id, &raster)?;
+        if !cells.is_empty() {
+            writing.put_cells(id, raster.fill, raster.whole(), cells)?;
+        }
+        writing.count(Counter::LastMap, id.0.into())?;
+        self.rasters.insert(id, raster);
+        Ok(Ok(Done::Raster(id, 1)))
+    }
+
+    fn check_new(&self, raster: &Raster, cells: &[u8]) -> Result<(), Refusal> {
+        if let Some(fault) = raster.fault() {
+            return Err(Refusal::Size(fault));
+        }
+        if !cells.is_empty() {
+            check_count(raster.whole(), cells)?;
+        }
+        if self.rasters.len() >= Self::MOST_MAPS {
+            return Err(Refusal::Full("at most 256 maps; delete one first"));
+        }
+        let before: usize = self.rasters.values().map(Raster::cells).sum();
+        if before + raster.cells() > Self::MOST_CELLS {
+            let most = "all maps together have at most 67108864 cells; delete one first";
+            return Err(Refusal::Full(most));
+        }
+        Ok(())
+    }
+
+    /// The next number; after 65535 maps, the next that is free.
+    fn next_map(&self) -> MapId {
+        let mut next = self.last_map;
+        loop {
+            next = next.checked_add(1).unwrap_or(1);
+            if !self.rasters.contains_key(&MapId(next)) {
+                return MapId(next);
+            }
+        }
+    }
+
+    fn set_cells(
+        &mut self,
+        map: MapId,
+        window: Window,
+        cells: &[u8],
+        writing: &Writing,
+    ) -> Result<Result<Done, Refusal>, KeepError> {
+        let checked = self.raster(map).and_then(|raster| {
+            check_count(window, cells)?;
+            inside(raster, window).map(|_| raster)
+        });
+        let raster = match checked {
+            Ok(raster) => raster,
+            Err(refusal) => return Ok(Err(refusal)),
+        };
+        let raster = Raster {
+            revision: raster.revision.wrapping_add(1),
+            ..raster.clone()
+        };
+        writing.put_cells(map, raster.fill, window, cells)?;
+        writing.put_raster(map, &raster)?;
+        let done = Done::Raster(map, raster.revision);
+        self.rasters.insert(map, raster);
+        Ok(Ok(done))
+    }
+
+    fn remove_raster(
+        &mut self,
+        map: MapId,
+        writing: &Writing,
+    ) -> Result<Result<Done, Refusal>, KeepError> {
+        let revision = match self.raster(map) {
+            Ok(raster) => raster.revision,
+            Err(refusal) => return Ok(Err(refusal)),
+        };
+        writing.remove_raster(map)?;
+        self.rasters.remove(&map);
+        Ok(Ok(Done::Raster(map, revision)))
+    }
+
+    fn raster(&self, map: MapId) -> Result<&Raster, Refusal> {
+        self.rasters.get(&map).ok_or(Refusal::NoSuchMap(map))
+    }
+}
+
+fn inside(raster: &Raster, window: Window) -> Result<Window, Refusal> {
+    raster.window(window).ok_or(Refusal::Outside {
+        window,
+        rows: raster.rows,
+        columns: raster.columns,
+    })
+}
+
+fn check_count(window: Window, cells: &[u8]) -> Result<(), Refusal> {
+    if !cells.is_empty() && cells.len() == window.cells() {
+        return Ok(());
+    }
+    Err(Refusal::Size(format!(
+        "{} cells for {} x {}: send as many as rows times columns, and at least one",
+        cells.len(),
+        window.rows,
+        window.columns,
+    )))
+}
