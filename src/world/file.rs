@@ -85,7 +85,7 @@ pub enum OpenError {
 }
 
 impl OpenError {
-    fn broken(path: &Path, why: impl ToString) -> Self {
+    fn broken(path: &Path, why: &impl ToString) -> Self {
         Self::Broken {
             path: path.to_owned(),
             why: why.to_string(),
@@ -112,7 +112,7 @@ impl<E: Into<redb::Error>> From<E> for KeepError {
 }
 
 impl KeepError {
-    fn record(error: impl ToString) -> Self {
+    fn record(error: &impl ToString) -> Self {
         Self(error.to_string())
     }
 
@@ -186,12 +186,12 @@ impl File {
             {
                 OpenError::io(path, error)
             }
-            error => OpenError::broken(path, error),
+            error => OpenError::broken(path, &error),
         })?;
         let file = Self { database };
         let format = file
             .format()
-            .map_err(|error| OpenError::broken(path, error))?;
+            .map_err(|error| OpenError::broken(path, &error))?;
         if format > FORMAT {
             return Err(OpenError::Newer {
                 path: path.to_owned(),
@@ -200,7 +200,7 @@ impl File {
         }
         let loaded = file
             .load()
-            .map_err(|error| OpenError::broken(path, error))?;
+            .map_err(|error| OpenError::broken(path, &error))?;
         Ok((file, loaded))
     }
 
@@ -211,7 +211,7 @@ impl File {
         match reading.open_table(NUMBERS) {
             Ok(numbers) => match numbers.get(KEY)? {
                 Some(format) => Ok(format.value()),
-                None => Err(KeepError::record("it does not say which format it has")),
+                None => Err(KeepError::record(&"it does not say which format it has")),
             },
             Err(TableError::TableDoesNotExist(_)) => {
                 let writing = self.database.begin_write()?;
@@ -234,7 +234,8 @@ impl File {
         let mut objects = Vec::new();
         for entry in reading.open_table(OBJECTS)?.iter()? {
             let (id, octets) = entry?;
-            let object = record::read_object(octets.value()).map_err(KeepError::record)?;
+            let object =
+                record::read_object(octets.value()).map_err(|error| KeepError::record(&error))?;
             objects.push((ObjectId(id.value()), object));
         }
         let mut classes = Vec::new();
@@ -245,7 +246,8 @@ impl File {
         let mut rasters = Vec::new();
         for entry in reading.open_table(RASTERS)?.iter()? {
             let (id, octets) = entry?;
-            let raster = record::read_raster(octets.value()).map_err(KeepError::record)?;
+            let raster =
+                record::read_raster(octets.value()).map_err(|error| KeepError::record(&error))?;
             rasters.push((MapId(id.value()), raster));
         }
         let numbers = reading.open_table(NUMBERS)?;
@@ -289,7 +291,7 @@ pub(super) struct Writing {
 
 impl Writing {
     pub(super) fn put_object(&self, id: ObjectId, object: &Object) -> Result<(), KeepError> {
-        let octets = record::write_object(object).map_err(KeepError::record)?;
+        let octets = record::write_object(object).map_err(|error| KeepError::record(&error))?;
         let mut objects = self.transaction.open_table(OBJECTS)?;
         objects.insert(id.0, &octets[..])?;
         Ok(())
@@ -311,7 +313,7 @@ impl Writing {
     }
 
     pub(super) fn put_raster(&self, id: MapId, raster: &Raster) -> Result<(), KeepError> {
-        let octets = record::write_raster(raster).map_err(KeepError::record)?;
+        let octets = record::write_raster(raster).map_err(|error| KeepError::record(&error))?;
         let mut rasters = self.transaction.open_table(RASTERS)?;
         rasters.insert(id.0, &octets[..])?;
         Ok(())
@@ -374,7 +376,7 @@ fn whole(tile: &[u8]) -> Result<&[u8], KeepError> {
     if tile.len() == tiles::CELLS {
         Ok(tile)
     } else {
-        Err(KeepError::record("a tile has a wrong size"))
+        Err(KeepError::record(&"a tile has a wrong size"))
     }
 }
 

@@ -20,6 +20,7 @@ mod change;
 mod collection;
 mod file;
 mod import;
+mod model;
 mod object;
 mod raster;
 mod record;
@@ -29,17 +30,16 @@ mod shape;
 mod tests;
 mod tiles;
 mod traversability;
-mod world;
 
 pub use change::{Change, Describe, Done, Refusal};
 pub use collection::Collection;
 pub use file::{KeepError, OpenError};
 pub use import::{ImportError, Picture};
+pub use model::World;
 pub use object::{Attribute, FeatureClass, Geometry, Object, ObjectId, Place};
 pub use raster::{MapId, Raster, Window};
 pub use selection::{Region, Selection};
 pub use traversability::as_objects;
-pub use world::World;
 
 /// For tests and for other places to keep a world in than a file.
 pub use redb::StorageBackend;

@@ -305,5 +305,9 @@ const fn result_of(refusal: &Refusal) -> ChangeResult {
 
 /// As much of a text as has at most so many octets.
 fn beginning(text: &str, most: usize) -> &str {
-    &text[..text.floor_char_boundary(most)]
+    let mut end = most.min(text.len());
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    &text[..end]
 }

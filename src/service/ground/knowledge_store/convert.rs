@@ -20,15 +20,15 @@ pub(super) struct Creation {
 }
 
 /// Reads a creation. An object of a kind that there is not has no points, so that it is refused.
-pub(super) fn creation(message: CreateVksObjects) -> Creation {
-    match message.objects {
+pub(super) fn creation(message: &CreateVksObjects) -> Creation {
+    match &message.objects {
         Objects::PlainSeq(seq) => Creation {
             request_id: seq.request_rec.request_id,
             confirm: wants_confirmation(seq.request_rec.message_properties),
             objects: seq
                 .plain_list
-                .into_iter()
-                .map(|it| object(it.object_rec, 0.0, it.feature_class_list, &it.point_list))
+                .iter()
+                .map(|it| object(&it.object_rec, 0.0, &it.feature_class_list, &it.point_list))
                 .collect(),
         },
         Objects::BufferedSeq(seq) => Creation {
@@ -36,10 +36,15 @@ pub(super) fn creation(message: CreateVksObjects) -> Creation {
             confirm: wants_confirmation(seq.request_rec.message_properties),
             objects: seq
                 .buffered_list
-                .into_iter()
+                .iter()
                 .map(|it| {
                     let buffer = it.buffer_rec.buffer;
-                    object(it.object_rec, buffer, it.feature_class_list, &it.point_list)
+                    object(
+                        it.object_rec,
+                        buffer,
+                        &it.feature_class_list,
+                        &it.point_list,
+                    )
                 })
                 .collect(),
         },
@@ -51,16 +56,16 @@ const fn wants_confirmation(message_properties: u8) -> bool {
 }
 
 fn object(
-    kind: ObjectRec,
+    kind: &ObjectRec,
     buffer: f32,
-    classes: Vec<FeatureClassSeq>,
+    classes: &[FeatureClassSeq],
     points: &[PointRec],
 ) -> Object {
     let geometry = geometry(kind.object_type.0, points.len());
     Object {
         geometry: geometry.unwrap_or_default(),
         buffer,
-        classes: classes.into_iter().map(class).collect(),
+        classes: classes.iter().map(class).collect(),
         points: geometry.map_or_else(Vec::new, |_| places(points)),
     }
 }
@@ -75,7 +80,7 @@ const fn geometry(number: u8, points: usize) -> Option<Geometry> {
     }
 }
 
-fn class(seq: FeatureClassSeq) -> FeatureClass {
+fn class(seq: &FeatureClassSeq) -> FeatureClass {
     FeatureClass {
         id: seq.feature_class_rec.feature_class_id,
         attribute: attribute(&seq.attribute),

@@ -65,9 +65,10 @@ impl VectorKnowledgeStore {
     }
 
     fn create(&self, now: Instant, message: &Received, context: &mut Context<'_>) {
-        let Some(create) = read::<CreateVksObjects>(message).map(convert::creation) else {
+        let Some(create) = read::<CreateVksObjects>(message) else {
             return;
         };
+        let create = convert::creation(&create);
         let answer = if create.confirm {
             Answer::Creation {
                 request_id: create.request_id,
