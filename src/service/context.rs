@@ -67,6 +67,12 @@ impl<'a> Context<'a> {
         self.out.reply(to, message);
     }
 
+    /// The same, until the receiver has acknowledged it: for answers of many datagrams, of which one
+    /// that is lost would cost all.
+    pub fn reply_until_acknowledged<M: Message>(&mut self, to: &Received, message: &M) {
+        self.out.reply_until_acknowledged(to, message);
+    }
+
     /// Says that the answer to the query `Q` is another now: whoever subscribed to it hears of it.
     pub fn changed<Q: Message>(&mut self) {
         self.news.changed.insert(Q::CODE);

@@ -42,6 +42,16 @@ impl Outbox {
         self.push(to.source, Broadcast::None, to.priority, message);
     }
 
+    /// The same, until the receiver has acknowledged it: for answers of many datagrams, of which one
+    /// that is lost would cost all.
+    pub fn reply_until_acknowledged<M: Message>(&mut self, to: &Received, message: &M) {
+        let next = self.queue.len();
+        self.reply(to, message);
+        if let Some(reply) = self.queue.get_mut(next) {
+            reply.acknowledge = true;
+        }
+    }
+
     /// Sends a message to every component of every subsystem.
     pub fn broadcast<M: Message>(&mut self, message: &M) {
         self.push(

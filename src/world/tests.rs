@@ -348,7 +348,7 @@ fn maps_and_cells_that_can_not_be_are_refused_with_what_is_wrong() {
         assert!(matches!(refused, Err(Refusal::Size(_))), "{refused:?}");
     }
     let few = Bytes::from_static(&[1]);
-    let refused = change(&mut world, Change::AddRaster(map(2, 1), few.clone()));
+    let refused = change(&mut world, Change::AddRaster(map(2, 1), few));
     assert!(matches!(refused, Err(Refusal::Size(_))));
     change(&mut world, Change::AddRaster(map(16, 16), Bytes::new())).unwrap();
     let mut set = |map, window, count| {

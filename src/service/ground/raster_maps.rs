@@ -83,7 +83,7 @@ impl RasterMaps {
             })
         });
         if let Some(report) = report {
-            context.reply(message, &report);
+            context.reply_until_acknowledged(message, &report);
         }
     }
 
@@ -232,8 +232,8 @@ mod tests {
         }
     }
 
-    fn cells(rig: &mut Rig, query: QueryRasterCells) -> (u16, u16, Vec<u8>) {
-        let report: ReportRasterCells = rig.ask(&query).unwrap();
+    fn cells(rig: &mut Rig, query: &QueryRasterCells) -> (u16, u16, Vec<u8>) {
+        let report: ReportRasterCells = rig.ask(query).unwrap();
         (report.rows, report.columns, report.cells.to_vec())
     }
 
@@ -258,13 +258,13 @@ mod tests {
             (changed.request_id, changed.map, changed.revision),
             (6, 1, 2)
         );
-        assert_eq!(cells(&mut rig, all_of(1)), (2, 3, vec![9, 9, 9, 1, 2, 3]));
+        assert_eq!(cells(&mut rig, &all_of(1)), (2, 3, vec![9, 9, 9, 1, 2, 3]));
         let corner = QueryRasterCells {
             row: 1,
             column: 2,
             ..all_of(1)
         };
-        assert_eq!(cells(&mut rig, corner), (1, 1, vec![3]));
+        assert_eq!(cells(&mut rig, &corner), (1, 1, vec![3]));
         let maps: ReportRasterMaps = rig.ask(&QueryRasterMaps).unwrap();
         assert_eq!(maps.map_list.len(), 1);
         assert_eq!(
@@ -319,14 +319,14 @@ mod tests {
             ChangeResult::WRONG_SIZE,
         ];
         assert_eq!(outcomes, expected);
-        assert_eq!(cells(&mut rig, all_of(1)), (2, 3, vec![9; 6]));
-        assert_eq!(cells(&mut rig, all_of(2)), (0, 0, vec![]));
+        assert_eq!(cells(&mut rig, &all_of(1)), (2, 3, vec![9; 6]));
+        assert_eq!(cells(&mut rig, &all_of(2)), (0, 0, vec![]));
         let outside = QueryRasterCells {
             row: 1,
             rows: 2,
             ..all_of(1)
         };
-        assert_eq!(cells(&mut rig, outside), (0, 0, vec![]));
+        assert_eq!(cells(&mut rig, &outside), (0, 0, vec![]));
     }
 
     #[test]
@@ -340,7 +340,7 @@ mod tests {
         rig.run(WorldStore::LINGER);
         let revisions = [0; 3].map(|_| rig.answer::<ReportRasterChange>().unwrap().revision);
         assert_eq!(revisions, [2, 3, 4]);
-        assert_eq!(cells(&mut rig, all_of(1)), (1, 1, vec![3]));
+        assert_eq!(cells(&mut rig, &all_of(1)), (1, 1, vec![3]));
     }
 
     #[test]
@@ -358,7 +358,7 @@ mod tests {
     fn of_a_map_too_large_for_one_report_the_southern_rows_are_told() {
         let mut rig = rig();
         change(&mut rig, &create(4096, 4096));
-        let (rows, columns, octets) = cells(&mut rig, all_of(1));
+        let (rows, columns, octets) = cells(&mut rig, &all_of(1));
         assert_eq!(
             (rows, columns, octets.len()),
             (1024, 4096, RasterMaps::MOST_TOLD)

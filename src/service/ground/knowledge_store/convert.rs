@@ -40,7 +40,7 @@ pub(super) fn creation(message: &CreateVksObjects) -> Creation {
                 .map(|it| {
                     let buffer = it.buffer_rec.buffer;
                     object(
-                        it.object_rec,
+                        &it.object_rec,
                         buffer,
                         &it.feature_class_list,
                         &it.point_list,

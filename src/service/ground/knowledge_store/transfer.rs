@@ -126,8 +126,12 @@ impl Transfer {
 /// Answers with the code that was asked with.
 pub(super) fn reply(request: &Received, code: Code, objects: Objects, context: &mut Context<'_>) {
     match code {
-        Code::Objects => context.reply(request, &ReportVksObjects { objects }),
-        Code::Traversability => context.reply(request, &ReportVksTraversability { objects }),
+        Code::Objects => {
+            context.reply_until_acknowledged(request, &ReportVksObjects { objects });
+        }
+        Code::Traversability => {
+            context.reply_until_acknowledged(request, &ReportVksTraversability { objects });
+        }
     }
 }
 
