@@ -340,7 +340,7 @@ fn a_part_runs_where_and_with_what_the_file_says_and_drives_no_terminal() {
         "'--name=it'\\''s me' --speed=2",
         "a/b\n",
         "with COLOUR=blue green",
-        "1 parts",
+        "1 part, nothing is wrong",
     ] {
         assert!(checked.stdout.contains(part), "{part}: {}", checked.stdout);
     }
