@@ -63,6 +63,11 @@ impl Part {
         self.status.is_some_and(|it| it.what == state as u8)
     }
 
+    /// Whether it has said since `since` that it stands by.
+    pub(super) fn stands_by(&self, since: Instant) -> bool {
+        self.is(State::Standby) && self.status.is_some_and(|it| it.at > since)
+    }
+
     /// Whether it has said since `since` that somebody other than `own`, or nobody, controls it;
     /// who does.
     pub(super) fn disowns(&self, own: JausId, since: Instant) -> Option<Option<JausId>> {

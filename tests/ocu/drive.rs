@@ -1,5 +1,6 @@
 //! What operators do: look, take control, drive, let go, stop; alone and two of them.
 
+use jaus::ocu::Station;
 use serde_json::json;
 
 use crate::scene::{Page, Scene, driver_of};
@@ -197,12 +198,15 @@ async fn of_two_stations_with_the_same_authority_the_second_is_told_who_is_in_co
 
 #[tokio::test]
 async fn a_vehicle_that_starts_again_is_taken_and_made_ready_again() {
-    let mut scene = Scene::new().await;
-    let mut page = scene.driver().await;
-    scene.restart_rover().await;
-    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
-    page.say(&json!({"type": "drive_end"})).await;
-    scene.until(|scene| scene.speed() == 0.0).await;
+    // With control that outlives the vehicle because it is renewed, and without.
+    for timeout in [0, 2] {
+        let mut scene = Scene::with(Station::default(), timeout).await;
+        let mut page = scene.driver().await;
+        scene.restart_rover().await;
+        page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+        page.ask(json!({"type": "drive_end"})).await.unwrap();
+        scene.until(|scene| scene.speed() == 0.0).await;
+    }
 }
 
 #[tokio::test]

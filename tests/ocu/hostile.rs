@@ -14,11 +14,14 @@ use crate::scene::{Page, Scene, driver_of, within_limit};
 const TOKEN: &str = "correct-horse-battery";
 
 async fn guarded(token_to_read: bool) -> Scene {
-    Scene::with(Station {
-        token: Token::new(TOKEN),
-        token_to_read,
-        ..Station::default()
-    })
+    Scene::with(
+        Station {
+            token: Token::new(TOKEN),
+            token_to_read,
+            ..Station::default()
+        },
+        0,
+    )
     .await
 }
 

@@ -40,22 +40,24 @@ pub(crate) struct Scene {
     rover: Option<Component>,
     pub(crate) address: SocketAddr,
     group: Group,
+    timeout: u8,
     station: JoinHandle<()>,
     nodes: Vec<Node>,
 }
 
 impl Scene {
     pub(crate) async fn new() -> Self {
-        Self::with(Station::default()).await
+        Self::with(Station::default(), 0).await
     }
 
-    pub(crate) async fn with(station: Station) -> Self {
+    /// With a vehicle whose control has to be renewed after so many seconds; 0 for never.
+    pub(crate) async fn with(station: Station, timeout: u8) -> Self {
         let group = own_group();
         let node = Node::start(Config::loopback(101, 1).group(group)).unwrap();
         let platform = SkidSteer::new(SkidSteerConfig::default());
         let vehicle = Vehicle::new(Pilot::new(platform, Frame::at(52.5, 13.4)))
             .with_time(Instant::now(), Duration::ZERO);
-        let rover = rover(&vehicle, &node);
+        let rover = rover(&vehicle, &node, timeout);
         let station = Station {
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
             ..station
@@ -66,6 +68,7 @@ impl Scene {
             rover: Some(rover),
             address,
             group,
+            timeout,
             station,
             nodes: vec![node, desk],
         }
@@ -110,7 +113,7 @@ impl Scene {
             }
         };
         within_limit(restarted).await;
-        self.rover = Some(rover(&self.vehicle, &self.nodes[0]));
+        self.rover = Some(rover(&self.vehicle, &self.nodes[0], self.timeout));
     }
 
     pub(crate) fn is_controlled(&self) -> bool {
@@ -140,9 +143,10 @@ impl Drop for Scene {
 }
 
 /// A component with what it takes to be driven.
-fn rover(vehicle: &Vehicle, node: &Node) -> Component {
+fn rover(vehicle: &Vehicle, node: &Node, timeout: u8) -> Component {
+    let control = AccessControl::new().timeout(timeout);
     Component::builder(Kind::Vehicle, "Rover")
-        .management(Management::new().access_control(AccessControl::new()))
+        .management(Management::new().access_control(control))
         .offer(vehicle.velocity_state_sensor())
         .offer(vehicle.local_pose_sensor())
         .offer(vehicle.primitive_driver())

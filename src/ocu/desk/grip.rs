@@ -40,6 +40,8 @@ enum Hold {
     Held {
         control: Arc<Control>,
         since: Instant,
+        /// When it was last told to act on commands.
+        resumed: Instant,
     },
     /// Why it is not held, and when it may be asked for again.
     Not {
@@ -61,7 +63,7 @@ impl Wanted {
 impl Grip {
     /// Before a part that could not be controlled is asked again, if nobody else controls it.
     const AGAIN: Duration = Duration::from_secs(1);
-    /// A part that has just granted control may still report that it is free.
+    /// A part that has just granted control, or was told to act, may still report what was before.
     const SETTLED: Duration = Duration::from_secs(1);
     /// How many may wait for control; more are answered at once.
     const MOST_WAITING: usize = 64;
@@ -136,9 +138,14 @@ impl Grip {
         self.want(Wanted::Nothing, picture)
     }
 
-    /// Whether what is held is to act on commands.
-    pub(super) const fn set_ready(&mut self, ready: bool) {
+    /// Whether what is held is to act on commands; it is being told so.
+    pub(super) fn set_ready(&mut self, now: Instant, ready: bool) {
         self.ready = ready;
+        for hold in self.holds.values_mut() {
+            if let Hold::Held { resumed, .. } = hold {
+                *resumed = now;
+            }
+        }
     }
 
     /// A part has granted control, or not.
@@ -163,6 +170,7 @@ impl Grip {
                 *hold = Hold::Held {
                     control,
                     since: now,
+                    resumed: now,
                 };
             }
             Err(error) => *hold = not(now, &error),
@@ -178,7 +186,12 @@ impl Grip {
         for (id, part) in wanted {
             match self.holds.get_mut(&id) {
                 Some(Hold::Asking) => {}
-                Some(hold @ Hold::Held { .. }) => look_after(now, own, part, hold),
+                Some(hold @ Hold::Held { .. }) => {
+                    look_after(now, own, part, hold);
+                    if self.ready {
+                        keep_ready(now, part, hold, hands);
+                    }
+                }
                 Some(Hold::Not { again, .. }) => {
                     // Whoever else took it had a reason.
                     let free = part.controller().is_none_or(|id| id == own);
@@ -282,7 +295,7 @@ impl Grip {
 
 /// Notices that control is lost, also when only the part knows it, because it was started again.
 fn look_after(now: Instant, own: JausId, part: &Part, hold: &mut Hold) {
-    let Hold::Held { control, since } = hold else {
+    let Hold::Held { control, since, .. } = hold else {
         return;
     };
     if let Err(error) = control.check() {
@@ -297,6 +310,20 @@ fn look_after(now: Instant, own: JausId, part: &Part, hold: &mut Hold) {
         };
         tracing::info!("control over {} is lost: {why}", control.peer());
         *hold = Hold::Not { why, again: now };
+    }
+}
+
+/// Notices that a part does not act on commands though it should: control that is renewed outlives
+/// that the part was started again.
+fn keep_ready(now: Instant, part: &Part, hold: &mut Hold, hands: &mut Hands) {
+    if let Hold::Held {
+        control, resumed, ..
+    } = hold
+        && part.stands_by(*resumed + Grip::SETTLED)
+    {
+        tracing::info!("{} stands by, and is made ready again", control.peer());
+        *resumed = now;
+        resume(control, hands);
     }
 }
 

@@ -145,6 +145,11 @@ impl Desk {
 
     fn handle_beat(&mut self, now: Instant) {
         self.look_around();
+        if self.alarm.is_wanted() || self.picture.in_emergency().next().is_some() {
+            // Whoever has set it: nothing acts again by itself when it is over.
+            self.stick.stop(now);
+            self.grip.set_ready(now, false);
+        }
         self.alarm.handle_time(now, &self.picture, &mut self.hands);
         self.grip.handle_time(now, &self.picture, &mut self.hands);
         self.steer(now);

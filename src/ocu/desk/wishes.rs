@@ -106,7 +106,7 @@ impl Desk {
         if ready && self.picture.in_emergency().next().is_some() {
             return reply(Err("clear the emergency first".to_owned()));
         }
-        self.grip.set_ready(ready);
+        self.grip.set_ready(now, ready);
         if !ready {
             self.stick.stop(now);
             self.steer(now);
@@ -119,9 +119,8 @@ impl Desk {
             return reply(Err(NO_VEHICLE.to_owned()));
         }
         self.stick.stop(now);
+        self.grip.set_ready(now, false);
         self.steer(now);
-        // Nothing acts again by itself when it is over.
-        self.grip.set_ready(false);
         self.alarm.set(now, &self.picture, &mut self.hands, reply);
     }
 
