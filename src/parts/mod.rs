@@ -7,11 +7,13 @@
 
 mod drivers;
 mod knowledge_store;
+mod path_driver;
 mod planner;
 mod pose_file;
 mod pose_sensor;
 mod primitive_driver;
 pub mod tester;
+mod vector_driver;
 mod velocity_sensor;
 
 use std::convert::Infallible;
@@ -22,11 +24,13 @@ use crate::component::{self, Builder, Component, Kind};
 use crate::node::{Node, Port};
 
 pub use knowledge_store::{Broken, KnowledgeStore};
+pub use path_driver::PathDriver;
 pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 pub use primitive_driver::GpioMotors;
 pub use primitive_driver::{Motors, PrimitiveDriver};
+pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 
 /// A ready component: what it is to do, not yet running.

@@ -59,6 +59,7 @@ mod random;
 mod reckoning;
 mod skid_steer;
 mod steering;
+mod throttle;
 
 #[cfg(test)]
 mod tests;
@@ -74,3 +75,6 @@ pub(crate) use random::Random;
 pub use reckoning::{DeadReckoning, Gone, Speedometer, WheelCount};
 pub use skid_steer::{SkidSteer, SkidSteerConfig};
 pub use steering::Waypoint;
+#[cfg(feature = "parts")]
+pub(crate) use steering::along;
+pub use throttle::Throttle;

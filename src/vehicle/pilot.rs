@@ -191,6 +191,13 @@ impl Pilot {
         course.is_some_and(|course| !course.has_arrived)
     }
 
+    /// Whether the last goal has been reached, whoever has set it.
+    #[must_use]
+    pub fn is_there(&self) -> bool {
+        let course = self.course.as_ref();
+        course.is_some_and(|course| course.has_arrived)
+    }
+
     /// Whether the last goal was [given up](Self::give_up_after) because nobody set it again.
     #[must_use]
     pub const fn was_left_alone(&self) -> bool {

@@ -60,7 +60,7 @@ pub(super) fn turn_rate(yaw: f64, heading: f64, limits: &Limits) -> f64 {
 }
 
 /// Keeps a heading and a speed; slower as long as the heading is wrong.
-pub(super) fn along(yaw: f64, heading: f64, speed: f64, limits: &Limits) -> Velocity {
+pub(crate) fn along(yaw: f64, heading: f64, speed: f64, limits: &Limits) -> Velocity {
     let error = wrap(heading - yaw);
     let share = if error.abs() > TURN_FIRST {
         0.0

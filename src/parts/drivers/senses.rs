@@ -1,8 +1,21 @@
 //! Reports of whoever offers a service in the own subsystem: found, followed, and found again.
 
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here it is noted when reports come"
+)]
+
+use std::convert::Infallible;
+use std::time::Instant;
+
+use super::Helm;
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::component::{Audience, Component, GroupSubscription, GroupUpdate, When};
+use crate::messages::mobility::{
+    QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState, local_pose_sensor,
+    velocity_state_sensor,
+};
 use crate::parts::PartError;
 
 /// The reports of one sensor of the own subsystem, whichever that is at the time.
@@ -57,6 +70,56 @@ impl<R: Message> Sense<R> {
                 }
                 _ => {}
             }
+        }
+    }
+}
+
+impl Sense<ReportLocalPose> {
+    /// X, Y and yaw.
+    const FIELDS: u16 = 0b100_0011;
+
+    /// The pose in the local frame.
+    pub(in crate::parts) fn pose(component: &Component, hz: f64) -> Result<Self, PartError> {
+        let query = QueryLocalPose {
+            presence_vector: Self::FIELDS,
+        };
+        Self::of(component, local_pose_sensor::URN, &query, hz, "pose")
+    }
+
+    /// Tells a helm whatever comes.
+    pub(in crate::parts) async fn steer(mut self, helm: &Helm) -> Result<Infallible, PartError> {
+        loop {
+            let report = self.next().await?;
+            let place = report.x_m().zip(report.y_m()).zip(report.yaw_rad());
+            helm.handle_pose(Instant::now(), place.map(|((x, y), yaw)| (x, y, yaw)));
+        }
+    }
+}
+
+impl Sense<ReportVelocityState> {
+    /// Velocity along X, and yaw rate.
+    const FIELDS: u16 = 0b100_0001;
+
+    /// The velocity along and about the vehicle's own axes.
+    pub(in crate::parts) fn velocity(component: &Component, hz: f64) -> Result<Self, PartError> {
+        let query = QueryVelocityState {
+            presence_vector: Self::FIELDS,
+        };
+        Self::of(
+            component,
+            velocity_state_sensor::URN,
+            &query,
+            hz,
+            "velocity",
+        )
+    }
+
+    /// Tells a helm whatever comes.
+    pub(in crate::parts) async fn steer(mut self, helm: &Helm) -> Result<Infallible, PartError> {
+        loop {
+            let report = self.next().await?;
+            let velocity = report.velocity_x_m_per_s().zip(report.yaw_rate_rad_per_s());
+            helm.handle_velocity(Instant::now(), velocity);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Stage: how far one driver of the chain is, and why it does not go on.
 
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::address::JausId;
@@ -38,6 +39,18 @@ pub enum StageState {
     Blocked = 3,
     /// It has done what was commanded.
     Done = 4,
+}
+
+impl fmt::Display for StageState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Idle => "idle",
+            Self::Engaging => "engaging",
+            Self::Active => "active",
+            Self::Blocked => "blocked",
+            Self::Done => "done",
+        })
+    }
 }
 
 impl StageBoard {

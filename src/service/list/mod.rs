@@ -87,6 +87,14 @@ impl Elements {
         self.lock().list.get(uid).cloned()
     }
 
+    /// How many elements lie before the one with a number, and how many there are.
+    #[must_use]
+    pub fn place_of(&self, uid: u16) -> (usize, usize) {
+        let shared = self.lock();
+        let before = shared.list.uids().take_while(|&other| other != uid).count();
+        (before, shared.list.len().into())
+    }
+
     /// Removes everything.
     pub fn clear(&self) {
         self.lock().list.clear();

@@ -36,7 +36,23 @@ pub(super) struct Travel {
     command: Option<u16>,
 }
 
+impl Travel {
+    /// Whether no list is being worked off.
+    pub(super) const fn is_over(&self) -> bool {
+        self.active.is_none()
+    }
+}
+
 impl Cockpit {
+    /// How many elements of the list lie before the one that is driven to, in percent of all.
+    pub(super) fn progress(&self) -> u8 {
+        let Some(active) = self.travel.active else {
+            return 0;
+        };
+        let (before, all) = self.elements.place_of(active);
+        u8::try_from(100 * before / all.max(1)).unwrap_or(100)
+    }
+
     /// The place that was set last, or that is the first one of the list.
     pub(super) fn place(&self) -> Option<Place> {
         let first = || Place::of(&self.elements.get(0)?);

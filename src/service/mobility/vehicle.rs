@@ -80,6 +80,19 @@ impl Vehicle {
         self.lock().pilot.is_under_way()
     }
 
+    /// Whether it has done what it was driven to do.
+    #[must_use]
+    pub fn has_arrived(&self) -> bool {
+        let cockpit = self.lock();
+        cockpit.pilot.is_there() && cockpit.travel.is_over()
+    }
+
+    /// How much of the list that it works off lies behind it, in percent.
+    #[must_use]
+    pub fn progress(&self) -> u8 {
+        self.lock().progress()
+    }
+
     /// Whether it has stopped because its [pilot](Pilot::give_up_after) was left alone.
     #[must_use]
     pub fn was_left_alone(&self) -> bool {
