@@ -14,7 +14,7 @@ use super::network::Network;
 use super::{output, runtime, settings};
 use crate::address::JausId;
 use crate::component::Kind;
-use crate::node::Node;
+use crate::node::{Config, Node};
 use crate::parts::{Part, Seat};
 
 /// The flags of a program that is one [`Part`].
@@ -31,6 +31,11 @@ pub trait Ready: Args {
     const KIND: Kind = Kind::Vehicle;
     /// What its subsystem is called unless a flag or the settings file says.
     const SUBSYSTEM: &'static str = "G-Bat";
+
+    /// What the flags say about the node, if we run one: it is laid over the node's settings.
+    fn for_node(&self) -> impl FnOnce(&mut Config) + 'static {
+        |_: &mut Config| {}
+    }
 
     /// The component that the flags ask for.
     ///
@@ -91,9 +96,10 @@ fn end<F: Ready>(outcome: Result<Outcome, Failure>) -> ExitCode {
 
 impl<F: Ready> Program<F> {
     fn run(self) -> Result<Outcome, Failure> {
+        let for_node = self.flags.for_node();
         let part = self.flags.part()?;
         runtime::run(async {
-            let place = self.network.join(F::ID);
+            let place = self.network.join(F::ID, for_node);
             let until = runtime::end(self.seconds);
             tokio::pin!(until);
             let place = tokio::select! {

@@ -15,7 +15,8 @@ pub mod output;
 pub mod runtime;
 pub mod settings;
 pub mod statistics;
-pub mod tree;
 
 pub use failure::{Failure, Outcome};
 pub use launch::{Ready, launch};
+
+pub use crate::view::tree;

@@ -222,14 +222,22 @@ impl Network {
     /// A place for a component that stays: on the host's node, or on one of its own. `usual` is the
     /// id of whoever chooses none; on the host's node its component number alone counts.
     ///
+    /// `for_node` lays its wishes over the settings of a node of our own.
+    ///
     /// Where the host's node is not there yet, it is waited for, for ever: components may be started
     /// in any order.
     ///
     /// # Errors
     /// If a flag or the file is mistaken, or a node cannot be started, or will not have us.
-    pub async fn join(&self, usual: JausId) -> Result<Place, Failure> {
+    pub async fn join(
+        &self,
+        usual: JausId,
+        for_node: impl FnOnce(&mut Config),
+    ) -> Result<Place, Failure> {
         let Some(address) = &self.attach else {
-            let (id, identity, config) = self.for_node(usual)?;
+            let (id, identity, mut config) = self.for_node(usual)?;
+            for_node(&mut config);
+            config.validate().map_err(Failure::of)?;
             let config = config.or_any_free_port();
             let node = Node::start(config).map_err(Failure::of)?;
             let port = node.attach(id.component()).map_err(Failure::of)?;

@@ -5,6 +5,8 @@
 //! until it is dropped. Parts find each other by discovery alone, in any order of start, and go on
 //! when another one is started again.
 
+#[cfg(feature = "web")]
+mod communicator;
 mod drivers;
 mod knowledge_store;
 mod path_driver;
@@ -23,6 +25,8 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use crate::component::{self, Builder, Component, Kind};
 use crate::node::{Node, Port};
 
+#[cfg(feature = "web")]
+pub use communicator::{Communicator, DEBUG_ADDRESS};
 pub use knowledge_store::{Broken, KnowledgeStore};
 pub use path_driver::PathDriver;
 pub use planner::Planner;

@@ -97,6 +97,25 @@ impl<'d> MessageLog<'d> {
         }
     }
 
+    /// The line of a message as soon as all of it is here; none for an acknowledgement.
+    pub(super) fn whole_message(
+        &mut self,
+        time: Option<Timestamp>,
+        frame: &Frame,
+    ) -> Option<Line<'d>> {
+        if frame.is_acknowledgement() {
+            return None;
+        }
+        if frame.flags.data() != DataControl::Single {
+            return self.whole(time, frame);
+        }
+        let envelope = Envelope {
+            time,
+            header: Some(Header::of(frame)),
+        };
+        Some(self.line(envelope, frame.version, &frame.payload))
+    }
+
     /// A message that is here as a whole.
     fn line(&self, envelope: Envelope, version: Version, octets: &Bytes) -> Line<'d> {
         if version == Version::Ra {

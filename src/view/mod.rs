@@ -6,22 +6,39 @@
 //! Nothing below this module knows that it exists.
 
 mod capture;
+#[cfg(feature = "web")]
+pub mod debug;
 mod definition;
 mod dictionary;
 mod hex;
+#[cfg(feature = "node")]
+mod journal;
 mod large;
 mod line;
 mod log;
 mod network;
 mod request;
+mod stream;
 mod time;
+#[cfg(feature = "node")]
+pub mod tree;
 
 pub use capture::{Capture, CaptureError, CaptureWriter, Frame, InterfaceNumber, LinkType};
 pub use definition::{Body, ServiceName};
 pub use dictionary::{Added, Dictionary, Reading, Unreadable};
 pub use hex::{from_hex, to_hex};
+#[cfg(feature = "node")]
+pub use journal::{
+    Journal, JournalCounters, JournalError, JournalFormat, JournalSettings, LEAST_FILE,
+};
 pub use line::{Content, Envelope, Header, Line};
 pub use log::MessageLog;
-pub use network::{Counts, Datagram, JAUS_PORT, Network};
+pub use network::{Counts, Datagram, JAUS_PORT, Network, udp_packet};
 pub use request::Request;
-pub use time::Timestamp;
+#[cfg(feature = "node")]
+pub use stream::Links;
+pub use stream::{Entry, Filter, FilterError, MessageStream};
+pub use time::{InvalidTime, Timestamp};
+
+#[cfg(feature = "node")]
+use stream::timestamp;

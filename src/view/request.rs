@@ -7,9 +7,12 @@ use serde_json::{Map, Value as Json};
 use super::definition::{ServiceName, parse_version};
 use super::dictionary::Unreadable;
 
-/// The keys that a line may have besides those that count: what `jaus decode` adds.
-const PASSED_OVER: [&str; 9] = [
+/// The keys that a line may have besides those that count: what `jaus decode` and `jaus watch` add.
+const PASSED_OVER: [&str; 12] = [
     "time",
+    "direction",
+    "link",
+    "peer",
     "source",
     "destination",
     "transport",

@@ -1,6 +1,7 @@
 //! The moment at which a packet was captured, with the precision that the capture keeps.
 
 use std::fmt;
+use std::str::FromStr;
 
 const NANOS_PER_SECOND: u32 = 1_000_000_000;
 const SECONDS_PER_DAY: i64 = 86_400;
@@ -59,6 +60,61 @@ impl fmt::Display for Timestamp {
     }
 }
 
+/// Not a time in UTC as RFC 3339 writes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("write a time in UTC such as 2015-06-07T14:03:21.068150Z")]
+pub struct InvalidTime;
+
+impl FromStr for Timestamp {
+    type Err = InvalidTime;
+
+    fn from_str(text: &str) -> Result<Self, InvalidTime> {
+        Self::parse(text).ok_or(InvalidTime)
+    }
+}
+
+impl Timestamp {
+    fn parse(text: &str) -> Option<Self> {
+        let (date, time) = text.strip_suffix('Z')?.split_once('T')?;
+        let (time, decimals) = time.split_once('.').unwrap_or((time, ""));
+        let [year, month, day] = three(date, '-')?;
+        let [hour, minute, second] = three(time, ':')?;
+        let is_time = (0..24).contains(&hour) && (0..60).contains(&minute) && second <= 60;
+        let is_date = (0..10_000).contains(&year) && (1..=12).contains(&month);
+        if !is_time || !is_date || !(1..=31).contains(&day) || decimals.len() > 9 {
+            return None;
+        }
+        let nanos = match decimals {
+            "" => 0,
+            digits => digits.parse::<u32>().ok()? * 10_u32.pow(9 - digits.len() as u32),
+        };
+        let seconds = days_since_1970(year, month, day) * SECONDS_PER_DAY
+            + hour * 3600
+            + minute * 60
+            + second;
+        Some(Self::new(seconds, nanos, decimals.len() as u8))
+    }
+}
+
+/// Three numbers with something between them.
+fn three(text: &str, between: char) -> Option<[i64; 3]> {
+    let numbers: Vec<i64> = text
+        .split(between)
+        .map(|part| part.parse::<u16>().map(i64::from).ok())
+        .collect::<Option<_>>()?;
+    numbers.try_into().ok()
+}
+
+/// The way back from [`civil_date`].
+fn days_since_1970(year: i64, month: i64, day: i64) -> i64 {
+    let year = year - i64::from(month <= 2);
+    let era = year.div_euclid(400);
+    let year_of_era = year.rem_euclid(400);
+    let day_of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
+    let day_of_era = year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year;
+    era * 146_097 + day_of_era - 719_468
+}
+
 /// Year, month and day of the proleptic Gregorian calendar, from days since 1970-01-01.
 ///
 /// Counts in eras of 400 years that begin on 1 March, so that the leap day comes last.
@@ -97,6 +153,26 @@ mod tests {
     }
 
     #[test]
+    fn a_time_that_was_written_is_read() {
+        for time in [
+            Timestamp::new(0, 0, 0),
+            Timestamp::new(1_433_685_801, 68_150_000, 6),
+            Timestamp::new(951_782_400, 7, 9),
+        ] {
+            assert_eq!(time.to_string().parse(), Ok(time));
+        }
+        for text in [
+            "",
+            "Z",
+            "2015-06-07",
+            "2015-13-07T14:03:21Z",
+            "2015-06-07T14:03Z",
+        ] {
+            assert_eq!(text.parse::<Timestamp>(), Err(InvalidTime), "{text}");
+        }
+    }
+
+    #[test]
     fn every_day_of_four_centuries_follows_the_one_before() {
         let mut before = civil_date(-1);
         for day in 0..146_097 {
@@ -106,6 +182,7 @@ mod tests {
                 "{before:?} {now:?}"
             );
             assert!(now.2 == before.2 + 1 || now.2 == 1);
+            assert_eq!(days_since_1970(now.0, now.1, now.2), day);
             before = now;
         }
     }

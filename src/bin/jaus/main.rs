@@ -21,6 +21,7 @@ mod replay;
 #[cfg(target_os = "linux")]
 mod up;
 mod vehicle;
+mod watch;
 
 use std::process::ExitCode;
 
@@ -59,6 +60,7 @@ enum Command {
     Node(node::NodeCommand),
     Vehicle(vehicle::VehicleCommand),
     Monitor(monitor::Monitor),
+    Watch(watch::Watch),
     Discover(discover::Discover),
     Doctor(doctor::Doctor),
     Ping(ping::Ping),
@@ -83,6 +85,7 @@ impl Command {
             Self::Node(node) => node.run(),
             Self::Vehicle(vehicle) => vehicle.run(),
             Self::Monitor(monitor) => monitor.run(),
+            Self::Watch(watch) => watch.run(),
             Self::Discover(discover) => discover.run(),
             Self::Doctor(doctor) => doctor.run(),
             Self::Ping(ping) => ping.run(),

@@ -62,6 +62,8 @@ pub struct Frame<'a> {
     pub link: LinkType,
     /// The octets that were kept.
     pub octets: &'a [u8],
+    /// How many frames were lost before this one, as far as whoever captured says (pcapng).
+    pub lost: u64,
     /// How many octets the frame had on the link; more than `octets` if the capture was told to
     /// keep only the beginning of each.
     pub length: u32,
@@ -207,6 +209,7 @@ struct Packet {
     time: Option<Timestamp>,
     link: LinkType,
     length: u32,
+    lost: u64,
     octets: Range<usize>,
 }
 
@@ -217,6 +220,7 @@ impl Packet {
             link: self.link,
             octets: taken.get(self.octets).unwrap_or_default(),
             length: self.length,
+            lost: self.lost,
         }
     }
 }

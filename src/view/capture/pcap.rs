@@ -114,6 +114,7 @@ impl Header {
             time: Some(self.time(&record)),
             link: self.link,
             length: self.endian.u32(&record, 12),
+            lost: 0,
             octets: 0..captured as usize,
         }))
     }

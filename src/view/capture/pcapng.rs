@@ -228,11 +228,13 @@ impl Section {
         else {
             return Err(TOO_SHORT);
         };
+        let octets = fields.range(captured as usize).ok_or(TOO_SHORT)?;
         Ok(Packet {
             time: Some(interface.time(u64::from(high) << 32 | u64::from(low))),
             link: interface.link,
             length,
-            octets: fields.range(captured as usize).ok_or(TOO_SHORT)?,
+            lost: fields.lost_before(captured as usize),
+            octets,
         })
     }
 
@@ -249,6 +251,7 @@ impl Section {
             time: None,
             link: interface.link,
             length,
+            lost: 0,
             octets: fields.range(captured as usize).ok_or(TOO_SHORT)?,
         })
     }
@@ -320,6 +323,27 @@ impl<'a> Fields<'a> {
         } else {
             u64::from_le_bytes(octets)
         })
+    }
+
+    /// What the options behind a packet of so many octets say about what was lost before it.
+    fn lost_before(&mut self, captured: usize) -> u64 {
+        // Everything begins at a multiple of four octets.
+        let padding = captured.next_multiple_of(4) - captured;
+        if self.range(padding).is_none() {
+            return 0;
+        }
+        while let Some((code, value)) = self.option() {
+            if code == super::writer::LOST
+                && let Ok(octets) = value.try_into()
+            {
+                return if self.big_endian {
+                    u64::from_be_bytes(octets)
+                } else {
+                    u64::from_le_bytes(octets)
+                };
+            }
+        }
+        0
     }
 
     /// The next option: code and value; `None` at the end or at one that does not fit.

@@ -18,6 +18,8 @@ const BYTE_ORDER: u32 = 0x1A2B_3C4D;
 /// Options of a block.
 const END: u16 = 0;
 const COMMENT: u16 = 1;
+/// How many were lost since the packet before, 8 octets.
+pub(super) const LOST: u16 = 4;
 const PROGRAM: u16 = 4;
 const INTERFACE_NAME: u16 = 2;
 const TIME_RESOLUTION: u16 = 9;
@@ -98,7 +100,8 @@ impl<W: Write> CaptureWriter<W> {
     /// # Errors
     /// What the writer says; [`io::ErrorKind::InvalidInput`] for a frame of 4 GiB and more.
     pub fn write(&mut self, on: InterfaceNumber, time: Timestamp, frame: &[u8]) -> io::Result<()> {
-        self.write_with_comment(on, time, frame, "")
+        self.put_frame(on, time, frame)?;
+        self.end()
     }
 
     /// The same, with words about the frame that Wireshark shows beside it.
@@ -112,6 +115,36 @@ impl<W: Write> CaptureWriter<W> {
         frame: &[u8],
         comment: &str,
     ) -> io::Result<()> {
+        self.put_frame(on, time, frame)?;
+        if !comment.is_empty() {
+            self.option(COMMENT, comment.as_bytes());
+            self.option(END, &[]);
+        }
+        self.end()
+    }
+
+    /// The same, and tells programs and people that so many were lost since the frame before.
+    ///
+    /// # Errors
+    /// As [`write`](Self::write).
+    pub fn write_after_loss(
+        &mut self,
+        on: InterfaceNumber,
+        time: Timestamp,
+        frame: &[u8],
+        lost: u64,
+    ) -> io::Result<()> {
+        self.put_frame(on, time, frame)?;
+        if lost > 0 {
+            self.option(LOST, &lost.to_ne_bytes());
+            self.option(COMMENT, format!("{lost} lost before this one").as_bytes());
+            self.option(END, &[]);
+        }
+        self.end()
+    }
+
+    /// Begins the block of a frame; options may follow.
+    fn put_frame(&mut self, on: InterfaceNumber, time: Timestamp, frame: &[u8]) -> io::Result<()> {
         let length = u32::try_from(frame.len()).map_err(|_| io::ErrorKind::InvalidInput)?;
         let nanos = i128::from(time.seconds()) * 1_000_000_000 + i128::from(time.subsec_nanos());
         // Before 1970 and after 2554 a capture has no way to say.
@@ -123,11 +156,7 @@ impl<W: Write> CaptureWriter<W> {
         self.put(&length.to_ne_bytes());
         self.put(&length.to_ne_bytes());
         self.put_padded(frame);
-        if !comment.is_empty() {
-            self.option(COMMENT, comment.as_bytes());
-            self.option(END, &[]);
-        }
-        self.end()
+        Ok(())
     }
 
     /// Octets written so far.
@@ -209,17 +238,19 @@ mod tests {
     }
 
     #[test]
-    fn a_comment_does_not_get_in_the_way_of_the_frame() {
+    fn what_was_lost_is_told_with_the_frame_behind_it() {
         let mut file = Vec::new();
         let mut writer = CaptureWriter::new(&mut file, "test").unwrap();
         let on = writer.add_interface("lo", LinkType::RAW).unwrap();
         let time = Timestamp::new(0, 0, 9);
-        writer
-            .write_with_comment(on, time, b"12345", "7 frames lost before this one")
-            .unwrap();
+        writer.write_after_loss(on, time, b"12345", 7).unwrap();
         writer.write(on, time, b"678").unwrap();
         let mut capture = Capture::new(&file[..]).unwrap();
-        let mut next = || capture.next_frame().unwrap().unwrap().octets.to_vec();
-        assert_eq!((next(), next()), (b"12345".to_vec(), b"678".to_vec()));
+        let mut next = || {
+            let frame = capture.next_frame().unwrap().unwrap();
+            (frame.octets.to_vec(), frame.lost)
+        };
+        assert_eq!(next(), (b"12345".to_vec(), 7));
+        assert_eq!(next(), (b"678".to_vec(), 0));
     }
 }

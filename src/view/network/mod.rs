@@ -1,6 +1,7 @@
 //! From a captured frame to the UDP datagram in it: link header, IP, fragments, ports.
 
 mod fragments;
+mod packet;
 
 use std::borrow::Cow;
 use std::net::{IpAddr, SocketAddr};
@@ -13,6 +14,8 @@ use etherparse::{
 use self::fragments::{Fragment, Fragments, Key};
 use super::{Frame, LinkType};
 
+pub use packet::udp_packet;
+
 /// The UDP and TCP port that IANA registered for JAUS.
 pub const JAUS_PORT: u16 = 3794;
 
@@ -23,6 +26,7 @@ pub const JAUS_PORT: u16 = 3794;
 /// see [`Counts`] for those that never are.
 #[derive(Debug)]
 pub struct Network {
+    /// Those of interest; all, if there are none.
     ports: Vec<u16>,
     fragments: Fragments,
     counts: Counts,
@@ -62,6 +66,11 @@ impl Network {
         }
     }
 
+    /// Looks for all UDP datagrams.
+    pub fn of_any_port() -> Self {
+        Self::new([])
+    }
+
     /// What was seen and not handed out. Fragments still waiting count as incomplete.
     pub fn counts(&self) -> Counts {
         let incomplete_datagrams = self.counts.incomplete_datagrams + self.fragments.incomplete();
@@ -98,7 +107,7 @@ impl Network {
     }
 
     fn is_chosen(&self, ports: [u16; 2]) -> bool {
-        ports.iter().any(|port| self.ports.contains(port))
+        self.ports.is_empty() || ports.iter().any(|port| self.ports.contains(port))
     }
 
     fn datagram<'u, 'a>(
@@ -243,6 +252,7 @@ mod tests {
             link,
             octets,
             length: octets.len() as u32,
+            lost: 0,
         }
     }
 

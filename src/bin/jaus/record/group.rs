@@ -1,14 +1,12 @@
 //! What goes to the multicast group, for whoever may not open packet sockets.
 
 use std::future::poll_fn;
-use std::net::{IpAddr, SocketAddr};
 use std::task::Poll;
 
-use bytes::Bytes;
-use etherparse::PacketBuilder;
 use jaus::cli::failure::Failure;
 use jaus::link::udp::{Settings, UdpLink};
 use jaus::link::{Group, Interfaces, Slab, interface::Ip};
+use jaus::view::udp_packet;
 
 use super::Packet;
 
@@ -52,24 +50,11 @@ impl Listeners {
         let link = &self.links[on];
         let octets = link
             .group()
-            .and_then(|group| wrap(source, group, &datagram));
+            .and_then(|group| udp_packet(source, group, &datagram));
         let packet = octets.map(|octets| Packet {
             interface: link.interface().name.clone(),
-            octets,
+            octets: octets.into(),
         });
         packet.into_iter().collect()
     }
-}
-
-/// Puts IP and UDP headers around a datagram.
-fn wrap(source: SocketAddr, destination: SocketAddr, datagram: &Bytes) -> Option<Bytes> {
-    let builder = match (source.ip(), destination.ip()) {
-        (IpAddr::V4(from), IpAddr::V4(to)) => PacketBuilder::ipv4(from.octets(), to.octets(), 1),
-        (IpAddr::V6(from), IpAddr::V6(to)) => PacketBuilder::ipv6(from.octets(), to.octets(), 1),
-        _ => return None,
-    };
-    let mut packet = Vec::new();
-    let builder = builder.udp(source.port(), destination.port());
-    builder.write(&mut packet, datagram).ok()?;
-    Some(packet.into())
 }

@@ -1,0 +1,68 @@
+//! How many messages there were of each kind, from whom, and how often.
+
+use std::collections::BTreeMap;
+
+use jaus::view::{Entry, Timestamp};
+
+/// Kinds that are told apart; an attacker may invent more.
+const MOST: usize = 4096;
+
+/// Counts by sender and message.
+#[derive(Default)]
+pub(super) struct Tally {
+    counts: BTreeMap<(String, String), u64>,
+    total: u64,
+    lost: u64,
+    span: Option<(f64, f64)>,
+}
+
+impl Tally {
+    pub(super) fn add(&mut self, entry: &Entry) {
+        self.total += 1;
+        let text = |key| entry.text(key).map(str::to_owned);
+        let message = text("message").or_else(|| text("code").map(|code| code + "h"));
+        let key = (
+            text("source").unwrap_or_default(),
+            message.unwrap_or_default(),
+        );
+        if self.counts.len() < MOST || self.counts.contains_key(&key) {
+            *self.counts.entry(key).or_default() += 1;
+        }
+        let time = entry.text("time").and_then(|time| time.parse().ok());
+        if let Some(time) = time.map(seconds) {
+            let (first, last) = self.span.unwrap_or((time, time));
+            self.span = Some((first.min(time), last.max(time)));
+        }
+    }
+
+    pub(super) fn lose(&mut self, count: u64) {
+        self.lost += count;
+    }
+
+    pub(super) fn lines(&self) -> Vec<String> {
+        let span = self.span.map_or(0.0, |(first, last)| last - first);
+        let mut lines = vec![format!(
+            "{:>9} {:>9}  {:<12} message",
+            "count", "per s", "from"
+        )];
+        let mut counts: Vec<_> = self.counts.iter().collect();
+        counts.sort_by(|a, b| b.1.cmp(a.1));
+        for ((source, message), &count) in counts {
+            let rate = if span > 0.0 {
+                format!("{:.1}", count as f64 / span)
+            } else {
+                "-".to_owned()
+            };
+            lines.push(format!("{count:>9} {rate:>9}  {source:<12} {message}"));
+        }
+        lines.push(format!(
+            "{} messages in {span:.1} s; {} lost",
+            self.total, self.lost
+        ));
+        lines
+    }
+}
+
+fn seconds(time: Timestamp) -> f64 {
+    time.seconds() as f64 + f64::from(time.subsec_nanos()) / 1e9
+}

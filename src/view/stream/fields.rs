@@ -1,0 +1,118 @@
+//! Comparing one field of a message with what is wanted of it.
+
+use serde_json::{Map, Value as Json};
+
+use super::filter::compare;
+
+/// A term such as `Pose.X>=1.5`.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Field {
+    /// Names as [`plain`] makes them, from the outside in.
+    path: Vec<String>,
+    comparison: Comparison,
+    wanted: String,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Comparison {
+    Equal,
+    Unequal,
+    Less,
+    AtMost,
+    More,
+    AtLeast,
+    Contains,
+}
+
+/// The longer ones first, of which the others are the beginnings.
+const SIGNS: [(&str, Comparison); 7] = [
+    ("!=", Comparison::Unequal),
+    ("<=", Comparison::AtMost),
+    (">=", Comparison::AtLeast),
+    ("=", Comparison::Equal),
+    ("<", Comparison::Less),
+    (">", Comparison::More),
+    ("~", Comparison::Contains),
+];
+
+impl Field {
+    /// Takes a comparison apart; `None` if it is none.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let at = text.find(['!', '<', '>', '=', '~'])?;
+        let (name, rest) = text.split_at(at);
+        let (wanted, comparison) = SIGNS
+            .iter()
+            .find_map(|&(sign, comparison)| Some((rest.strip_prefix(sign)?, comparison)))?;
+        let name = name.trim();
+        let path: Vec<_> = name
+            .strip_prefix("body.")
+            .unwrap_or(name)
+            .split('.')
+            .collect();
+        let path: Vec<_> = path.into_iter().map(plain).collect();
+        if path.iter().any(String::is_empty) {
+            return None;
+        }
+        Some(Self {
+            path,
+            comparison,
+            wanted: wanted.trim().to_owned(),
+        })
+    }
+
+    /// Whether it compares by size, but not with a number.
+    pub(super) fn needs_number(&self) -> bool {
+        use Comparison::{AtLeast, AtMost, Less, More};
+        let by_size = matches!(self.comparison, Less | AtMost | More | AtLeast);
+        by_size && self.wanted.parse::<f64>().is_err()
+    }
+
+    /// Whether a message's object has such a field, in its body at any depth, or of its own.
+    pub(super) fn holds(&self, object: &Map<String, Json>) -> bool {
+        object.get("body").is_some_and(|body| self.is_within(body))
+            || self.is_in(object, &self.path)
+    }
+
+    /// Whether the path begins here or further inside.
+    fn is_within(&self, value: &Json) -> bool {
+        match value {
+            Json::Object(object) => {
+                self.is_in(object, &self.path) || object.values().any(|inner| self.is_within(inner))
+            }
+            Json::Array(values) => values.iter().any(|inner| self.is_within(inner)),
+            _ => false,
+        }
+    }
+
+    /// Whether the path begins in this very object.
+    fn is_in(&self, object: &Map<String, Json>, path: &[String]) -> bool {
+        let Some((first, rest)) = path.split_first() else {
+            return false;
+        };
+        let mut named = object.iter().filter(|(name, _)| plain(name) == *first);
+        named.any(|(_, value)| self.leads(value, rest))
+    }
+
+    /// Whether the rest of the path leads from here to what is wanted. In a list it may begin with an
+    /// element's number; without one, any element will do.
+    fn leads(&self, value: &Json, path: &[String]) -> bool {
+        match (value, path.split_first()) {
+            (Json::Array(values), Some((first, rest))) => match first.parse::<usize>() {
+                Ok(index) => values
+                    .get(index)
+                    .is_some_and(|value| self.leads(value, rest)),
+                Err(_) => values.iter().any(|value| self.leads(value, path)),
+            },
+            (Json::Array(values), None) => values.iter().any(|value| self.leads(value, path)),
+            (Json::Object(object), Some(_)) => self.is_in(object, path),
+            (_, Some(_)) => false,
+            (value, None) => compare(self.comparison, value, &self.wanted),
+        }
+    }
+}
+
+/// A name without what people do not want to type: case, underscores, blanks.
+fn plain(name: &str) -> String {
+    let letters = name.chars().filter(|c| c.is_alphanumeric());
+    letters.flat_map(char::to_lowercase).collect()
+}
