@@ -8,21 +8,19 @@ use std::fs;
 use cli_support::{Running, jaus, own_group, run};
 
 #[test]
-fn the_demo_tells_its_story_and_ends_by_itself() {
-    let run = run(&["demo", "--seconds", "4"], b"");
+fn the_demo_drives_a_mission_to_its_end_or_says_why_it_can_not() {
+    let demo = |to| run(&["demo", "--headless", "--seconds", "60", "--to", to], b"");
+    let run = demo("0,2");
     let mut rest = &*run.stdout;
     for part in [
-        "vehicle   starts subsystem 101 \"Rover\"",
-        "operator  starts subsystem 42 \"Operator station\"",
-        "asks everybody who they are, by multicast to 239.255.0.1:3794",
-        "discovers subsystem 101: it is the vehicle \"Rover\"",
-        "learns what component 101.1.33 offers",
-        "urn:jaus:jss:core:Discovery ",
-        "urn:jaus:jss:core:Liveness ",
-        "urn:jaus:jss:mobility:VelocityStateSensor ",
-        "heartbeat 1 came after",
-        "heartbeat 2 came after",
-        "The demo ends after 4.",
+        "system    starts 101.1.35, the communicator",
+        "starts 101.3.36, the planner",
+        "operator  takes control of the planner 101.3.36 with authority 150",
+        "operator  wants the vehicle at x 0 m, y 2 m",
+        "planner   all stages obey: under way",
+        "planner   arrived",
+        "vehicle   at x",
+        "the vehicle has arrived",
     ] {
         let place = rest
             .find(part)
@@ -31,6 +29,13 @@ fn the_demo_tells_its_story_and_ends_by_itself() {
     }
     assert!(!run.stdout.contains('\x1b'), "colours are for terminals");
     assert_eq!((run.status, &*run.stderr), (0, ""));
+
+    // Afterwards, because both have the same ids on the same loopback interface.
+    let outside = demo("200,0");
+    let said = &outside.stdout;
+    assert!(said.contains("planner   gives up ("), "{said}");
+    assert!(said.contains("has not arrived"), "{said}");
+    assert_eq!(outside.status, 1);
 }
 
 #[test]

@@ -28,7 +28,17 @@ const STARTS: usize = 7;
 const SETTLED: Duration = Duration::from_secs(4);
 
 /// The programs, each with flags that keep its files apart.
-const PROGRAMS: &[(&str, &[&str])] = &[];
+const PROGRAMS: &[(&str, &[&str])] = &[
+    (env!("CARGO_BIN_EXE_jaus-communicator"), &["--debug", "off"]),
+    (env!("CARGO_BIN_EXE_jaus-primitive-driver"), &[]),
+    (env!("CARGO_BIN_EXE_jaus-velocity-state-sensor"), &[]),
+    (env!("CARGO_BIN_EXE_jaus-local-pose-sensor"), &[]),
+    (env!("CARGO_BIN_EXE_jaus-local-vector-driver"), &[]),
+    (env!("CARGO_BIN_EXE_jaus-local-path-segment-driver"), &[]),
+    (env!("CARGO_BIN_EXE_jaus-vector-knowledge-store"), &[]),
+    (env!("CARGO_BIN_EXE_jaus-planner"), &[]),
+    (env!("CARGO_BIN_EXE_jaus-ocu"), &[]),
+];
 
 #[tokio::main(flavor = "current_thread")]
 async fn main() {
