@@ -35,11 +35,23 @@ impl Switch {
         Handlers::new(stage::LATEST).answer(move |_: QueryStage| report.lock().unwrap().clone())
     }
 
+    pub(crate) async fn stand_down(&self, component: &Component, reason: &str) {
+        {
+            let mut report = self.0.lock().unwrap();
+            report.next_subsystem_id = 0;
+            report.state = State::BLOCKED;
+            report.reason = reason.into();
+        }
+        component.changed::<QueryStage>().await;
+    }
+
     pub(crate) async fn set(&self, component: &Component, state: State, reason: &str) {
         {
             let mut report = self.0.lock().unwrap();
             report.state = state;
             report.reason = reason.into();
+            // As if it commanded the next one: else it has stood down.
+            report.next_subsystem_id = 1;
         }
         component.changed::<QueryStage>().await;
     }

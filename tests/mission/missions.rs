@@ -100,6 +100,20 @@ async fn an_emergency_of_a_driver_ends_the_mission() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_driver_that_stands_down_ends_the_mission() {
+    let mut world = World::new(1081).await;
+    world.go(9.5, 9.5, true).await;
+    world.engage().await;
+    let component = world.path.component.clone();
+    let reason = "101.1.33 is controlled by 42.1.1";
+    world.path.stage.stand_down(&component, reason).await;
+    let report = world.until_stage(Stage::STOPPED).await;
+    let told = report.reason.to_string_lossy();
+    assert!(told.ends_with(reason), "{told}");
+    world.shut_down().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn the_operator_stops_it_and_the_driver_is_given_back() {
     let mut world = World::new(1051).await;
     world.go(9.5, 9.5, true).await;

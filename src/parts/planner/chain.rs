@@ -29,6 +29,8 @@ pub(super) enum News {
     Controller(Link, Option<JausId>),
     /// It has been stopped by an emergency.
     Emergency(Link),
+    /// It has stood down, for a reason that somebody had: it commands nobody any more.
+    StoodDown(Link, String),
 }
 
 /// Between two attempts to subscribe.
@@ -120,6 +122,12 @@ async fn ask<R: crate::codec::Message, Q: crate::codec::Message>(
 }
 
 fn stage_news(link: Link, report: &ReportStage) -> News {
+    // The last one of the chain commands nobody in any case.
+    let commands = report.next_subsystem_id != 0 || link == Link::Primitive;
+    if report.state == State::BLOCKED && !commands {
+        let reason = report.reason.to_string_lossy().into_owned();
+        return News::StoodDown(link, reason);
+    }
     News::Stage(link, state(report), report.progress)
 }
 

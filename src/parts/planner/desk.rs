@@ -268,6 +268,10 @@ impl<'a> Desk<'a> {
                     self.check_controller(link, client).await;
                 }
             }
+            News::StoodDown(link, reason) => {
+                let reason = format!("the {link}{} has stood down: {reason}", self.named(link));
+                self.stop_if_driving(&reason).await;
+            }
             News::Emergency(link) => {
                 let reason = format!("the {link}{} is in emergency", self.named(link));
                 self.stop_if_driving(&reason).await;

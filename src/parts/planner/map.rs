@@ -26,12 +26,22 @@ pub(in crate::parts) struct Map {
 }
 
 /// The map that is called so, or the only one; `known` if it has not changed.
-pub(in crate::parts) async fn fetch(
+pub(super) async fn fetch(
     component: &Component,
     name: &str,
     known: Option<Map>,
 ) -> Result<Map, String> {
     let store = find_soon(component, &[raster_maps::URN], "knowledge store").await?;
+    fetch_from(component, store, name, known).await
+}
+
+/// The same of a store that is known.
+pub(in crate::parts) async fn fetch_from(
+    component: &Component,
+    store: JausId,
+    name: &str,
+    known: Option<Map>,
+) -> Result<Map, String> {
     for _ in 0..TRIES {
         let report: ReportRasterMaps = component
             .query(store, &QueryRasterMaps {})

@@ -145,7 +145,7 @@ impl<T: FnMut(&Step)> Running<'_, T> {
     }
 
     async fn ask_sensors(&mut self, cast: &Cast) -> Option<()> {
-        let component = self.component;
+        let (component, test) = (self.component, self.test);
         self.step(async {
             let report: ReportRasterMaps = ask(component, cast.store, &QueryRasterMaps {}).await?;
             let maps = report.map_list.iter();
@@ -166,11 +166,8 @@ impl<T: FnMut(&Step)> Running<'_, T> {
         })
         .await?;
         self.step(async {
-            let (x, y) = pose(component, cast.pose).await?;
-            let query = QueryVelocityState { presence_vector: 1 };
-            let velocity: ReportVelocityState = ask(component, cast.velocity, &query).await?;
-            let speed = velocity.velocity_x_m_per_s();
-            let speed = speed.ok_or_else(|| format!("{} tells no speed", cast.velocity))?;
+            let (x, y) = patiently(test, || pose(component, cast.pose)).await?;
+            let speed = patiently(test, || speed(component, cast.velocity)).await?;
             Ok(((), format!("x {x:.2} m, y {y:.2} m, {speed:.2} m/s")))
         })
         .await?;
@@ -355,6 +352,27 @@ async fn pose(component: &Component, sensor: JausId) -> Result<Point, String> {
     place.ok_or_else(|| format!("{sensor} does not tell where the vehicle is: set its pose"))
 }
 
+async fn speed(component: &Component, sensor: JausId) -> Result<f64, String> {
+    let query = QueryVelocityState { presence_vector: 1 };
+    let report: ReportVelocityState = ask(component, sensor, &query).await?;
+    let speed = report.velocity_x_m_per_s();
+    speed.ok_or_else(|| format!("{sensor} does not tell how fast the vehicle is"))
+}
+
+/// Asks again until the answer is good: a sensor that was just started knows nothing yet.
+async fn patiently<V, F: Future<Output = Result<V, String>>>(
+    test: &MissionTest,
+    ask: impl Fn() -> F,
+) -> Result<V, String> {
+    let begin = Instant::now();
+    loop {
+        match ask().await {
+            Err(_) if begin.elapsed() < test.patience => tokio::time::sleep(LOOK).await,
+            answer => return answer,
+        }
+    }
+}
+
 async fn take_control(
     component: &Component,
     test: &MissionTest,
@@ -379,7 +397,7 @@ async fn set_out(
 ) -> Result<((Point, u32), String), String> {
     let to = match test.to {
         Some(to) => to,
-        None => choose(component, pose(component, cast.pose).await?).await?,
+        None => choose(component, cast.store, pose(component, cast.pose).await?).await?,
     };
     let before = reports.now().await?.mission;
     let command = SetDestination {
@@ -406,9 +424,9 @@ async fn set_out(
 }
 
 /// A destination some metres away that can be reached.
-async fn choose(component: &Component, from: Point) -> Result<Point, String> {
+async fn choose(component: &Component, store: JausId, from: Point) -> Result<Point, String> {
     const AWAY: f64 = 4.0;
-    let map = map::fetch(component, "traversability", None).await?;
+    let map = map::fetch_from(component, store, "traversability", None).await?;
     let room = Vehicle {
         margin: 0.3,
         ..Vehicle::default()
