@@ -107,6 +107,10 @@ impl Desk {
             return reply(Err("clear the emergency first".to_owned()));
         }
         self.grip.set_ready(now, ready);
+        if ready && self.grip.wanted() == Wanted::Planner && !self.is_driven_by_planner() {
+            // Its mission is over, and the operator goes on with everything.
+            drop(self.grip.want(Wanted::Everything, &self.picture));
+        }
         if !ready {
             self.stick.stop(now);
             self.steer(now);
