@@ -17,3 +17,5 @@ mod scene;
 mod drive;
 #[path = "ocu/hostile.rs"]
 mod hostile;
+#[path = "ocu/looking.rs"]
+mod looking;

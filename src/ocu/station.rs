@@ -126,6 +126,7 @@ impl Part for OpenStation {
             listener,
             address: _,
         } = self;
+        let node = seat.node.clone();
         let component = seat.component("Operator").live_on(seat.port)?;
         let door = Door {
             operator: component.id(),
@@ -133,6 +134,7 @@ impl Part for OpenStation {
             token: station.token,
             token_to_read: station.token_to_read,
             hosts: station.hosts,
+            node,
         };
         let (desk, access) = Desk::new(component, station.vehicle, station.authority);
         let server = Server::new(door, access);

@@ -121,6 +121,17 @@ impl Scene {
         standing.is_some_and(|it| it.controller.is_some())
     }
 
+    /// A place for another part of the vehicle.
+    pub(crate) fn seat(&self, component: u8) -> Seat {
+        let node = &self.nodes[0];
+        Seat {
+            port: node.attach(component).unwrap(),
+            node: Some(node.clone()),
+            kind: Kind::Vehicle,
+            name: "Rover".to_owned(),
+        }
+    }
+
     pub(crate) fn speed(&self) -> f64 {
         self.vehicle.motion().velocity.x
     }
@@ -225,9 +236,14 @@ impl Page {
 
     /// The next state.
     pub(crate) async fn state(&mut self) -> Value {
+        self.said("state").await
+    }
+
+    /// The next frame of a type.
+    pub(crate) async fn said(&mut self, wanted: &str) -> Value {
         loop {
             let said = self.next().await;
-            if said["type"] == "state" {
+            if said["type"] == wanted {
                 return said;
             }
         }

@@ -5,6 +5,7 @@ mod bounds;
 mod connections;
 mod guard;
 mod socket;
+mod view;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -25,6 +26,8 @@ use super::desk::{Access, Order};
 use super::page::{self, File};
 use super::token::Token;
 use crate::address::JausId;
+use crate::node::Node;
+use crate::view::Dictionary;
 
 /// Who may come in, and whom they meet.
 pub(super) struct Door {
@@ -33,6 +36,8 @@ pub(super) struct Door {
     pub(super) token: Option<Token>,
     pub(super) token_to_read: bool,
     pub(super) hosts: Vec<String>,
+    /// The station's node, if it is in this process: what passes it can be seen.
+    pub(super) node: Option<Node>,
 }
 
 /// The server, not yet listening.
@@ -44,6 +49,7 @@ pub(super) struct Server {
 struct Shared {
     door: Door,
     access: Access,
+    dictionary: Dictionary,
     /// Places for pages.
     places: Arc<Semaphore>,
     pages: AtomicU64,
@@ -81,6 +87,7 @@ impl Server {
         let shared = Shared {
             door,
             access,
+            dictionary: Dictionary::new(),
             places: Arc::new(Semaphore::new(Self::PAGES)),
             pages: AtomicU64::new(0),
             counters: Counters::default(),

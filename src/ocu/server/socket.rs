@@ -13,10 +13,12 @@ use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
 use super::Shared;
 use super::bounds::Rate;
+use super::view::{self, MessageView};
 use crate::ocu::PageId;
 use crate::ocu::answer::Said as Answer;
 use crate::ocu::desk::{Order, Reply};
-use crate::ocu::wish::{Frame, Said, Wish};
+use crate::ocu::wish::{Frame, MessageFilter, Said, Wish};
+use crate::view::Filter;
 
 /// The version of the protocol between page and station.
 const VERSION: u32 = 1;
@@ -38,11 +40,13 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
     let page = PageId(shared.pages.fetch_add(1, Relaxed));
     let (mut sink, stream) = socket.split();
     let (answers, waiting) = mpsc::channel(ANSWERS);
-    let trusted = Arc::new(AtomicBool::new(!shared.needs_token()));
+    let (views, chosen) = mpsc::channel(ANSWERS);
+    let trusted = AtomicBool::new(!shared.needs_token());
     let reader = Reader {
         page,
         shared: &shared,
         answers,
+        views,
         trusted: &trusted,
         rate: Rate::new(Instant::now()),
         wrong_tokens: 0,
@@ -50,7 +54,7 @@ pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
     };
     let parting = tokio::select! {
         parting = reader.run(stream) => parting,
-        () = write(&mut sink, &shared, &trusted, waiting) => None,
+        () = write(&mut sink, &shared, &trusted, waiting, chosen) => None,
     };
     // The hand that was on the stick is gone, whatever else is.
     let _ = shared.access.orders.send(Order::Gone(page)).await;
@@ -72,7 +76,9 @@ struct Reader<'s> {
     page: PageId,
     shared: &'s Shared,
     answers: mpsc::Sender<Utf8Bytes>,
-    trusted: &'s Arc<AtomicBool>,
+    /// Which messages the page wants to see.
+    views: mpsc::Sender<Option<Filter>>,
+    trusted: &'s AtomicBool,
     rate: Rate,
     wrong_tokens: u32,
     /// When a wish without an id was last refused.
@@ -122,9 +128,7 @@ impl Reader<'_> {
         };
         match frame.said {
             Said::Token { token } => return self.show(frame.id, &token).await,
-            Said::Messages { .. } => {
-                self.refuse(frame.id, "messages are not shown by this version");
-            }
+            Said::Messages { on, filter } => self.choose(frame.id, on, &filter).await,
             Said::Wish(_) if !self.trusted.load(Relaxed) => {
                 self.refuse(
                     frame.id,
@@ -148,6 +152,30 @@ impl Reader<'_> {
         sleep(WRONG_TOKEN).await;
         self.refuse(id, "this is not the token");
         (self.wrong_tokens >= WRONG_TOKENS).then_some((close_code::POLICY, "too many wrong tokens"))
+    }
+
+    /// The page wants to see messages, or none.
+    async fn choose(&mut self, id: Option<u64>, on: bool, filter: &MessageFilter) {
+        if !self.may_read() {
+            return self.refuse(id, "looking needs the token, too");
+        }
+        if on && self.shared.door.node.is_none() {
+            return self.refuse(
+                id,
+                "the station's node runs in another process: look at its debug view",
+            );
+        }
+        let chosen = match on.then(|| view::filter(filter)).transpose() {
+            Ok(chosen) => chosen,
+            Err(error) => return self.refuse(id, &error.to_string()),
+        };
+        // An error means that the writer has ended, and with it the connection.
+        let _ = self.views.send(chosen).await;
+        self.say(id.map(|id| Answer::Done { id }).as_ref());
+    }
+
+    fn may_read(&self) -> bool {
+        may_read(self.shared, self.trusted)
     }
 
     async fn wish(&mut self, id: Option<u64>, wish: Wish) {
@@ -195,13 +223,28 @@ fn say(answers: &mpsc::Sender<Utf8Bytes>, answer: &Answer<'_>) {
     }
 }
 
+/// Whether a page may look.
+fn may_read(shared: &Shared, trusted: &AtomicBool) -> bool {
+    !shared.door.token_to_read || trusted.load(Relaxed)
+}
+
+/// The next message of the view, if there is one.
+async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
+    match view {
+        Some(view) => view.next().await,
+        None => std::future::pending().await,
+    }
+}
+
 /// Tells the page everything, until it does not take it or the desk has ended.
 async fn write(
     sink: &mut SplitSink<WebSocket, Message>,
     shared: &Shared,
     trusted: &AtomicBool,
     mut answers: mpsc::Receiver<Utf8Bytes>,
+    mut chosen: mpsc::Receiver<Option<Filter>>,
 ) {
+    let mut view = None;
     let mut snapshots = shared.access.snapshots.clone();
     snapshots.mark_changed();
     let mut pings = interval(PING);
@@ -232,12 +275,22 @@ async fn write(
                 if changed.is_err() {
                     return;
                 }
-                let reads = !shared.door.token_to_read || trusted.load(Relaxed);
                 let json = snapshots.borrow_and_update().clone();
-                let json = Some(json).filter(|json| reads && !json.is_empty());
+                let shown = may_read(shared, trusted) && !json.is_empty();
+                let json = Some(json).filter(|_| shown);
                 json.map(|json| Message::Text(Utf8Bytes::from(&*json)))
             }
             _ = pings.tick() => Some(Message::Ping(axum::body::Bytes::new())),
+            Some(filter) = chosen.recv() => {
+                view = filter.zip(shared.door.node.as_ref()).map(|(filter, node)| {
+                    MessageView::new(node, &shared.dictionary, filter)
+                });
+                None
+            }
+            message = next_message(&mut view) => match message {
+                Some(json) => Some(Message::Text(json)),
+                None => return,
+            },
         };
     }
 }
