@@ -72,7 +72,7 @@ fn run(system: &System) {
     look_from_all_screens(&mut page, "1-start");
 
     take_control(&mut page);
-    plan(&mut page, 4.0, 1.0);
+    plan(&mut page, 4.5, 1.5);
     look_from_all_screens(&mut page, "2-approval");
     approve(&mut page);
     page.wait("+document.querySelector('#progress').ariaValueNow > 5");
@@ -145,7 +145,7 @@ fn take_over_by_keyboard(page: &mut Browser) {
 /// A mission to its end.
 fn arrive(page: &mut Browser) {
     take_control(page);
-    plan(page, 2.0, -2.0);
+    plan(page, -4.5, -1.5);
     approve(page);
     page.wait("document.querySelector('#mission-line').dataset.state === 'arrived'");
 }

@@ -29,11 +29,11 @@ const HOSTS: [&str; 4] = ["communicator", "board-a", "board-b", "operator"];
 
 /// The programs, each with its host and its flags, in the order of their start.
 const PROGRAMS: [(&str, Host, &[&str]); 9] = [
-    ("jaus-communicator", Host::Communicator, &[]),
+    ("jaus-communicator", Host::Communicator, &["--forward"]),
     ("jaus-primitive-driver", Host::BoardA, &[]),
     ("jaus-velocity-state-sensor", Host::BoardA, &[]),
     ("jaus-local-pose-sensor", Host::BoardA, &[]),
-    ("jaus-vector-knowledge-store", Host::BoardB, &[]),
+    ("jaus-vector-knowledge-store", Host::BoardB, &["--demo-map"]),
     ("jaus-local-vector-driver", Host::BoardB, &[]),
     ("jaus-local-path-segment-driver", Host::BoardB, &[]),
     ("jaus-planner", Host::BoardB, &[]),
@@ -171,6 +171,7 @@ impl System {
                 },
             ])
             .current_dir(&directory)
+            .env("XDG_STATE_HOME", &directory)
             .stdin(Stdio::null())
             .stdout(log.try_clone().unwrap())
             .stderr(log)
