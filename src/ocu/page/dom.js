@@ -93,5 +93,5 @@ export function toast(kind, text) {
   notice.dataset.text = shown;
   close.addEventListener("click", () => notice.remove());
   area.append(notice);
-  setTimeout(() => notice.remove(), kind === "bad" ? 12_000 : 6_000);
+  setTimeout(() => notice.remove(), { bad: 12_000, warn: 6_000 }[kind] ?? 3_000);
 }

@@ -16,6 +16,8 @@ export class MapView {
   #raster = new Raster();
   #camera = { x: 0, y: 0, scale: 24 };
   #placed = false;
+  /** Whether somebody has chosen what is seen, so that a turned screen leaves it alone. */
+  #chosen = false;
   #following = true;
   #pointers = new Map();
   #tap = null;
@@ -129,6 +131,7 @@ export class MapView {
     const info = this.#raster.info;
     if (!info || !width || !height) return;
     const [tall, wide] = [info.rows * info.cell_m, info.columns * info.cell_m];
+    this.#chosen = false;
     this.#camera = {
       x: info.x + tall / 2,
       y: info.y + wide / 2,
@@ -156,6 +159,7 @@ export class MapView {
 
   /** Zooms about a place of the screen, which stays where it is. */
   #zoom(factor, px = this.#size.width / 2, py = this.#size.height / 2) {
+    this.#chosen = true;
     const fixed = this.#toWorld(px, py);
     this.#camera.scale = clampScale(this.#camera.scale * factor);
     const moved = this.#toWorld(px, py);
@@ -210,6 +214,7 @@ export class MapView {
     if (!from) return;
     if (this.#tap && Math.hypot(to[0] - this.#tap[0], to[1] - this.#tap[1]) < TAP) return;
     this.#tap = null;
+    this.#chosen = true;
     const before = spread([...this.#pointers.values()]);
     this.#pointers.set(event.pointerId, to);
     const after = spread([...this.#pointers.values()]);
@@ -244,7 +249,7 @@ export class MapView {
     const { width, height } = this.#size;
     this.#canvas.width = Math.max(1, Math.round(width * ratio));
     this.#canvas.height = Math.max(1, Math.round(height * ratio));
-    if (!this.#following || !this.#placed) this.#showAll();
+    if (!this.#chosen) this.#showAll();
     this.#draw();
   }
 
