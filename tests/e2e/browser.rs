@@ -149,6 +149,12 @@ impl Browser {
     /// Says a command and waits for its answer.
     #[track_caller]
     fn call(&mut self, method: &str, parameters: &Value) -> Value {
+        let answer = self.try_call(method, parameters);
+        answer.unwrap_or_else(|error| panic!("{method}: {error}"))
+    }
+
+    /// Likewise, where the browser may say no.
+    fn try_call(&mut self, method: &str, parameters: &Value) -> Result<Value, Value> {
         self.number += 1;
         let mut command = json!({ "id": self.number, "method": method, "params": parameters });
         if let Some(session) = &self.session {
@@ -158,13 +164,15 @@ impl Browser {
         octets.push(0);
         self.commands.write_all(&octets).unwrap();
         loop {
-            let said = self
-                .said
-                .recv_timeout(LIMIT)
-                .unwrap_or_else(|error| panic!("{method}: the browser is silent: {error}"));
+            let said = self.said.recv_timeout(LIMIT);
+            let said = said.unwrap_or_else(|e| panic!("{method}: the browser is silent: {e}"));
             if said["id"] == self.number {
-                assert_eq!(said["error"], Value::Null, "{method}");
-                return said["result"].clone();
+                let error = said["error"].clone();
+                return if error.is_null() {
+                    Ok(said["result"].clone())
+                } else {
+                    Err(error)
+                };
             }
             self.note(&said);
         }
@@ -349,7 +357,13 @@ impl Browser {
 
     /// Keeps a picture of the page in `target/e2e-screenshots`.
     pub(crate) fn screenshot(&mut self, name: &str) {
-        let shot = self.call("Page.captureScreenshot", &json!({ "format": "png" }));
+        // While the page takes another size there is nothing to take a picture of.
+        let png = json!({ "format": "png" });
+        let mut shots = (0..20).map(|_| {
+            std::thread::sleep(PERIOD);
+            self.try_call("Page.captureScreenshot", &png)
+        });
+        let shot = shots.find_map(Result::ok).expect("a picture of the page");
         let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("e2e-screenshots");
         std::fs::create_dir_all(&directory).unwrap();
         let octets = from_base64(shot["data"].as_str().unwrap());

@@ -29,7 +29,7 @@ const HOSTS: [&str; 4] = ["communicator", "board-a", "board-b", "operator"];
 
 /// The programs, each with its host and its flags, in the order of their start.
 const PROGRAMS: [(&str, Host, &[&str]); 9] = [
-    ("jaus-communicator", Host::Communicator, &["--forward"]),
+    ("jaus-communicator", Host::Communicator, &[]),
     ("jaus-primitive-driver", Host::BoardA, &[]),
     ("jaus-velocity-state-sensor", Host::BoardA, &[]),
     ("jaus-local-pose-sensor", Host::BoardA, &[]),
