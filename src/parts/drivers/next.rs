@@ -242,7 +242,12 @@ impl<L: Language> Next<L> {
                     self.language.halt()
                 }
                 Plan::Rest if now - busy > Self::LINGER => return End::Rest,
-                Plan::Rest => self.language.halt(),
+                Plan::Rest => {
+                    if self.vehicle.has_arrived() {
+                        self.tell(StageState::Done, None, String::new()).await;
+                    }
+                    self.language.halt()
+                }
             };
             match timeout(Self::PATIENCE, control.deliver(&command)).await {
                 Ok(Ok(())) => acknowledged = Instant::now(),
