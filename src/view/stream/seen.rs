@@ -40,6 +40,7 @@ impl Seen {
 
     /// The same for a message to many that passes within a node without a number, and goes to the
     /// links as well.
+    #[cfg(feature = "node")]
     pub(super) fn is_copy_for_many(&mut self, time: Timestamp, frame: &Frame) -> bool {
         let key = self.key(frame, None);
         self.is_known(time, key, COPIES)
