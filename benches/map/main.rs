@@ -201,7 +201,8 @@ async fn set(client: &Component, map: u16, side: u16, cells: Bytes) {
         ..SetRasterCells::default()
     };
     client.deliver(STORE, &set).await.expect("delivered");
-    let message = messages.next().await.expect("an answer");
+    let answer = tokio::time::timeout(Duration::from_secs(10), messages.next());
+    let message = answer.await.expect("in time").expect("an answer");
     let report = <ReportRasterChange as jaus::codec::Message>::decode(&message.payload);
     let done = report_raster_change::Result_::DONE;
     assert_eq!(report.expect("the answer").result, done);

@@ -230,10 +230,10 @@ fn tell(
         (Answer::None, _) => {}
         (Answer::Creation { request_id, .. }, Ok(Done::Added(added))) => {
             let numbers = added.iter().map(|id| id.map_or(0, |id| id.0));
-            context.reply(request, &creation(request_id, numbers));
+            context.reply_until_acknowledged(request, &creation(request_id, numbers));
         }
         (Answer::Creation { request_id, count }, _) => {
-            context.reply(
+            context.reply_until_acknowledged(
                 request,
                 &creation(request_id, std::iter::repeat_n(0, count)),
             );
@@ -246,14 +246,14 @@ fn tell(
                 result: ChangeResult::DONE,
                 reason: "".into(),
             };
-            context.reply(request, &done);
+            context.reply_until_acknowledged(request, &done);
         }
         (Answer::Raster { request_id, map }, result) => {
             let (code, reason) = match result {
                 Err(refusal) => (result_of(refusal), refusal.to_string()),
                 Ok(_) => (ChangeResult::FAILED, String::new()),
             };
-            context.reply(request, &refused(request_id, map, code, &reason));
+            context.reply_until_acknowledged(request, &refused(request_id, map, code, &reason));
         }
     }
 }
@@ -262,14 +262,14 @@ fn tell_failed(request: &Received, answer: Answer, error: &KeepError, context: &
     match answer {
         Answer::None => {}
         Answer::Creation { request_id, count } => {
-            context.reply(
+            context.reply_until_acknowledged(
                 request,
                 &creation(request_id, std::iter::repeat_n(0, count)),
             );
         }
         Answer::Raster { request_id, map } => {
             let reason = error.to_string();
-            context.reply(
+            context.reply_until_acknowledged(
                 request,
                 &refused(request_id, map, ChangeResult::FAILED, &reason),
             );
