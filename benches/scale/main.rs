@@ -1,0 +1,124 @@
+//! How long planning takes, and how much memory, on maps up to the largest.
+//!
+//! ```sh
+//! cargo bench --bench scale
+//! ```
+//!
+//! Each row is the median of a few runs; memory is the most that the process held in one of them
+//! beyond the map itself (Linux).
+#![expect(clippy::disallowed_methods, reason = "a bench measures time")]
+
+use std::time::{Duration, Instant};
+
+use jaus::mission::{Terrain, Vehicle, plan};
+
+const RUNS: usize = 3;
+
+fn main() {
+    println!("| map | cells | ground | time | memory | segments | length |");
+    println!("|---|---:|---|---:|---:|---:|---:|");
+    for side in [16, 256, 512, 1024, 4096] {
+        for (name, ground) in GROUNDS {
+            row(side, name, ground);
+        }
+    }
+}
+
+type Ground = fn(usize, usize, usize) -> u8;
+
+/// What is at a row and a column of a map with so many of each.
+const GROUNDS: [(&str, Ground); 5] = [
+    ("open", |_, _, _| 255),
+    ("uneven", |row, column, _| {
+        1 + random(row / 8, column / 8) % 255
+    }),
+    ("boulders", |row, column, side| {
+        let is_boulder = random(row / 4, column / 4).is_multiple_of(5);
+        let is_corner = row.max(column) < 8 || row.min(column) + 8 >= side;
+        if is_boulder && !is_corner { 0 } else { 255 }
+    }),
+    ("maze", |row, column, side| {
+        let apart = (side / 16).clamp(4, 64);
+        let at_left = (row / apart).is_multiple_of(2);
+        let gap = if at_left {
+            column + 3 >= side
+        } else {
+            column < 3
+        };
+        if row % apart == apart - 1 && !gap {
+            0
+        } else {
+            255
+        }
+    }),
+    ("walled in", |row, column, side| {
+        let wall = side - 4;
+        let is_wall = (row == wall && column >= wall) || (column == wall && row >= wall);
+        if is_wall { 0 } else { 255 }
+    }),
+];
+
+/// Some number for a place, always the same.
+fn random(row: usize, column: usize) -> u8 {
+    let mut seed = ((row as u64) << 32) | column as u64;
+    seed = (seed ^ (seed >> 30))
+        .wrapping_mul(0xBF58_476D_1CE4_E5B9)
+        .wrapping_add(0x9E37);
+    seed = (seed ^ (seed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    (seed >> 40) as u8
+}
+
+fn row(side: usize, name: &str, ground: Ground) {
+    let cells = (0..side * side)
+        .map(|at| ground(at / side, at % side, side))
+        .collect();
+    let sides = side as u16;
+    let Ok(terrain) = Terrain::new(sides, sides, 0.1, (0.0, 0.0), cells) else {
+        return;
+    };
+    let end = side as f64 * 0.1 - 0.05;
+    let thin = Vehicle {
+        width: 0.1,
+        margin: 0.0,
+    };
+    let mut times = Vec::new();
+    let mut memory = 0;
+    let mut told = String::new();
+    for _ in 0..RUNS {
+        let before = reset_peak();
+        let begin = Instant::now();
+        let path = plan(&terrain, &thin, (0.05, 0.05), (end, end));
+        times.push(begin.elapsed());
+        memory = memory.max(peak().saturating_sub(before));
+        told = match path {
+            Ok(path) => format!("{} | {:.1} m", path.segments().len(), path.length()),
+            Err(_) => "none | none".to_owned(),
+        };
+    }
+    times.sort();
+    let time: Duration = times[RUNS / 2];
+    println!(
+        "| {side} x {side} | {} | {name} | {:.1} ms | {:.1} MiB | {told} |",
+        side * side,
+        time.as_secs_f64() * 1e3,
+        memory as f64 / 1024.0
+    );
+}
+
+/// Lets the peak begin at what is held now, in KiB.
+fn reset_peak() -> u64 {
+    // Without it the peak is that of the whole run.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+    status("VmRSS:")
+}
+
+fn peak() -> u64 {
+    status("VmHWM:")
+}
+
+fn status(key: &str) -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix(key));
+    let number = line.and_then(|line| line.split_whitespace().next());
+    number.and_then(|number| number.parse().ok()).unwrap_or(0)
+}
