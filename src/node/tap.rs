@@ -143,7 +143,8 @@ impl Passage {
     }
 }
 
-/// A look at everything that passes a node; see the [module's](self) words on what that is.
+/// A look at everything that passes a node: what comes from a link, what goes to one, and what goes
+/// from one of the node's components to another, before the endpoint makes anything of it.
 ///
 /// Dropping it ends it.
 pub struct Tap(Arc<Queue>);

@@ -1,9 +1,9 @@
 //! The operator's station: a component that watches a vehicle, takes it under control, drives it and
 //! stops it, and the page through which people do that in a browser.
 //!
-//! [`Station`] is the ready component. Its [desk](desk) speaks JAUS, its [server](server) speaks
-//! HTTP and WebSocket to the pages; between them go wishes one way and snapshots the other. Manual
-//! drive goes through the [`Stick`](stick::Stick), which lets go of itself when nobody pushes it.
+//! [`Station`] is the ready component. Its desk speaks JAUS, its server speaks HTTP and WebSocket to
+//! the pages; between them go wishes one way and snapshots the other. Manual drive goes through the
+//! [`Stick`](stick::Stick), which lets go of itself when nobody pushes it.
 
 mod answer;
 #[expect(

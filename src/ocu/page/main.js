@@ -71,8 +71,10 @@ function obstacle(live) {
   if (!trusted) return "Watching only: enter the token to drive";
   if (!state.vehicle) return "No vehicle";
   if (state.vehicle.emergency) return "Emergency: clear it before driving";
-  if (!state.control?.held) return "Take control before driving";
-  return "";
+  if (!state.control?.wanted) return "Take control before driving";
+  // While control is asked for, as when the operator takes over from the planner, what is held is
+  // sent already and acts as soon as the vehicle agrees.
+  return state.control.held ? "" : state.control.reason;
 }
 
 // What the operator wants.
