@@ -69,10 +69,11 @@ fn two_networks() -> (Node, Port, Port) {
 async fn say_until_heard(from: &Port, payload: &'static [u8], to: &mut Port) {
     let say = async {
         loop {
-            let payload = Bytes::from_static(payload);
-            from.send(Outgoing::new(from.id(), to.id(), payload))
-                .unwrap();
-            if timeout(Duration::from_millis(50), to.recv()).await.is_ok() {
+            let said = Outgoing::new(from.id(), to.id(), Bytes::from_static(payload));
+            from.send(said).unwrap();
+            let heard = timeout(Duration::from_millis(50), to.recv()).await;
+            // Others may have said something before.
+            if heard.is_ok_and(|m| m.is_some_and(|m| m.payload == payload)) {
                 return;
             }
         }

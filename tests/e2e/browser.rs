@@ -5,11 +5,14 @@
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+/// Browsers so far: each has a profile of its own.
+static BROWSERS: AtomicU32 = AtomicU32::new(0);
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(60);
 /// How often a condition is looked at.
@@ -72,8 +75,9 @@ pub(crate) struct Browser {
 impl Browser {
     /// Starts the browser, in a network namespace if one is given.
     pub(crate) fn start(network: Option<&str>) -> Self {
-        let profile =
-            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("chromium-{}", std::process::id()));
+        let number = BROWSERS.fetch_add(1, Ordering::Relaxed);
+        let profile = format!("chromium-{}-{number}", std::process::id());
+        let profile = Path::new(env!("CARGO_TARGET_TMPDIR")).join(profile);
         let mut command = match network {
             Some(network) => {
                 let mut command = Command::new("ip");
@@ -214,9 +218,17 @@ impl Browser {
         self.call("Emulation.setEmulatedMedia", &features);
     }
 
+    /// Opens an address, as soon as something answers there.
     pub(crate) fn open(&mut self, address: &str) {
-        let answer = self.call("Page.navigate", &json!({ "url": address }));
-        assert_eq!(answer["errorText"], Value::Null, "{address}");
+        let deadline = Instant::now() + LIMIT;
+        loop {
+            let answer = self.call("Page.navigate", &json!({ "url": address }));
+            match answer["errorText"].as_str() {
+                None => break,
+                Some(why) if Instant::now() > deadline => panic!("{address}: {why}"),
+                Some(_) => std::thread::sleep(PERIOD),
+            }
+        }
         self.wait("document.readyState === 'complete'");
     }
 

@@ -20,8 +20,6 @@ mod networks;
 mod steps;
 mod system;
 
-use std::time::Duration;
-
 use browser::{Browser, SCREENS};
 use networks::{on_hosts, say_skipped};
 use steps::{emergency, look_from_all_screens, take_control};
@@ -68,7 +66,8 @@ fn run(system: &System) {
     system.start_all();
     let mut page = Browser::start(Some(system.operator()));
     page.look_on(SCREENS[0]);
-    open(&mut page);
+    page.open(PAGE);
+    comes_alive(&mut page);
     look_from_all_screens(&mut page, "1-start");
 
     take_control(&mut page);
@@ -85,25 +84,16 @@ fn run(system: &System) {
         system.kill(program);
         page.screenshot(&format!("5-without-{program}"));
         system.start(program);
+        comes_alive(&mut page);
     }
-    open(&mut page);
     arrive(&mut page);
     look_from_all_screens(&mut page, "6-arrived");
     assert!(page.complaints().is_empty(), "{:?}", page.complaints());
 }
 
-/// Opens the page and waits for a vehicle that is all there.
-fn open(page: &mut Browser) {
-    for attempt in 0.. {
-        page.open(PAGE);
-        if page.holds_within(
-            Duration::from_secs(10),
-            "document.body.dataset.link === 'live'",
-        ) {
-            break;
-        }
-        assert!(attempt < 5, "the page never came to life");
-    }
+/// Waits until the page is connected, by itself, and shows a vehicle that is all there.
+fn comes_alive(page: &mut Browser) {
+    page.wait("document.body.dataset.link === 'live'");
     page.wait("document.querySelectorAll('#parts .part').length >= 4");
     page.wait("document.querySelector('#north').textContent !== '–'");
     page.wait("document.querySelector('#map-empty').hidden");

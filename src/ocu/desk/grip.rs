@@ -17,8 +17,9 @@ use crate::ocu::state;
 #[derive(Default)]
 pub(super) struct Grip {
     wanted: Wanted,
-    /// Whether what is held is to act on commands, also after it was started again.
-    ready: bool,
+    /// Whether what is held is to act on commands, also after it was started again; nothing while
+    /// nobody has said so since this station was started.
+    ready: Option<bool>,
     holds: BTreeMap<JausId, Hold>,
     /// Who asked for control and waits for the answers of the parts.
     waiting: Vec<Reply>,
@@ -72,8 +73,13 @@ impl Grip {
         self.wanted
     }
 
-    pub(super) const fn is_ready(&self) -> bool {
-        self.ready
+    pub(super) fn is_ready(&self) -> bool {
+        self.ready == Some(true)
+    }
+
+    /// What this operator left ready when the station ended is to stay so.
+    pub(super) fn go_on_ready(&mut self) {
+        self.ready.get_or_insert(true);
     }
 
     /// The control over a part, if it is held.
@@ -134,13 +140,13 @@ impl Grip {
 
     /// Everything is to be given back.
     pub(super) fn release(&mut self, picture: &Picture) -> Vec<Arc<Control>> {
-        self.ready = false;
+        self.ready = Some(false);
         self.want(Wanted::Nothing, picture)
     }
 
     /// Whether what is held is to act on commands; it is being told so.
     pub(super) fn set_ready(&mut self, now: Instant, ready: bool) {
-        self.ready = ready;
+        self.ready = Some(ready);
         for hold in self.holds.values_mut() {
             if let Hold::Held { resumed, .. } = hold {
                 *resumed = now;
@@ -156,6 +162,7 @@ impl Grip {
         result: Result<Control, ControlError>,
         hands: &mut Hands,
     ) {
+        let is_ready = self.is_ready();
         // Otherwise it is not wanted any more, and given back by dropping it.
         let Some(hold @ Hold::Asking) = self.holds.get_mut(&part) else {
             return;
@@ -163,7 +170,7 @@ impl Grip {
         match result {
             Ok(control) => {
                 let control = Arc::new(control);
-                if self.ready {
+                if is_ready {
                     resume(&control, hands);
                 }
                 tracing::info!("in control of {part}");
@@ -182,13 +189,14 @@ impl Grip {
     pub(super) fn handle_time(&mut self, now: Instant, picture: &Picture, hands: &mut Hands) {
         drop(self.let_go(picture));
         let own = hands.component().id();
+        let is_ready = self.is_ready();
         let wanted = self.wanted_parts(picture);
         for (id, part) in wanted {
             match self.holds.get_mut(&id) {
                 Some(Hold::Asking) => {}
                 Some(hold @ Hold::Held { .. }) => {
                     look_after(now, own, part, hold);
-                    if self.ready {
+                    if is_ready {
                         keep_ready(now, part, hold, hands);
                     }
                 }
