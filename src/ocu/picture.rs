@@ -282,6 +282,7 @@ impl Picture {
         state::Part {
             id: id.to_string(),
             role: part.role.name(),
+            managed: part.managed,
             state: part.status.map(|told| state_name(told.what)),
             controller: controller.map(|(id, _)| id.to_string()),
             authority: controller.map(|(_, authority)| authority),

@@ -118,6 +118,8 @@ pub struct Part {
     pub id: String,
     /// What it does in the vehicle, for example `primitive_driver`.
     pub role: &'static str,
+    /// Whether it can be managed: a sensor or a store has no state, and nobody controls it.
+    pub managed: bool,
     /// Its state in Management, for example `ready`.
     pub state: Option<&'static str>,
     /// Who controls it.

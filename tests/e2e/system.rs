@@ -32,7 +32,11 @@ const PROGRAMS: [(&str, Host, &[&str]); 9] = [
     ("jaus-communicator", Host::Communicator, &[]),
     ("jaus-primitive-driver", Host::BoardA, &[]),
     ("jaus-velocity-state-sensor", Host::BoardA, &[]),
-    ("jaus-local-pose-sensor", Host::BoardA, &[]),
+    (
+        "jaus-local-pose-sensor",
+        Host::BoardA,
+        &["--state", "pose.toml"],
+    ),
     ("jaus-vector-knowledge-store", Host::BoardB, &["--demo-map"]),
     ("jaus-local-vector-driver", Host::BoardB, &[]),
     ("jaus-local-path-segment-driver", Host::BoardB, &[]),

@@ -118,13 +118,16 @@ function showParts(parts) {
       area.append(row);
     }
     const [, name, mode, detail] = row.children;
-    mark(row, "data-state", plain(part?.state ?? "unknown", 20));
-    mark(row, "data-old", (number(part?.age_ms) ?? 0) > 3_000 ? "yes" : null);
+    // A sensor or a store has no state, and is controlled by nobody: that it is there is what counts.
+    const managed = part?.managed === true;
+    mark(row, "data-state", managed ? plain(part.state ?? "unknown", 20) : "present");
+    mark(row, "data-old", managed && (number(part.age_ms) ?? 0) > 3_000 ? "yes" : null);
     say(name, words(part?.role ?? part?.id));
-    say(mode, words(part?.state ?? "unknown"));
+    say(mode, managed ? words(part.state ?? "unknown") : "");
     const stage = part?.stage?.state ? ` · ${words(part.stage.state).toLowerCase()}` : "";
     const reason = plain(part?.stage?.reason, 160);
-    say(detail, `${key} · ${authority(part ?? {})}${stage}${reason ? `: ${reason}` : ""}`);
+    const control = managed ? ` · ${authority(part)}` : "";
+    say(detail, `${key}${control}${stage}${reason ? `: ${reason}` : ""}`);
   }
   for (const gone of old.values()) gone.remove();
 }
