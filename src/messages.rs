@@ -1,45 +1,53 @@
 //! The messages of the service sets, generated from their definitions.
 //!
-//! One module per set. The types inside a message are in a module of the message's name, for
-//! example `core::report_services::NodeSeq`.
+//! One module per set, each but the core set behind the feature of its name. The types inside a
+//! message are in a module of the message's name, for example `core::report_services::NodeSeq`.
 
 use crate::codec::{MessageInfo, Registry, ServiceInfo};
 
-/// The core set (AS5710): what every component speaks.
-#[allow(missing_docs, reason = "what the definitions do not describe")]
-pub mod core {
-    include!(concat!(env!("OUT_DIR"), "/core.rs"));
+/// The modules of the sets, and the tables of those that are switched on.
+macro_rules! sets {
+    ($($(#[$doc:meta])* $set:ident $(if $feature:literal)?;)*) => {
+        $(
+            $(#[$doc])*
+            $(#[cfg(feature = $feature)])?
+            #[allow(missing_docs, reason = "what the definitions do not describe")]
+            pub mod $set {
+                include!(concat!(env!("OUT_DIR"), "/", stringify!($set), ".rs"));
+            }
+        )*
+
+        static MESSAGES: &[&[MessageInfo]] = &[
+            $($(#[cfg(feature = $feature)])? $set::MESSAGES,)*
+        ];
+
+        static SERVICES: &[&[ServiceInfo]] = &[
+            $($(#[cfg(feature = $feature)])? $set::SERVICES,)*
+        ];
+    };
 }
 
-/// The mobility set (AS6009): sensing and commanding how a platform moves.
-#[cfg(feature = "mobility")]
-#[allow(missing_docs, reason = "what the definitions do not describe")]
-pub mod mobility {
-    include!(concat!(env!("OUT_DIR"), "/mobility.rs"));
+sets! {
+    /// The core set (AS5710): what every component speaks.
+    core;
+    /// The mobility set (AS6009): sensing and commanding how a platform moves.
+    mobility if "mobility";
+    /// The environment sensing set (AS6060): cameras, microphones, range and force sensors.
+    environment_sensing if "environment-sensing";
+    /// The manipulator set (AS6057): arms, pan-tilts and what they hold.
+    manipulator if "manipulator";
+    /// The unmanned ground vehicle set (AS6091): drive train, lights, power, stabilisers.
+    ugv if "ugv";
+    /// The human-machine interface set (AS6040): pointing devices, keys, drawing.
+    hmi if "hmi";
+    /// The mission spooling set (AS6062): missions that are kept and worked off.
+    mission_spooler if "mission-spooler";
+    /// The interoperability profiles' set: cost maps, handoff, platform mode and state, CBRN
+    /// sensors.
+    iop if "iop";
+    /// Our own set for a ground vehicle: world model, mission, stages, odometry.
+    ground if "ground";
 }
-
-/// Our own set for a ground vehicle: world model, mission, stages, odometry.
-#[cfg(feature = "ground")]
-#[allow(missing_docs, reason = "what the definitions do not describe")]
-pub mod ground {
-    include!(concat!(env!("OUT_DIR"), "/ground.rs"));
-}
-
-static MESSAGES: &[&[MessageInfo]] = &[
-    core::MESSAGES,
-    #[cfg(feature = "mobility")]
-    mobility::MESSAGES,
-    #[cfg(feature = "ground")]
-    ground::MESSAGES,
-];
-
-static SERVICES: &[&[ServiceInfo]] = &[
-    core::SERVICES,
-    #[cfg(feature = "mobility")]
-    mobility::SERVICES,
-    #[cfg(feature = "ground")]
-    ground::SERVICES,
-];
 
 /// All messages of the service sets that are switched on.
 pub const fn registry() -> Registry {

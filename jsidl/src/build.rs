@@ -32,7 +32,8 @@ use crate::{Diagnostic, Loader, Severity, rust};
 pub struct Build {
     loader: Loader,
     runtime: String,
-    modules: Vec<(String, String)>,
+    /// Names, each with the beginnings of URNs.
+    modules: Vec<(String, Vec<String>)>,
     paths: Vec<PathBuf>,
     out_dir: Option<PathBuf>,
 }
@@ -68,10 +69,13 @@ impl Build {
     }
 
     /// Generates `<name>.rs`, with the services whose URN begins with `urn`, for example
-    /// `urn:jaus:jss:core:`.
+    /// `urn:jaus:jss:core:`. Said again with the same name, it adds to that module.
     #[must_use]
     pub fn module(mut self, name: &str, urn: &str) -> Self {
-        self.modules.push((name.to_owned(), urn.to_owned()));
+        match self.modules.iter_mut().find(|(known, _)| known == name) {
+            Some((_, urns)) => urns.push(urn.to_owned()),
+            None => self.modules.push((name.to_owned(), vec![urn.to_owned()])),
+        }
         self
     }
 
@@ -120,9 +124,10 @@ impl Build {
     /// definitions. A module without services has empty tables.
     pub fn generate(self) -> (Vec<(String, String)>, crate::Diagnostics) {
         let loaded = self.loader.load();
-        let module = |(name, urn): &(String, String)| {
+        let module = |(name, urns): &(String, Vec<String>)| {
             let services = loaded.library.services().map(AsRef::<Service>::as_ref);
-            let chosen = services.filter(|service| service.id.urn.starts_with(urn));
+            let chosen =
+                services.filter(|it| urns.iter().any(|urn| it.id.urn.starts_with(urn.as_str())));
             (format!("{name}.rs"), rust::module(chosen, &self.runtime))
         };
         let files = self.modules.iter().map(module).collect();
