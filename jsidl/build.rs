@@ -1,12 +1,18 @@
 //! Embeds every definition under `services`, so that adding a file needs no code.
 //!
 //! Writes `catalogue.rs` to `OUT_DIR`: a table of the files by set (the first directory), each with
-//! what its root element declares and its text.
+//! what its root element declares and its text, which is packed: the texts of all sets would be a
+//! good part of a small program.
 
 use std::error::Error;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
+
+use miniz_oxide::deflate::compress_to_vec;
+
+/// The level of compression that takes the longest and gives the least.
+const BEST: u8 = 10;
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
@@ -15,14 +21,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut files = Vec::new();
     definitions(&services, &mut files)?;
     files.sort();
+    let out = PathBuf::from(env::var("OUT_DIR")?);
     let mut table = String::from("[\n");
-    for file in files {
-        entry(&services, &file, &mut table)
+    for (number, file) in files.iter().enumerate() {
+        let packed = out.join(format!("{number}.deflate"));
+        entry(&services, file, &packed, &mut table)
             .map_err(|error| format!("{}: {error}", file.display()))?;
     }
     table.push(']');
-    let out = Path::new(&env::var("OUT_DIR")?).join("catalogue.rs");
-    fs::write(out, table)?;
+    fs::write(out.join("catalogue.rs"), table)?;
     Ok(())
 }
 
@@ -38,8 +45,14 @@ fn definitions(directory: &Path, files: &mut Vec<PathBuf>) -> Result<(), Box<dyn
     Ok(())
 }
 
-fn entry(services: &Path, file: &Path, table: &mut String) -> Result<(), Box<dyn Error>> {
+fn entry(
+    services: &Path,
+    file: &Path,
+    packed: &Path,
+    table: &mut String,
+) -> Result<(), Box<dyn Error>> {
     let text = fs::read_to_string(file)?;
+    fs::write(packed, compress_to_vec(text.as_bytes(), BEST))?;
     let document = roxmltree::Document::parse(&text)?;
     let root = document.root_element();
     let attribute = |name| {
@@ -57,12 +70,12 @@ fn entry(services: &Path, file: &Path, table: &mut String) -> Result<(), Box<dyn
     };
     writeln!(
         table,
-        "Entry {{ set: {set:?}, path: {:?}, element: {:?}, urn: {:?}, version: {:?}, text: include_str!({:?}) }},",
+        "Entry {{ set: {set:?}, path: {:?}, element: {:?}, urn: {:?}, version: {:?}, packed: include_bytes!({:?}) }},",
         parts.join("/"),
         root.tag_name().name(),
         attribute("id")?,
         attribute("version")?,
-        file,
+        packed,
     )?;
     Ok(())
 }

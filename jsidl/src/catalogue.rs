@@ -19,8 +19,24 @@ pub struct Entry {
     pub urn: &'static str,
     /// The version that the file declares, for example `1.1`.
     pub version: &'static str,
+    /// The XML text, packed as raw deflate.
+    packed: &'static [u8],
+}
+
+impl Entry {
     /// The XML text.
-    pub text: &'static str,
+    #[must_use]
+    pub fn text(&self) -> String {
+        let text = miniz_oxide::inflate::decompress_to_vec(self.packed).ok();
+        #[expect(
+            clippy::expect_used,
+            reason = "the build script packed a text, and a test reads all"
+        )]
+        let text = text
+            .and_then(|octets| String::from_utf8(octets).ok())
+            .expect("the catalogue is whole");
+        text
+    }
 }
 
 static ENTRIES: &[Entry] = &include!(concat!(env!("OUT_DIR"), "/catalogue.rs"));

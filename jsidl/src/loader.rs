@@ -78,7 +78,7 @@ impl Loader {
         if self.with_catalogue {
             for entry in catalogue::entries() {
                 let name = Path::new("catalogue").join(entry.path);
-                self.add(&name, entry.text, Strictness::Named);
+                self.add(&name, &entry.text(), Strictness::Named);
             }
         }
         let library = resolve(&self.program, &self.sources, &mut self.report);
