@@ -8,6 +8,7 @@
 
 mod support;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -283,11 +284,8 @@ fn check(message: &Message, row: &Json) {
     }
 }
 
-#[test]
-fn every_golden_message_is_read_shown_and_written_as_it_is() {
-    let Some(shared) = support::shared() else {
-        return;
-    };
+/// The files of golden messages.
+fn golden_files(shared: &Path) -> Vec<PathBuf> {
     let mut files: Vec<_> = fs::read_dir(shared.join("golden"))
         .unwrap()
         .map(|entry| entry.unwrap().path())
@@ -304,8 +302,16 @@ fn every_golden_message_is_read_shown_and_written_as_it_is() {
         })
         .collect();
     files.sort();
+    files
+}
+
+#[test]
+fn every_golden_message_is_read_shown_and_written_as_it_is() {
+    let Some(shared) = support::shared() else {
+        return;
+    };
     let mut total = 0;
-    for file in files {
+    for file in golden_files(&shared) {
         let source = file.file_stem().unwrap().to_str().unwrap();
         let library = load(&shared, source);
         let rows = lines(&file);
@@ -317,4 +323,36 @@ fn every_golden_message_is_read_shown_and_written_as_it_is() {
     }
     println!("{total} vectors in all");
     assert!(total > 2000, "the golden data have 2116 vectors");
+}
+
+/// Messages that are laid out otherwise in our definitions than in those the vectors were made
+/// from; `services.rs` says why.
+const LAID_OUT_OTHERWISE: &[(&str, &str)] = &[
+    ("fkie-mobility", "ReportLocalVector"),
+    ("fkie-mobility", "SetLocalVector"),
+    ("jts-mobility", "ReportGlobalVector"),
+    ("jts-mobility", "SetGlobalVector"),
+];
+
+#[test]
+fn our_own_definitions_read_show_and_write_the_golden_messages_of_their_services() {
+    let Some(shared) = support::shared() else {
+        return;
+    };
+    let mut loader = jsidl::Loader::new();
+    loader.catalogue();
+    let ours = loader.load().library;
+    let mut vectors = BTreeMap::<String, usize>::new();
+    for row in golden_files(&shared).iter().flat_map(|file| lines(file)) {
+        let id = id_of(&row);
+        let other = |&(source, message): &(&str, &str)| {
+            row["source"] == source && row["message"] == message
+        };
+        if ours.service(&id).is_some() && !LAID_OUT_OTHERWISE.iter().any(other) {
+            check(message_of(&ours, &row), &row);
+            *vectors.entry(id.to_string()).or_default() += 1;
+        }
+    }
+    println!("{vectors:#?}");
+    assert!(vectors.values().sum::<usize>() > 500);
 }
