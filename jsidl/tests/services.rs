@@ -280,7 +280,6 @@ fn is_left_out(id: &str) -> bool {
 /// Sets that are not written yet.
 const NOT_YET: &[&str] = &[
     "urn:jaus:jss:HMI:",
-    "urn:jaus:jss:environmentSensing:",
     "urn:jaus:jss:exp:",
     "urn:jaus:jss:iop:",
     "urn:jaus:jss:missionSpooler:",
@@ -419,6 +418,7 @@ fn layout(item: &Item) -> String {
             });
             choices.collect::<Vec<_>>().join(" ")
         }
+        Shape::Array(array) => format!("{:?}[{}]", array.dimensions, layout(&array.element)),
         shape => format!("{shape:?}"),
     };
     format!("{}{optional}={shape}", item.name)
