@@ -1,7 +1,9 @@
 //! The library's tracing on standard error, as much of it as is asked for.
 
 use clap::Args;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
 
 use super::Failure;
 use super::output::colours_wanted;
@@ -32,19 +34,19 @@ impl Logging {
             2 => "debug",
             _ => "trace",
         };
-        let filter = match std::env::var(LOG) {
-            Ok(filter) => EnvFilter::try_new(&filter)
-                .map_err(|error| Failure::new(format!("{LOG}={filter}: {error}")))?,
-            Err(_) => EnvFilter::new(level),
-        };
-        tracing_subscriber::fmt()
-            .with_env_filter(filter)
+        // Modules and levels are enough: filters of fields would bring an engine for regular
+        // expressions into every small program.
+        let wanted = std::env::var(LOG).unwrap_or_else(|_| level.to_owned());
+        let filter: Targets = wanted
+            .parse()
+            .map_err(|error| Failure::new(format!("{LOG}={wanted}: {error}")))?;
+        let told = tracing_subscriber::fmt::layer()
             .with_writer(std::io::stderr)
             .with_ansi(colours_wanted(&std::io::stderr()))
             .with_target(self.verbose > 1)
             // It would complain on standard error that standard error is closed, and panic.
-            .log_internal_errors(false)
-            .init();
+            .log_internal_errors(false);
+        tracing_subscriber::registry().with(filter).with(told).init();
         Ok(())
     }
 }

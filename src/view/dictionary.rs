@@ -1,6 +1,7 @@
 //! Which definition a message is read and written by: the generated types, and definitions loaded
 //! at run time.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
@@ -106,9 +107,18 @@ impl Dictionary {
         }
     }
 
+    /// Everything that comes with this crate: also the sets whose features are off, read by their
+    /// definitions at run time. It costs some milliseconds and a few MiB.
+    pub fn complete() -> Self {
+        let mut dictionary = Self::new();
+        dictionary.load::<&Path>([]);
+        dictionary
+    }
+
     /// Adds the definitions in files and directories, which may refer to one another and to the
-    /// definitions that come with this crate. A service with the URN and version of one that is
-    /// already here takes its place. What has a mistake is left out and named in the diagnostics.
+    /// definitions that come with this crate; those are added too, after all others. A service with
+    /// the URN and version of one that is already here takes its place. What has a mistake is left
+    /// out and named in the diagnostics.
     pub fn load<P: AsRef<Path>>(&mut self, paths: impl IntoIterator<Item = P>) -> Added {
         let mut loader = Loader::new();
         for path in paths {
@@ -119,13 +129,31 @@ impl Dictionary {
             library,
             diagnostics,
         } = loader.load();
-        let services: Vec<_> = library.services().filter(|s| !is_built_in(s)).collect();
-        for service in &services {
+        let (mut ours, theirs): (Vec<_>, Vec<_>) =
+            library.services().partition(|it| comes_with_us(it));
+        for service in &theirs {
             self.add(service);
         }
+        ours.retain(|service| !self.knows(&service.id));
+        ours.sort_by_key(|service| Reverse(service.id.version));
+        for service in &ours {
+            self.add_last(service);
+        }
         Added {
-            messages: services.iter().flat_map(|s| s.messages()).count(),
+            messages: theirs.iter().flat_map(|s| s.messages()).count(),
             diagnostics,
+        }
+    }
+
+    fn knows(&self, service: &Id) -> bool {
+        let mut services = self.by_code.values().flatten().flat_map(|d| &d.services);
+        services.any(|known| known == service)
+    }
+
+    fn add_last(&mut self, service: &Service) {
+        for message in service.messages() {
+            let known = self.by_code.entry(message.code).or_default();
+            known.push(Definition::dynamic(&service.id, message));
         }
     }
 
@@ -349,9 +377,45 @@ impl<'d> Reading<'d> {
     }
 }
 
-/// Whether a service is one of those that come with the crate, of which the generated types are
-/// made.
-fn is_built_in(service: &Service) -> bool {
+/// Whether a service is one of those that come with the crate.
+fn comes_with_us(service: &Service) -> bool {
     jsidl::catalogue::find(&service.id)
         .is_some_and(|entry| *service.location.file == *Path::new("catalogue").join(entry.path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_message_that_comes_with_the_crate_is_known_whatever_the_features() {
+        let mut loader = Loader::new();
+        loader.catalogue();
+        let dictionary = Dictionary::complete();
+        let services: Vec<_> = loader.load().library.services().cloned().collect();
+        assert!(services.len() > 130);
+        for service in services {
+            for message in service.messages() {
+                let known = dictionary.by_code[&message.code].iter();
+                let mut known = known.filter(|it| it.name() == message.name);
+                assert!(
+                    known.any(|it| it.services.contains(&service.id)),
+                    "{:04X} {} of {}",
+                    message.code,
+                    message.name,
+                    service.id
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_generated_is_tried_before_what_is_read_by_its_definition() {
+        let plain = Dictionary::new();
+        let complete = Dictionary::complete();
+        for (code, known) in &plain.by_code {
+            let first = &complete.by_code[code][0];
+            assert_eq!(first.services, known[0].services, "{code:04X}");
+        }
+    }
 }

@@ -26,7 +26,7 @@ pub(crate) struct Definitions {
 impl Definitions {
     /// The built-in definitions and those of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
-        let mut dictionary = Dictionary::new();
+        let mut dictionary = Dictionary::complete();
         self.add(&mut dictionary)?;
         for service in &self.service {
             service

@@ -113,7 +113,7 @@ impl Watch {
         let outcome = if self.files.is_empty() {
             live::watch(&self.at, &filter, self.seconds, &mut printer)?
         } else {
-            let dictionary = Dictionary::new();
+            let dictionary = Dictionary::complete();
             files::watch(&self.files, &filter, &dictionary, &mut printer)?
         };
         if let Form::Tally(tally) = &printer.form {
