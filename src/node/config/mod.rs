@@ -215,7 +215,8 @@ impl Config {
         self
     }
 
-    /// Uses no UDP at all, but the TCP connections and serial lines that are configured.
+    /// Uses no UDP at all, but the TCP connections, the serial lines and the address for components
+    /// of this host that are configured.
     #[must_use]
     pub fn without_udp(self) -> Self {
         self.interfaces::<String>([])
@@ -313,7 +314,8 @@ impl Config {
 
     /// Whether UDP is wanted: an empty list of interfaces turns it off, if there is another way.
     pub(super) fn uses_udp(&self) -> bool {
-        self.interfaces != Interfaces::Only(Vec::new()) || !self.has_streams()
+        let another_way = self.has_streams() || matches!(self.local, Local::At(_));
+        self.interfaces != Interfaces::Only(Vec::new()) || !another_way
     }
 
     pub(super) fn udp(&self) -> udp::Settings {
@@ -472,6 +474,8 @@ mod toml_tests {
         let tcp = read("tcp = { connect = [\"10.0.0.7\"] }");
         let serial = read("[[serial]]\ndevice = \"/dev/ttyUSB0\"");
         assert!(!tcp.uses_udp() && !serial.uses_udp() && read("").uses_udp());
+        let local = Config::loopback(1, 1).local(Address::Default);
+        assert!(local.uses_udp() && !local.without_udp().uses_udp());
         assert_eq!((tcp.validate(), serial.validate()), (Ok(()), Ok(())));
         let closed = read("tcp = { listen = \"0.0.0.0\", max_accepted = 0 }").validate();
         assert_eq!(closed, Err(ConfigError::MaxAccepted));
