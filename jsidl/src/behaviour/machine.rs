@@ -17,6 +17,13 @@ use crate::model::Service;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StateIndex(usize);
 
+impl StateIndex {
+    /// Its place among the [states](Machine::states) of the machine, from 0.
+    pub const fn number(self) -> usize {
+        self.0
+    }
+}
+
 /// A state machine, merged along `inherits_from`.
 #[derive(Debug, Clone)]
 pub struct Machine<'a> {
@@ -93,6 +100,14 @@ impl<'s> Stimulus<'s> {
         Self {
             event,
             message: None,
+        }
+    }
+
+    /// What a transition waits for.
+    pub fn of(transition: &'s Transition) -> Self {
+        Self {
+            event: transition.trigger.event.last(),
+            message: transition.trigger.message(),
         }
     }
 

@@ -3,8 +3,9 @@
 //! [`Service::behaviour`](crate::model::Service::behaviour) holds the [`StateMachine`]s as they
 //! are written. A service that inherits from another writes down only what it adds to the
 //! machines of that one; [`Machine`] puts the parts together and says which transitions a state
-//! has for a message.
+//! has for a message. [`dot`] and [`mermaid`] draw it.
 
+mod draw;
 mod guard;
 mod machine;
 
@@ -13,6 +14,7 @@ use std::fmt;
 use crate::model::Location;
 use crate::source::Span;
 
+pub use draw::{dot, mermaid};
 pub use guard::{Argument, Call, Comparison, Guard};
 pub use machine::{Declared, Machine, MachineState, StateIndex, Stimulus};
 
