@@ -1,11 +1,17 @@
-//! Drawings of state machines.
+//! Merged state machines: how they are drawn, how they run, and that those of the published
+//! definitions are whole.
 #![allow(
     clippy::expect_used,
     reason = "a broken test setup should stop the test"
 )]
 
-use jsidl::behaviour::{dot, mermaid};
-use jsidl::{Library, Loader};
+mod support;
+
+use jsidl::behaviour::{
+    Machine, Name, Outcome, Run, Stimulus, Transition, TransitionKind, dot, mermaid,
+};
+use jsidl::model::Service;
+use jsidl::{Library, Loaded, Loader};
 
 const LAMP: &str = r#"<service_def xmlns="urn:jaus:jsidl:1.1" name="Lamp" id="urn:lamp" version="1.0">
 <message_set><input_set/><output_set/></message_set>
@@ -14,7 +20,8 @@ const LAMP: &str = r#"<service_def xmlns="urn:jaus:jsidl:1.1" name="Lamp" id="ur
 <state_machine name="FSM"><state name="Up" initial_state="Dark">
 <state name="Dark"><entry><action name="cool"/></entry>
 <transition name="Receive"><parameter type="Switch" value="msg"/><guard condition="own.may( msg ) &amp;&amp; !late('x')"/><simple><end_state state="Up.Lit"/></simple><action name="own.Send"><argument value="'Gone'"/><argument value="msg"/></action></transition></state>
-<state name="Lit"><transition name="Receive"><parameter type="Back" value="msg"/><pop/></transition>
+<state name="Lit"><entry><action name="warm"/></entry><exit><action name="fade"/></exit><transition name="Receive"><parameter type="Back" value="msg"/><pop/></transition>
+<transition name="Receive"><parameter type="Flash" value="msg"/><simple/><action name="click"/></transition>
 <transition name="Tick"><internal/><action name="glow"/></transition></state>
 <default_state><transition name="Receive"><parameter type="Test" value="msg"/><push><end_state state="Up.Lit"/></push></transition></default_state>
 </state></state_machine></protocol_behavior></service_def>"#;
@@ -43,10 +50,13 @@ fn a_machine_is_drawn_with_all_that_it_does() {
         s1 --> s2 : Test, to come back
         s2 --> s2 : Test, to come back
         s1 --> s2 : Switch [may() && !late('x')] / Send('Gone')
+        s2 --> s2 : Flash / click()
         note right of s1
             entry / cool()
         end note
         note right of s2
+            entry / warm()
+            exit / fade()
             Back, then back
             Tick / glow()
         end note
@@ -63,12 +73,124 @@ fn a_machine_is_drawn_with_all_that_it_does() {
         subgraph cluster_s0 {
             label="Up\n";
             s1 [label="Dark\nentry / cool()\l"];
-            s2 [label="Lit\nBack, then back\lTick / glow()\l"];
+            s2 [label="Lit\nentry / warm()\lexit / fade()\lBack, then back\lTick / glow()\l"];
         }
         start -> s1;
         s1 -> s2 [label="Test, to come back"];
         s2 -> s2 [label="Test, to come back"];
         s1 -> s2 [label="Switch [may() && !late('x')] / Send('Gone')"];
+        s2 -> s2 [label="Flash / click()"];
     }
     "#);
+}
+
+#[test]
+fn a_state_that_is_left_or_entered_does_so_around_the_transition() {
+    let library = library(LAMP);
+    let service = library.services().next().expect("sound");
+    let machine = &library.machines(service)[0];
+    let mut done = Vec::new();
+    let mut run = Run::start(machine, &mut |action| done.push(action.name.to_string()));
+    let mut step = |message: &str, holds: bool| {
+        let outcome = run.step(Stimulus::received(message), &mut |_| holds, &mut |action| {
+            done.push(action.name.last().to_owned());
+        });
+        let state = machine.state(run.state()).path.last().to_owned();
+        (outcome, state, std::mem::take(&mut done).join(" "))
+    };
+    let expect = |outcome, state: &str, done: &str| (outcome, state.to_owned(), done.to_owned());
+    // `!late('x')` is false where everything holds.
+    assert_eq!(
+        step("Switch", true),
+        expect(Outcome::Rejected, "Dark", "cool")
+    );
+    assert_eq!(step("Back", true), expect(Outcome::Ignored, "Dark", ""));
+    assert_eq!(step("Test", true), expect(Outcome::Handled, "Lit", "warm"));
+    assert_eq!(
+        step("Back", true),
+        expect(Outcome::Handled, "Dark", "fade cool")
+    );
+    assert_eq!(step("Test", true), expect(Outcome::Handled, "Lit", "warm"));
+    assert_eq!(
+        step("Flash", true),
+        expect(Outcome::Handled, "Lit", "fade click warm")
+    );
+}
+
+/// The ends of a machine's transitions that are written down.
+fn ends<'a>(machine: &Machine<'a>) -> Vec<(&'a Transition, &'a Name)> {
+    let states = machine.states().map(|(_, state)| state);
+    let transitions =
+        states.flat_map(|state| state.transitions.iter().chain(&state.default_transitions));
+    let end = |transition: &'a Transition| match &transition.kind {
+        TransitionKind::To(end) | TransitionKind::Push(end) => Some((transition, end)),
+        _ => None,
+    };
+    transitions
+        .filter_map(|declared| end(declared.item))
+        .collect()
+}
+
+/// What does not lead where it should, as `service: what`.
+fn broken(library: &Library, service: &Service) -> Vec<String> {
+    let mut broken = Vec::new();
+    for machine in library.machines(service) {
+        let parts = library.lineage(service).flat_map(|base| &base.behaviour);
+        let own = |part: &&jsidl::behaviour::StateMachine| {
+            part.name.last().eq_ignore_ascii_case(machine.name().last())
+        };
+        let start = parts.filter(own).map(|part| &part.start).next();
+        let start = start.expect("a machine has a start");
+        match machine.find(start) {
+            Some(index) => assert_eq!(machine.leaf(index), machine.start(), "{}", service.id),
+            None => broken.push(format!("{}: start {start}", service.id)),
+        }
+        for (transition, end) in ends(&machine) {
+            match machine.find(end) {
+                Some(index) => {
+                    let target = machine.target(machine.start(), transition);
+                    assert_eq!(target, Some(machine.leaf(index)), "{}", service.id);
+                }
+                None => broken.push(format!("{}: {end}", service.id)),
+            }
+        }
+        for (index, state) in machine.states() {
+            assert_eq!(machine.find(&state.path), Some(index));
+            assert_eq!(state.initial.is_none(), state.children.is_empty());
+        }
+    }
+    broken
+}
+
+/// Collections, how many of their services have a machine, and what leads nowhere.
+const PUBLISHED: [(&str, usize, &[&str]); 3] =
+    [("jts", 97, &[]), ("ffi", 76, &[]), ("fkie", 129, &[])];
+
+/// Everything that a collection says about machines fits together; what does not is warned of.
+#[test]
+fn every_published_machine_starts_and_leads_to_states_that_exist() {
+    let Some(shared) = support::shared() else {
+        return;
+    };
+    for (source, services, unsound) in PUBLISHED {
+        let mut loader = Loader::new();
+        loader.path(shared.join("jsidl-corpus").join(source));
+        let Loaded {
+            library,
+            diagnostics,
+        } = loader.load();
+        let with = library.services();
+        let with: Vec<_> = with
+            .filter(|service| !library.machines(service).is_empty())
+            .collect();
+        let found: Vec<_> = with.iter().flat_map(|it| broken(&library, it)).collect();
+        for finding in &found {
+            let (_, what) = finding.rsplit_once(' ').expect("two words");
+            let mut warnings = diagnostics.warnings();
+            let warned = warnings.any(|d| d.message.contains(&format!("`{what}`")));
+            assert!(warned, "{finding}");
+        }
+        assert_eq!((source, with.len()), (source, services));
+        assert_eq!(found, unsound, "{source}");
+    }
 }

@@ -190,6 +190,44 @@ impl<'a> Machine<'a> {
         own
     }
 
+    /// What is done when a change from one state to another leaves the first, which holds no
+    /// others: the exit actions from there outwards, up to what both are in. A state that is left
+    /// for itself is left and entered alone.
+    ///
+    /// # Panics
+    /// As [`state`](Self::state).
+    pub fn leaving(&self, from: StateIndex, to: StateIndex) -> impl Iterator<Item = &'a Action> {
+        let left = self.alone(from, Some(to));
+        let actions = left.into_iter().flat_map(|index| &self.state(index).exit);
+        actions.map(|declared| declared.item)
+    }
+
+    /// What is done when such a change enters the other state: the entry actions of the states
+    /// around it that are new, then its own. From nowhere, all are new.
+    ///
+    /// # Panics
+    /// As [`state`](Self::state).
+    pub fn entering(
+        &self,
+        from: Option<StateIndex>,
+        to: StateIndex,
+    ) -> impl Iterator<Item = &'a Action> {
+        let entered = self.alone(to, from).into_iter().rev();
+        let actions = entered.flat_map(|index| &self.state(index).entry);
+        actions.map(|declared| declared.item)
+    }
+
+    /// A state and those around it that are not around the other, from inside outwards.
+    fn alone(&self, one: StateIndex, other: Option<StateIndex>) -> Vec<StateIndex> {
+        let around = |index: StateIndex| {
+            let parent = self.state(index).parent;
+            std::iter::successors(parent, |index| self.state(*index).parent)
+        };
+        let shared: Vec<_> = other.into_iter().flat_map(around).collect();
+        let alone = around(one).take_while(|index| !shared.contains(index));
+        std::iter::once(one).chain(alone).collect()
+    }
+
     /// The transition that a state takes on a stimulus, when `ask` answers the questions of the
     /// guards; see [`Guard::holds`]. `None` if nothing happens.
     ///

@@ -3,11 +3,12 @@
 //! [`Service::behaviour`](crate::model::Service::behaviour) holds the [`StateMachine`]s as they
 //! are written. A service that inherits from another writes down only what it adds to the
 //! machines of that one; [`Machine`] puts the parts together and says which transitions a state
-//! has for a message. [`dot`] and [`mermaid`] draw it.
+//! has for a message. [`Run`] lets it run, [`dot`] and [`mermaid`] draw it.
 
 mod draw;
 mod guard;
 mod machine;
+mod run;
 
 use std::fmt;
 
@@ -17,6 +18,7 @@ use crate::source::Span;
 pub use draw::{dot, mermaid};
 pub use guard::{Argument, Call, Comparison, Guard};
 pub use machine::{Declared, Machine, MachineState, StateIndex, Stimulus};
+pub use run::{MOST_REMEMBERED, Outcome, Run};
 
 /// Longer names are refused: findings repeat them.
 const LONGEST: usize = 500;
