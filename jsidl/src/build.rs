@@ -128,7 +128,8 @@ impl Build {
             let services = loaded.library.services().map(AsRef::<Service>::as_ref);
             let chosen =
                 services.filter(|it| urns.iter().any(|urn| it.id.urn.starts_with(urn.as_str())));
-            (format!("{name}.rs"), rust::module(chosen, &self.runtime))
+            let text = rust::module(&loaded.library, chosen, &self.runtime);
+            (format!("{name}.rs"), text)
         };
         let files = self.modules.iter().map(module).collect();
         (files, loaded.diagnostics)

@@ -22,6 +22,7 @@ mod enumeration;
 mod error;
 mod exact;
 mod fixed;
+pub mod machine;
 mod message;
 mod reader;
 mod registry;

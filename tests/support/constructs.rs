@@ -21,5 +21,5 @@ macro_rules! constructs {
 }
 
 constructs!(
-    arrays, bits, composites, measures, names, numbers, octets, sections, versions
+    arrays, bits, composites, machines, measures, names, numbers, octets, sections, versions
 );

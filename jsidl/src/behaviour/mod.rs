@@ -172,7 +172,7 @@ pub struct Parameter {
 
 impl Parameter {
     /// The record of the event `Receive` in which the transport describes the message.
-    fn is_envelope(&self) -> bool {
+    pub(crate) fn is_envelope(&self) -> bool {
         self.kind.ends_with(".ReceiveRec")
     }
 }

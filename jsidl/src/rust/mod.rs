@@ -3,7 +3,8 @@
 //! The text comes out indented and documented, to be included from a build script's `OUT_DIR`;
 //! [`build`](crate::build) does all of that. Messages are flat in the module; the types inside a
 //! message are in a module of its name. A message that several services or versions declare with
-//! one layout is one type; an older layout stands in a module of its version, such as `v1_0`.
+//! one layout is one type; an older layout stands in a module of its version, such as `v1_0`. The
+//! state machine of a service is in the service's module.
 
 mod choices;
 mod decode;
@@ -11,6 +12,7 @@ mod docs;
 mod encode;
 mod fingerprint;
 mod ident;
+mod machine;
 mod messages;
 mod newtypes;
 mod random;
@@ -23,15 +25,21 @@ mod writer;
 use std::collections::{BTreeMap, HashMap};
 
 use self::ident::{Names, version_module};
+use self::machine::Messages;
 use self::messages::Plan;
 use self::writer::Writer;
+use crate::library::Library;
 use crate::model::{Id, Message, Service, Version};
 
-/// The Rust module of a set of services.
+/// The Rust module of a set of services, which may inherit from other services of the library.
 ///
 /// `runtime` is the path of the codec runtime as the generated module sees it, for example
 /// `::jaus::codec`.
-pub fn module<'m>(services: impl IntoIterator<Item = &'m Service>, runtime: &str) -> String {
+pub fn module<'m>(
+    library: &'m Library,
+    services: impl IntoIterator<Item = &'m Service>,
+    runtime: &str,
+) -> String {
     let mut services: Vec<_> = services.into_iter().collect();
     services.sort_by_key(|service| &service.id);
     let mut out = Writer::default();
@@ -42,8 +50,13 @@ pub fn module<'m>(services: impl IntoIterator<Item = &'m Service>, runtime: &str
     };
     out.push(format!("use {runtime}{rename};"));
     let mut names = Names::reserving(&["codec"]);
-    let paths = registry::services(&mut out, &services, &mut names);
+    let versions = registry::versions(&services, &mut names);
     let plans = plan(&services, &mut names);
+    let messages = Messages {
+        library,
+        plans: &plans,
+    };
+    let paths = registry::services(&mut out, &versions, messages);
     registry::tables(&mut out, &services, &paths, &plans);
     write(&mut out, &plans);
     out.finish()

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::docs;
 use super::ident::{Names, version_module};
+use super::machine::{self, Messages};
 use super::messages::Plan;
 use super::writer::Writer;
 use crate::model::{Id, Message, Service};
@@ -11,21 +12,36 @@ use crate::model::{Id, Message, Service};
 /// The constants of services: identity to path from the root of the set.
 pub(super) type ServicePaths<'m> = BTreeMap<&'m Id, String>;
 
-/// Writes a module of constants for every service, all versions in one.
-pub(super) fn services<'m>(
-    out: &mut Writer,
-    services: &[&'m Service],
-    names: &mut Names,
-) -> ServicePaths<'m> {
+/// The versions of one service, the newest first, and the name of their module.
+pub(super) struct Versions<'m> {
+    pub(super) services: Vec<&'m Service>,
+    module: String,
+}
+
+/// Which modules of services there are to be.
+pub(super) fn versions<'m>(services: &[&'m Service], names: &mut Names) -> Vec<Versions<'m>> {
     let mut by_urn: BTreeMap<&str, Vec<&Service>> = BTreeMap::new();
     for &service in services {
         by_urn.entry(&service.id.urn).or_default().push(service);
     }
+    let named = by_urn.into_values().map(|mut services| {
+        services.sort_by_key(|service| std::cmp::Reverse(service.id.version));
+        let module = names.snake(&services[0].name);
+        Versions { services, module }
+    });
+    named.collect()
+}
+
+/// Writes a module for every service, all versions in one: constants and state machines.
+pub(super) fn services<'m>(
+    out: &mut Writer,
+    all: &[Versions<'m>],
+    messages: Messages<'_>,
+) -> ServicePaths<'m> {
     let mut paths = ServicePaths::new();
-    for (urn, mut versions) in by_urn {
-        versions.sort_by_key(|service| std::cmp::Reverse(service.id.version));
-        let newest = versions[0];
-        let module = names.snake(&newest.name);
+    for Versions { services, module } in all {
+        let newest = services[0];
+        let urn = &*newest.id.urn;
         out.gap();
         out.doc([
             format!("The service `{}`.", newest.name).as_str(),
@@ -36,7 +52,7 @@ pub(super) fn services<'m>(
         out.push(format!(
             "/// What the service is called, whatever its version.\npub const URN: &str = {urn:?};"
         ));
-        for service in &versions {
+        for service in services {
             let version = service.id.version;
             let constant = version_module(version).to_uppercase();
             out.gap();
@@ -53,8 +69,10 @@ pub(super) fn services<'m>(
         out.gap();
         let constant = version_module(newest.id.version).to_uppercase();
         out.push(format!(
-            "/// The newest version.\npub const LATEST: codec::ServiceId = {constant};\n}}"
+            "/// The newest version.\npub const LATEST: codec::ServiceId = {constant};"
         ));
+        machine::machines(out, messages, services);
+        out.push("}");
     }
     paths
 }

@@ -1,0 +1,509 @@
+//! State machines: the merged machine of a service as an enumeration of states, one of events, a
+//! trait for its actions and guards, and functions that take one step.
+//!
+//! A machine is written for each service that says something about it itself, in the module of the
+//! service: its only machine in a module `machine`, several in modules of their names, and those of
+//! older versions in modules of the version around them.
+
+mod steps;
+mod vocabulary;
+
+use std::collections::HashMap;
+
+use self::steps::Steps;
+use self::vocabulary::{Event, Kind, Method, Vocabulary};
+use super::docs;
+use super::ident::{Names, version_module};
+use super::messages::Plan;
+use super::writer::Writer;
+use crate::behaviour::{MOST_REMEMBERED, Machine, Name, StateIndex, TransitionKind};
+use crate::library::Library;
+use crate::model::{Message, Service};
+
+/// Where the types of messages are found.
+#[derive(Clone, Copy)]
+pub(super) struct Messages<'m> {
+    pub(super) library: &'m Library,
+    pub(super) plans: &'m [Plan<'m>],
+}
+
+impl Messages<'_> {
+    /// The type of a message that a service takes part in, as seen from the root of the set; `None`
+    /// for what another set declares.
+    fn path(&self, service: &Service, name: &str) -> Option<String> {
+        let clients = self.library.lineage(service).flat_map(|it| &it.client_of);
+        let servers = clients.filter_map(|server| self.library.service(&server.id));
+        let servers = servers.flat_map(|server| self.library.vocabulary(server));
+        let mut all = self.library.vocabulary(service).chain(servers);
+        let (declaring, message) = all.find(|(_, it)| it.name.eq_ignore_ascii_case(name))?;
+        self.declared(declaring, message)
+    }
+
+    fn declared(&self, service: &Service, message: &Message) -> Option<String> {
+        let same = |plan: &&Plan<'_>| {
+            plan.message.code == message.code
+                && plan.message.name == message.name
+                && plan.services.contains(&&service.id)
+        };
+        self.plans.iter().find(same).map(Plan::path)
+    }
+}
+
+/// Writes the machines of all versions of a service, the newest first.
+pub(super) fn machines(out: &mut Writer, messages: Messages<'_>, versions: &[&Service]) {
+    let with = versions.iter().filter(|it| !it.behaviour.is_empty());
+    for (age, service) in with.enumerate() {
+        let version = (age > 0).then(|| version_module(service.id.version));
+        if let Some(version) = &version {
+            out.gap();
+            out.push(format!("/// Machines of version {}.", service.id.version));
+            out.push(format!("pub mod {version} {{\nuse super::codec;"));
+        }
+        let root = if age > 0 {
+            "super::super::super"
+        } else {
+            "super::super"
+        };
+        of_service(out, messages, service, root);
+        if version.is_some() {
+            out.push("}");
+        }
+    }
+}
+
+fn of_service(out: &mut Writer, messages: Messages<'_>, service: &Service, root: &str) {
+    let machines = messages.library.machines(service);
+    let mut modules = Names::reserving(&["codec"]);
+    for machine in &machines {
+        let name = match machines.as_slice() {
+            [_] => "machine",
+            _ => machine.name().last(),
+        };
+        let module = modules.snake(name);
+        Emitter::new(machine, service, messages, root).write(out, &module);
+    }
+}
+
+/// The states that hold no others, and what they are called.
+struct States {
+    leaves: Vec<StateIndex>,
+    idents: HashMap<StateIndex, String>,
+}
+
+impl States {
+    fn of(machine: &Machine<'_>) -> Self {
+        let leaf = machine
+            .states()
+            .filter(|(_, state)| state.children.is_empty());
+        let leaves: Vec<_> = leaf.map(|(index, _)| index).collect();
+        let paths: Vec<_> = leaves
+            .iter()
+            .map(|leaf| &machine.state(*leaf).path)
+            .collect();
+        let shared = shared_names(&paths);
+        let mut names = Names::default();
+        let named = leaves.iter().zip(paths);
+        let idents = named.map(|(&leaf, path)| {
+            let own = path.parts().get(shared..).unwrap_or_default();
+            (leaf, names.camel(&own.join("_")))
+        });
+        let idents = idents.collect();
+        Self { leaves, idents }
+    }
+
+    fn leaves(&self) -> &[StateIndex] {
+        &self.leaves
+    }
+
+    fn ident(&self, leaf: StateIndex) -> &str {
+        self.idents.get(&leaf).map_or("", String::as_str)
+    }
+}
+
+/// How many names all paths begin with; the last one of each stays.
+fn shared_names(paths: &[&Name]) -> usize {
+    let Some((first, rest)) = paths.split_first() else {
+        return 0;
+    };
+    let most = paths.iter().map(|path| path.parts().len() - 1).min();
+    let same = |position: &usize| {
+        let part = first.parts().get(*position);
+        rest.iter().all(|path| path.parts().get(*position) == part)
+    };
+    (0..most.unwrap_or(0)).take_while(same).count()
+}
+
+/// Writes one machine.
+struct Emitter<'a> {
+    machine: &'a Machine<'a>,
+    service: &'a Service,
+    messages: Messages<'a>,
+    root: &'a str,
+    states: States,
+    vocabulary: Vocabulary,
+    remembers: bool,
+}
+
+impl<'a> Emitter<'a> {
+    fn new(
+        machine: &'a Machine<'a>,
+        service: &'a Service,
+        messages: Messages<'a>,
+        root: &'a str,
+    ) -> Self {
+        let mut types = Names::reserving(&[
+            "codec",
+            "State",
+            "Event",
+            "Behaviour",
+            "Machine",
+            "Outcome",
+            "Memory",
+        ]);
+        let mut transitions = machine
+            .states()
+            .flat_map(|(_, state)| state.transitions.iter().chain(&state.default_transitions));
+        let remembers = transitions.any(|declared| {
+            let kind = &declared.item.kind;
+            matches!(kind, TransitionKind::Push(_) | TransitionKind::Pop)
+        });
+        Self {
+            machine,
+            service,
+            messages,
+            root,
+            states: States::of(machine),
+            vocabulary: Vocabulary::of(machine, &mut types),
+            remembers,
+        }
+    }
+
+    fn write(&self, out: &mut Writer, module: &str) {
+        out.gap();
+        out.doc([format!(
+            "The state machine `{}` of version {}, with what it inherits.",
+            self.machine.name(),
+            self.service.id.version
+        )
+        .as_str()]);
+        out.push("#[allow(unused_variables, unreachable_patterns)]");
+        out.push("#[allow(clippy::if_same_then_else, clippy::nonminimal_bool)]");
+        out.push(format!("pub mod {module} {{"));
+        let memory = if self.remembers {
+            "{Memory, Outcome}"
+        } else {
+            "Outcome"
+        };
+        out.push(format!("use super::codec::machine::{memory};"));
+        self.state(out);
+        self.event(out);
+        self.behaviour(out);
+        self.struct_(out);
+        self.functions(out);
+        out.push("}");
+    }
+
+    fn state(&self, out: &mut Writer) {
+        out.gap();
+        out.push("/// The states, which hold no others.");
+        out.push("#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]\npub enum State {");
+        for &leaf in self.states.leaves() {
+            let path = &self.machine.state(leaf).path;
+            out.push(format!("/// `{path}`\n{},", self.states.ident(leaf)));
+        }
+        out.push("}");
+        out.gap();
+        let leaves = self.states.leaves().iter();
+        let idents = leaves.map(|&leaf| format!("Self::{}", self.states.ident(leaf)));
+        let idents: Vec<_> = idents.collect();
+        out.push(format!(
+            "impl State {{\n/// All states.\npub const ALL: [Self; {}] = [{}];",
+            idents.len(),
+            idents.join(", ")
+        ));
+        out.gap();
+        out.push("/// The names of the states around it and its own, from outside inwards.");
+        out.push("#[must_use]\npub const fn path(self) -> &'static [&'static str] {\nmatch self {");
+        for &leaf in self.states.leaves() {
+            let path = self.machine.state(leaf).path.parts();
+            out.push(format!("Self::{} => &{path:?},", self.states.ident(leaf)));
+        }
+        out.push("}\n}");
+        out.gap();
+        out.push("/// Whether it is the state with this path, or lies in it.");
+        out.push("#[must_use]\npub fn is_in(self, path: &[&str]) -> bool {");
+        out.push("self.path().starts_with(path)\n}\n}");
+    }
+
+    fn event(&self, out: &mut Writer) {
+        let events = &self.vocabulary.events;
+        out.gap();
+        out.push("/// What happens to the machine.");
+        out.push("#[derive(Debug)]");
+        out.push(format!(
+            "pub enum Event{} {{",
+            self.event_generics("'a", "E")
+        ));
+        for event in events {
+            out.push(format!("/// {}", self.event_doc(event)));
+            let mut parts = Vec::new();
+            parts.extend(
+                event
+                    .message
+                    .as_deref()
+                    .map(|it| self.message_type(it, "'a ")),
+            );
+            parts.extend(event.envelope.then(|| "&'a E".to_owned()));
+            parts.extend((0..event.numbers).map(|_| "i64".to_owned()));
+            if parts.is_empty() {
+                out.push(format!("{},", event.ident));
+            } else {
+                out.push(format!("{}({}),", event.ident, parts.join(", ")));
+            }
+        }
+        out.push("}");
+    }
+
+    fn event_doc(&self, event: &Event) -> String {
+        let Some(message) = &event.message else {
+            return format!("`{}`.", event.name);
+        };
+        let what = match self.messages.path(self.service, message) {
+            Some(_) => format!("`{message}`"),
+            None => format!("`{message}`, whose type is in another set: its octets"),
+        };
+        let envelope = if event.envelope {
+            ", and what the transport knows of it"
+        } else {
+            ""
+        };
+        match event.name.as_str() {
+            "Receive" => format!("The message {what}{envelope}."),
+            name => format!("`{name}`: {what}{envelope}."),
+        }
+    }
+
+    /// A reference to a message, or to its octets if its type is in another set.
+    fn message_type(&self, message: &str, lifetime: &str) -> String {
+        match self.messages.path(self.service, message) {
+            Some(path) => format!("&{lifetime}{}::{path}", self.root),
+            None => format!("&{lifetime}[u8]"),
+        }
+    }
+
+    /// The parameters of `Event`: a lifetime if it has references, and the envelope's type.
+    fn event_generics(&self, lifetime: &str, envelope: &str) -> String {
+        let borrows = |event: &Event| event.message.is_some() || event.envelope;
+        let mut generics = Vec::new();
+        if self.vocabulary.events.iter().any(borrows) {
+            generics.push(lifetime);
+        }
+        if self.vocabulary.has_envelope() {
+            generics.push(envelope);
+        }
+        if generics.is_empty() {
+            String::new()
+        } else {
+            format!("<{}>", generics.join(", "))
+        }
+    }
+
+    fn behaviour(&self, out: &mut Writer) {
+        let methods = &self.vocabulary.methods;
+        for method in methods.iter().filter(|it| !it.message_type.is_empty()) {
+            self.message_enum(out, method);
+        }
+        out.gap();
+        out.push(
+            "/// What the machine asks and does: a question for each condition of a guard, and",
+        );
+        out.push("/// a method for each action. Questions change nothing.");
+        out.push("pub trait Behaviour {");
+        if self.vocabulary.has_envelope() {
+            out.push("/// What the transport knows of a message, such as its sender.");
+            out.push("type Envelope;");
+        }
+        for asks in [true, false] {
+            for method in methods.iter().filter(|it| it.asks() == asks) {
+                out.gap();
+                self.method(out, method);
+            }
+        }
+        out.push("}");
+    }
+
+    fn message_enum(&self, out: &mut Writer, method: &Method) {
+        let given = method
+            .parameters()
+            .find(|(_, given)| given.events.len() > 1);
+        let Some((_, given)) = given else {
+            return;
+        };
+        out.gap();
+        out.push(format!("/// The messages that `{}` is for.", method.name));
+        out.push("#[derive(Debug, Clone, Copy)]");
+        out.push(format!("pub enum {}<'a> {{", method.message_type));
+        for &event in &given.events {
+            let event = &self.vocabulary.events[event];
+            let message = event.message.as_deref().unwrap_or_default();
+            let ty = self.message_type(message, "'a ");
+            out.push(format!("/// `{message}`\n{}({ty}),", event.ident));
+        }
+        out.push("}");
+    }
+
+    fn method(&self, out: &mut Writer, method: &Method) {
+        let receiver = if method.asks() { "&self" } else { "&mut self" };
+        let mut parameters = vec![receiver.to_owned()];
+        let mut names = Names::default();
+        let mut texts = Vec::new();
+        for (kind, given) in method.parameters() {
+            let (name, ty) = match kind {
+                Kind::Message => ("message", self.parameter_type(method, &given.events)),
+                Kind::Envelope => ("envelope", "&Self::Envelope".to_owned()),
+                Kind::Number => ("number", "i64".to_owned()),
+                Kind::Text => ("text", "&'static str".to_owned()),
+            };
+            let name = names.snake(name);
+            if kind == Kind::Text {
+                let known: Vec<_> = given.texts.iter().map(|text| format!("{text:?}")).collect();
+                texts.push(format!(
+                    "`{name}` is one of {}.",
+                    docs::prose(&known.join(", "))
+                ));
+            }
+            parameters.push(format!("{name}: {ty}"));
+        }
+        let first = format!("`{}`.", method.name);
+        out.doc([first.as_str(), &texts.join(" ")]);
+        let answer = if method.asks() { " -> bool" } else { "" };
+        out.push(format!(
+            "fn {}({}){answer};",
+            method.ident,
+            parameters.join(", ")
+        ));
+    }
+
+    fn parameter_type(
+        &self,
+        method: &Method,
+        events: &std::collections::BTreeSet<usize>,
+    ) -> String {
+        if events.len() > 1 {
+            return format!("{}<'_>", method.message_type);
+        }
+        let event = events
+            .first()
+            .and_then(|&it| self.vocabulary.events.get(it));
+        let message = event.and_then(|event| event.message.as_deref());
+        self.message_type(message.unwrap_or_default(), "")
+    }
+
+    fn struct_(&self, out: &mut Writer) {
+        out.gap();
+        out.push("/// The machine: a state, and what it goes back to. It does nothing by itself.");
+        out.push("#[derive(Debug, Clone, PartialEq, Eq)]\npub struct Machine {\nstate: State,");
+        if self.remembers {
+            out.push(format!("remembered: Memory<State, {MOST_REMEMBERED}>,"));
+        }
+        out.push("}");
+    }
+
+    fn functions(&self, out: &mut Writer) {
+        let steps = Steps {
+            machine: self.machine,
+            states: &self.states,
+            vocabulary: &self.vocabulary,
+        };
+        let start = self.machine.start();
+        let entering = steps.actions(None, self.machine.entering(None, start));
+        let unused = if entering.is_empty() { "_" } else { "" };
+        let remembered = if self.remembers {
+            "remembered: Memory::new(),\n"
+        } else {
+            ""
+        };
+        out.gap();
+        out.push("impl Machine {");
+        out.push("/// Enters the state in which the machine begins.");
+        out.push(format!(
+            "pub fn start<B: Behaviour + ?Sized>({unused}behaviour: &mut B) -> Self {{\n{entering}\
+             Self::at(State::{})\n}}",
+            self.states.ident(start)
+        ));
+        out.gap();
+        out.push("/// A machine in some state, which is entered without any action.");
+        out.push(format!(
+            "#[must_use]\npub const fn at(state: State) -> Self {{\nSelf {{\nstate,\n{remembered}}}\n}}"
+        ));
+        out.gap();
+        out.push("/// The state that it is in.");
+        out.push("#[must_use]\npub const fn state(&self) -> State {\nself.state\n}");
+        self.step(out);
+        for event in &self.vocabulary.events {
+            steps.handler(out, event, &self.handler_signature(event));
+        }
+        out.push("}");
+    }
+
+    fn step(&self, out: &mut Writer) {
+        let generics = self.event_generics("'_", "B::Envelope");
+        let unused = if self.vocabulary.events.is_empty() {
+            "_"
+        } else {
+            ""
+        };
+        out.gap();
+        out.push("/// Takes the first transition whose guard holds, and does what it and the states that");
+        out.push("/// are left and entered ask for.");
+        out.push(format!(
+            "pub fn step<B: Behaviour + ?Sized>(&mut self, event: Event{generics}, {unused}behaviour: &mut B) -> Outcome {{"
+        ));
+        out.push("match event {");
+        for event in &self.vocabulary.events {
+            let names = parameters(event);
+            let pattern = if names.is_empty() {
+                String::new()
+            } else {
+                format!("({})", names.join(", "))
+            };
+            let arguments: Vec<_> = names
+                .iter()
+                .map(String::as_str)
+                .chain(["behaviour"])
+                .collect();
+            out.push(format!(
+                "Event::{}{pattern} => self.{}({}),",
+                event.ident,
+                event.handler,
+                arguments.join(", ")
+            ));
+        }
+        out.push("}\n}");
+    }
+
+    fn handler_signature(&self, event: &Event) -> String {
+        let mut parameters = Vec::new();
+        if let Some(message) = &event.message {
+            parameters.push(format!("message: {}", self.message_type(message, "")));
+        }
+        if event.envelope {
+            parameters.push("envelope: &B::Envelope".to_owned());
+        }
+        parameters.extend((0..event.numbers).map(|number| format!("number_{number}: i64")));
+        parameters.push("behaviour: &mut B".to_owned());
+        format!(
+            "fn {}<B: Behaviour + ?Sized>(&mut self, {}) -> Outcome {{",
+            event.handler,
+            parameters.join(", ")
+        )
+    }
+}
+
+/// What an event brings, by name.
+fn parameters(event: &Event) -> Vec<String> {
+    let message = event.message.iter().map(|_| "message".to_owned());
+    let envelope = event.envelope.then(|| "envelope".to_owned());
+    let numbers = (0..event.numbers).map(|number| format!("number_{number}"));
+    message.chain(envelope).chain(numbers).collect()
+}

@@ -1,0 +1,229 @@
+//! The functions of a generated machine: what each state does with each event.
+
+use super::super::writer::Writer;
+use super::States;
+use super::vocabulary::{Event, Kind, Method, Value, Vocabulary};
+use crate::behaviour::{
+    Action, Declared, Guard, Machine, StateIndex, Stimulus, Transition, TransitionKind, Trigger,
+};
+
+/// What the functions are made from.
+pub(super) struct Steps<'a> {
+    pub(super) machine: &'a Machine<'a>,
+    pub(super) states: &'a States,
+    pub(super) vocabulary: &'a Vocabulary,
+}
+
+/// States that do the same, and what they do.
+type Group = (Vec<StateIndex>, String);
+
+impl Steps<'_> {
+    /// The function that handles an event.
+    pub(super) fn handler(&self, out: &mut Writer, event: &Event, signature: &str) {
+        out.gap();
+        out.push(signature);
+        let mut groups: Vec<Group> = Vec::new();
+        for &leaf in self.states.leaves() {
+            let body = self.body(event, leaf);
+            match groups.iter_mut().find(|(_, known)| *known == body) {
+                Some((states, _)) => states.push(leaf),
+                None => groups.push((vec![leaf], body)),
+            }
+        }
+        if let [(_, body)] = groups.as_slice() {
+            out.push(body);
+        } else {
+            // What most states do, which is nothing as a rule, stands last.
+            groups.sort_by_key(|(states, _)| states.len());
+            out.push("match self.state {");
+            let last = groups.len() - 1;
+            for (number, (states, body)) in groups.iter().enumerate() {
+                let pattern = if number == last {
+                    "_".to_owned()
+                } else {
+                    self.pattern(states)
+                };
+                if body.contains('\n') {
+                    out.push(format!("{pattern} => {{\n{body}\n}}"));
+                } else {
+                    out.push(format!("{pattern} => {body},"));
+                }
+            }
+            out.push("}");
+        }
+        out.push("}");
+    }
+
+    fn pattern(&self, states: &[StateIndex]) -> String {
+        let states = states.iter().map(|&state| self.state(state));
+        states.collect::<Vec<_>>().join(" | ")
+    }
+
+    fn state(&self, state: StateIndex) -> String {
+        format!("State::{}", self.states.ident(state))
+    }
+
+    /// What a state does with an event, as an expression of type `Outcome`.
+    fn body(&self, event: &Event, leaf: StateIndex) -> String {
+        let stimulus = Stimulus {
+            event: &event.name,
+            message: event.message.as_deref(),
+        };
+        let candidates = self.machine.candidates(leaf, stimulus);
+        if candidates.is_empty() {
+            return "Outcome::Ignored".into();
+        }
+        let mut text = String::new();
+        for Declared { item, .. } in candidates {
+            let Some(effect) = self.effect(leaf, item) else {
+                // It leads to a state that does not exist, and is never taken.
+                continue;
+            };
+            let Some(condition) = self.condition(item) else {
+                let alone = text.is_empty();
+                let last = format!("{effect}Outcome::Handled");
+                text.push_str(&if alone {
+                    last
+                } else {
+                    format!("{{\n{last}\n}}")
+                });
+                return text;
+            };
+            text.push_str(&format!(
+                "if {condition} {{\n{effect}Outcome::Handled\n}} else "
+            ));
+        }
+        if text.is_empty() {
+            return "Outcome::Rejected".into();
+        }
+        text + "{\nOutcome::Rejected\n}"
+    }
+
+    /// When a transition can be taken; `None` for always.
+    fn condition(&self, transition: &Transition) -> Option<String> {
+        let room = match transition.kind {
+            TransitionKind::Push(_) => Some("self.remembered.has_room()"),
+            TransitionKind::Pop => Some("self.remembered.is_used()"),
+            _ => None,
+        };
+        let trigger = &transition.trigger;
+        match (&transition.guard, room) {
+            (None, room) => room.map(str::to_owned),
+            (Some(guard), None) => Some(self.guard(trigger, guard, 0)),
+            (Some(guard), Some(room)) => {
+                Some(format!("{} && {room}", self.guard(trigger, guard, 1)))
+            }
+        }
+    }
+
+    /// A guard as a condition of Rust; in parentheses if it binds less than `least`.
+    fn guard(&self, trigger: &Trigger, guard: &Guard, least: u8) -> String {
+        let (rank, text) = match guard {
+            Guard::Or(left, right) => (
+                0,
+                [left, right]
+                    .map(|it| self.guard(trigger, it, 0))
+                    .join(" || "),
+            ),
+            Guard::And(left, right) => (
+                1,
+                [left, right]
+                    .map(|it| self.guard(trigger, it, 1))
+                    .join(" && "),
+            ),
+            Guard::Not(inner) => (2, format!("!{}", self.guard(trigger, inner, 2))),
+            question => {
+                let asked = self.vocabulary.question(trigger, question);
+                let call = asked.map(|(method, values)| self.call(Some(trigger), method, &values));
+                (3, call.unwrap_or_else(|| "false".into()))
+            }
+        };
+        if rank < least {
+            format!("({text})")
+        } else {
+            text
+        }
+    }
+
+    /// What is done when a transition is taken; `None` if it cannot be.
+    fn effect(&self, leaf: StateIndex, transition: &Transition) -> Option<String> {
+        let trigger = Some(&transition.trigger);
+        let own = self.actions(trigger, transition.actions.iter());
+        let text = match transition.kind {
+            TransitionKind::Internal => own,
+            TransitionKind::Pop => self.back(leaf, &own),
+            TransitionKind::To(_) | TransitionKind::Again | TransitionKind::Push(_) => {
+                let to = self.machine.target(leaf, transition)?;
+                let leaving = self.actions(None, self.machine.leaving(leaf, to));
+                let entering = self.actions(None, self.machine.entering(Some(leaf), to));
+                let remember = match transition.kind {
+                    TransitionKind::Push(_) => "self.remembered.push(self.state);\n",
+                    _ => "",
+                };
+                let state = self.state(to);
+                let stays = to == leaf && remember.is_empty();
+                let change = if stays {
+                    String::new()
+                } else {
+                    format!("self.state = {state};\n")
+                };
+                format!("{remember}{leaving}{own}{entering}{change}")
+            }
+        };
+        Some(text)
+    }
+
+    /// Goes back to the state that was remembered last, whichever that is.
+    fn back(&self, leaf: StateIndex, own: &str) -> String {
+        let leaving = self.by_destination(|to| self.actions(None, self.machine.leaving(leaf, to)));
+        let entering =
+            self.by_destination(|to| self.actions(None, self.machine.entering(Some(leaf), to)));
+        format!(
+            "if let Some(to) = self.remembered.pop() {{\n{leaving}{own}{entering}self.state = to;\n}}\n"
+        )
+    }
+
+    fn by_destination(&self, actions: impl Fn(StateIndex) -> String) -> String {
+        let mut text = String::new();
+        for &to in self.states.leaves() {
+            let done = actions(to);
+            if !done.is_empty() {
+                text.push_str(&format!("{} => {{\n{done}}}\n", self.state(to)));
+            }
+        }
+        if text.is_empty() {
+            return text;
+        }
+        format!("match to {{\n{text}_ => {{}}\n}}\n")
+    }
+
+    /// Calls, a line each.
+    pub(super) fn actions<'i>(
+        &self,
+        trigger: Option<&Trigger>,
+        actions: impl Iterator<Item = &'i Action>,
+    ) -> String {
+        let calls = actions.filter_map(|action| {
+            let (method, values) = self.vocabulary.action(trigger, action)?;
+            Some(format!("{};\n", self.call(trigger, method, &values)))
+        });
+        calls.collect()
+    }
+
+    fn call(&self, trigger: Option<&Trigger>, method: &Method, values: &[Value]) -> String {
+        let event = trigger.and_then(|trigger| self.vocabulary.event_of(trigger));
+        let places = method.parameters().zip(values);
+        let arguments = places.map(|((kind, given), value)| match value {
+            Value::Message if kind == Kind::Message && given.events.len() > 1 => {
+                let event = event.map_or("", |event| &self.vocabulary.events[event].ident);
+                format!("{}::{event}(message)", method.message_type)
+            }
+            Value::Message => "message".to_owned(),
+            Value::Envelope => "envelope".to_owned(),
+            Value::Number(number) => format!("number_{number}"),
+            Value::Text(text) => format!("{text:?}"),
+        });
+        let arguments: Vec<_> = arguments.collect();
+        format!("behaviour.{}({})", method.ident, arguments.join(", "))
+    }
+}

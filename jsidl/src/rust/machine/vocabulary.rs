@@ -1,0 +1,319 @@
+//! What a machine hears, asks and does: its events, and the methods of its trait.
+
+use std::collections::BTreeSet;
+
+use heck::ToSnakeCase;
+
+use super::super::ident::Names;
+use crate::behaviour::{Action, Argument, Guard, Machine, Transition, Trigger};
+
+/// Everything that the generated types of one machine have names for.
+pub(super) struct Vocabulary {
+    pub(super) events: Vec<Event>,
+    pub(super) methods: Vec<Method>,
+}
+
+/// Something that happens to the machine.
+pub(super) struct Event {
+    /// Unqualified, as the definition has it.
+    pub(super) name: String,
+    pub(super) message: Option<String>,
+    /// The alternative of the enumeration.
+    pub(super) ident: String,
+    /// The function that handles it.
+    pub(super) handler: String,
+    /// Whether it brings what the transport knows of the message.
+    pub(super) envelope: bool,
+    /// How many numbers it brings.
+    pub(super) numbers: usize,
+}
+
+/// An action, or a question of a guard.
+pub(super) struct Method {
+    key: Key,
+    pub(super) ident: String,
+    /// As the definition calls it, without qualification.
+    pub(super) name: String,
+    /// By position: the events whose messages it is given, and the texts.
+    pub(super) arguments: Vec<Given>,
+    /// Name of the enumeration of the messages, where they are several.
+    pub(super) message_type: String,
+}
+
+/// What a method is given in one place.
+#[derive(Default)]
+pub(super) struct Given {
+    pub(super) events: BTreeSet<usize>,
+    pub(super) texts: BTreeSet<String>,
+}
+
+/// Methods with the same key are one.
+#[derive(PartialEq, Eq, Clone)]
+struct Key {
+    base: String,
+    asks: bool,
+    kinds: Vec<Kind>,
+}
+
+/// What a parameter of a method is.
+#[derive(PartialEq, Eq, Clone, Copy)]
+pub(super) enum Kind {
+    Message,
+    Envelope,
+    Number,
+    Text,
+}
+
+/// An argument of a call, as the generated code has it.
+pub(super) enum Value {
+    Message,
+    Envelope,
+    /// Which of the numbers of the event.
+    Number(usize),
+    Text(String),
+}
+
+impl Value {
+    const fn kind(&self) -> Kind {
+        match self {
+            Self::Message => Kind::Message,
+            Self::Envelope => Kind::Envelope,
+            Self::Number(_) => Kind::Number,
+            Self::Text(_) => Kind::Text,
+        }
+    }
+}
+
+/// A call of a method: what it is called, and its arguments.
+struct Spoken {
+    key: Key,
+    name: String,
+    values: Vec<Value>,
+}
+
+impl Event {
+    fn is(&self, trigger: &Trigger) -> bool {
+        let same = |own: &str, other: &str| own.eq_ignore_ascii_case(other);
+        let message = match (&self.message, trigger.message()) {
+            (Some(own), Some(other)) => same(own, other),
+            (None, None) => true,
+            _ => false,
+        };
+        message && same(&self.name, trigger.event.last())
+    }
+}
+
+impl Method {
+    pub(super) fn asks(&self) -> bool {
+        self.key.asks
+    }
+
+    /// The kinds of its parameters, and what is given in their places.
+    pub(super) fn parameters(&self) -> impl Iterator<Item = (Kind, &Given)> {
+        self.key.kinds.iter().copied().zip(&self.arguments)
+    }
+}
+
+impl Vocabulary {
+    pub(super) fn of(machine: &Machine<'_>, types: &mut Names) -> Self {
+        let mut collected = Self {
+            events: Vec::new(),
+            methods: Vec::new(),
+        };
+        for (_, state) in machine.states() {
+            for effect in state.entry.iter().chain(&state.exit) {
+                collected.add_action(None, effect.item);
+            }
+            let all = state.transitions.iter().chain(&state.default_transitions);
+            for declared in all {
+                collected.add_transition(declared.item);
+            }
+        }
+        collected.name_all(types);
+        collected
+    }
+
+    pub(super) fn has_envelope(&self) -> bool {
+        self.events.iter().any(|event| event.envelope)
+    }
+
+    pub(super) fn event_of(&self, trigger: &Trigger) -> Option<usize> {
+        self.events.iter().position(|event| event.is(trigger))
+    }
+
+    fn add_transition(&mut self, transition: &Transition) {
+        let trigger = &transition.trigger;
+        let event = self.event_of(trigger).unwrap_or_else(|| {
+            self.events.push(Event {
+                name: trigger.event.last().to_owned(),
+                message: trigger.message().map(str::to_owned),
+                ident: String::new(),
+                handler: String::new(),
+                envelope: false,
+                numbers: 0,
+            });
+            self.events.len() - 1
+        });
+        let numbers = numbers(trigger).count();
+        let known = &mut self.events[event];
+        known.envelope |= trigger.has_envelope();
+        known.numbers = known.numbers.max(numbers);
+        if let Some(guard) = &transition.guard {
+            self.add_guard(event, trigger, guard);
+        }
+        for action in &transition.actions {
+            self.add_action(Some((event, trigger)), action);
+        }
+    }
+
+    fn add_guard(&mut self, event: usize, trigger: &Trigger, guard: &Guard) {
+        match guard {
+            Guard::Not(inner) => self.add_guard(event, trigger, inner),
+            Guard::And(left, right) | Guard::Or(left, right) => {
+                self.add_guard(event, trigger, left);
+                self.add_guard(event, trigger, right);
+            }
+            question => self.add(Some(event), question_of(Some(trigger), question)),
+        }
+    }
+
+    fn add_action(&mut self, event: Option<(usize, &Trigger)>, action: &Action) {
+        let spoken = action_of(event.map(|(_, trigger)| trigger), action);
+        self.add(event.map(|(event, _)| event), spoken);
+    }
+
+    fn add(&mut self, event: Option<usize>, spoken: Spoken) {
+        let known = self.methods.iter().position(|it| it.key == spoken.key);
+        let method = known.unwrap_or_else(|| {
+            self.methods.push(Method {
+                ident: String::new(),
+                name: spoken.name,
+                arguments: spoken.values.iter().map(|_| Given::default()).collect(),
+                message_type: String::new(),
+                key: spoken.key,
+            });
+            self.methods.len() - 1
+        });
+        for (given, value) in self.methods[method].arguments.iter_mut().zip(spoken.values) {
+            match value {
+                Value::Message => given.events.extend(event),
+                Value::Text(text) => _ = given.texts.insert(text),
+                Value::Envelope | Value::Number(_) => {}
+            }
+        }
+    }
+
+    fn name_all(&mut self, types: &mut Names) {
+        let (mut alternatives, mut handlers) = (Names::default(), Names::reserving(&["step"]));
+        for event in &mut self.events {
+            let name = match &event.message {
+                // An event that is named after its message needs no other name.
+                Some(message) if event.name == "Receive" || event.name == *message => {
+                    message.clone()
+                }
+                Some(message) => format!("{} {message}", event.name),
+                None => event.name.clone(),
+            };
+            event.ident = alternatives.camel(&name);
+            event.handler = handlers.snake(&format!("on {name}"));
+        }
+        let mut methods = Names::default();
+        for method in &mut self.methods {
+            method.ident = methods.snake(&method.key.base);
+            let several = method.arguments.iter().any(|given| given.events.len() > 1);
+            if several {
+                method.message_type = types.camel(&format!("{} message", method.ident));
+            }
+        }
+    }
+
+    /// The method that performs an action, and what it is given.
+    pub(super) fn action(
+        &self,
+        trigger: Option<&Trigger>,
+        action: &Action,
+    ) -> Option<(&Method, Vec<Value>)> {
+        self.find(action_of(trigger, action))
+    }
+
+    /// The method that answers a question of a guard, and what it is given.
+    pub(super) fn question(
+        &self,
+        trigger: &Trigger,
+        question: &Guard,
+    ) -> Option<(&Method, Vec<Value>)> {
+        self.find(question_of(Some(trigger), question))
+    }
+
+    fn find(&self, spoken: Spoken) -> Option<(&Method, Vec<Value>)> {
+        let method = self.methods.iter().find(|it| it.key == spoken.key)?;
+        Some((method, spoken.values))
+    }
+}
+
+/// The parameters of a trigger that are neither a message nor what the transport knows of it.
+fn numbers(trigger: &Trigger) -> impl Iterator<Item = &str> {
+    let parameters = trigger.parameters.iter().enumerate();
+    let numbers = parameters.filter(|&(position, parameter)| {
+        let message = position == 0 && trigger.message().is_some();
+        !message && !parameter.is_envelope()
+    });
+    numbers.map(|(_, parameter)| parameter.name.as_str())
+}
+
+/// A message that is sent is part of the method's name: `Send('ReportStatus', …)` is another
+/// action than `Send('RejectControl', …)`.
+fn action_of(trigger: Option<&Trigger>, action: &Action) -> Spoken {
+    let last = action.name.last();
+    let (name, rest) = match (action.sent(), action.arguments.split_first()) {
+        (Some(message), Some((_, rest))) => (format!("{last} {message}"), rest),
+        _ => (last.to_owned(), action.arguments.as_slice()),
+    };
+    spoken(trigger, name, rest, false)
+}
+
+fn question_of(trigger: Option<&Trigger>, question: &Guard) -> Spoken {
+    match question {
+        Guard::Call(call) => spoken(trigger, call.name.last().to_owned(), &call.arguments, true),
+        // A comparison, or a name alone: what it says is its name, and it is given everything.
+        other => {
+            let words = other.to_string();
+            let all = trigger.into_iter().flat_map(|trigger| &trigger.parameters);
+            let all = all.filter_map(|parameter| Argument::parse(&parameter.name).ok());
+            spoken(trigger, words, &all.collect::<Vec<_>>(), true)
+        }
+    }
+}
+
+fn spoken(trigger: Option<&Trigger>, name: String, arguments: &[Argument], asks: bool) -> Spoken {
+    let values: Vec<_> = arguments.iter().map(|it| value(trigger, it)).collect();
+    let key = Key {
+        base: name.to_snake_case(),
+        asks,
+        kinds: values.iter().map(Value::kind).collect(),
+    };
+    Spoken { key, name, values }
+}
+
+/// What is no parameter of the event is a text: nothing else is known of it.
+fn value(trigger: Option<&Trigger>, argument: &Argument) -> Value {
+    let Argument::Variable(name) = argument else {
+        return Value::Text(match argument {
+            Argument::Text(text) | Argument::Integer(text) => text.clone(),
+            Argument::Variable(name) => name.to_string(),
+        });
+    };
+    let name = name.to_string();
+    let known = trigger.and_then(|trigger| {
+        let position = trigger.parameters.iter().position(|it| it.name == name)?;
+        if trigger.parameters[position].is_envelope() {
+            return Some(Value::Envelope);
+        }
+        if position == 0 && trigger.message().is_some() {
+            return Some(Value::Message);
+        }
+        let number = numbers(trigger).position(|number| number == name)?;
+        Some(Value::Number(number))
+    });
+    known.unwrap_or(Value::Text(name))
+}

@@ -1,0 +1,527 @@
+use ::jaus::codec;
+
+/// The service `Door`.
+///
+/// A door that can be locked.
+pub mod door {
+    use super::codec;
+
+    /// What the service is called, whatever its version.
+    pub const URN: &str = "urn:example:Door";
+
+    /// Version 1.0.
+    pub const V1_0: codec::ServiceId = codec::ServiceId {
+        urn: URN,
+        major: 1,
+        minor: 0,
+    };
+
+    /// The newest version.
+    pub const LATEST: codec::ServiceId = V1_0;
+
+    /// The state machine `ReceiveFSM` of version 1.0, with what it inherits.
+    #[allow(unused_variables, unreachable_patterns)]
+    #[allow(clippy::if_same_then_else, clippy::nonminimal_bool)]
+    pub mod machine {
+        use super::codec::machine::{Memory, Outcome};
+
+        /// The states, which hold no others.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum State {
+            /// `Working.Closed`
+            WorkingClosed,
+            /// `Working.Opened`
+            WorkingOpened,
+            /// `Stopped`
+            Stopped,
+        }
+
+        impl State {
+            /// All states.
+            pub const ALL: [Self; 3] = [Self::WorkingClosed, Self::WorkingOpened, Self::Stopped];
+
+            /// The names of the states around it and its own, from outside inwards.
+            #[must_use]
+            pub const fn path(self) -> &'static [&'static str] {
+                match self {
+                    Self::WorkingClosed => &["Working", "Closed"],
+                    Self::WorkingOpened => &["Working", "Opened"],
+                    Self::Stopped => &["Stopped"],
+                }
+            }
+
+            /// Whether it is the state with this path, or lies in it.
+            #[must_use]
+            pub fn is_in(self, path: &[&str]) -> bool {
+                self.path().starts_with(path)
+            }
+        }
+
+        /// What happens to the machine.
+        #[derive(Debug)]
+        pub enum Event<'a, E> {
+            /// The message `Stop`.
+            Stop(&'a super::super::Stop),
+            /// The message `Open`, and what the transport knows of it.
+            Open(&'a super::super::Open, &'a E),
+            /// The message `Unlock`, whose type is in another set: its octets.
+            Unlock(&'a [u8]),
+            /// The message `Close`, and what the transport knows of it.
+            Close(&'a super::super::Close, &'a E),
+            /// `Moved`.
+            Moved(i64),
+            /// `Timedout`.
+            Timedout,
+        }
+
+        /// The messages that `remember` is for.
+        #[derive(Debug, Clone, Copy)]
+        pub enum RememberMessage<'a> {
+            /// `Open`
+            Open(&'a super::super::Open),
+            /// `Close`
+            Close(&'a super::super::Close),
+        }
+
+        /// What the machine asks and does: a question for each condition of a guard, and
+        /// a method for each action. Questions change nothing.
+        pub trait Behaviour {
+            /// What the transport knows of a message, such as its sender.
+            type Envelope;
+
+            /// `isAllowed`.
+            fn is_allowed(&self, message: &super::super::Open) -> bool;
+
+            /// `isLocked`.
+            fn is_locked(&self) -> bool;
+
+            /// `isLate`.
+            ///
+            /// `text` is one of "night".
+            fn is_late(&self, text: &'static str, envelope: &Self::Envelope) -> bool;
+
+            /// `steps == 0`.
+            fn steps_0(&self, number: i64) -> bool;
+
+            /// `lightOn`.
+            fn light_on(&mut self);
+
+            /// `lightOff`.
+            fn light_off(&mut self);
+
+            /// `remember`.
+            fn remember(&mut self, message: RememberMessage<'_>);
+
+            /// `Send ReportDoor`.
+            ///
+            /// `text` is one of "CLOSED", "OPEN".
+            fn send_report_door(&mut self, text: &'static str, envelope: &Self::Envelope);
+
+            /// `unlock`.
+            fn unlock(&mut self, message: &[u8]);
+
+            /// `startMotor`.
+            ///
+            /// `text` is one of "down", "up".
+            fn start_motor(&mut self, text: &'static str);
+
+            /// `count`.
+            fn count(&mut self, number: i64);
+
+            /// `ring`.
+            fn ring(&mut self);
+        }
+
+        /// The machine: a state, and what it goes back to. It does nothing by itself.
+        #[derive(Debug, Clone, PartialEq, Eq)]
+        pub struct Machine {
+            state: State,
+            remembered: Memory<State, 8>,
+        }
+
+        impl Machine {
+            /// Enters the state in which the machine begins.
+            pub fn start<B: Behaviour + ?Sized>(behaviour: &mut B) -> Self {
+                behaviour.light_on();
+                Self::at(State::WorkingClosed)
+            }
+
+            /// A machine in some state, which is entered without any action.
+            #[must_use]
+            pub const fn at(state: State) -> Self {
+                Self {
+                    state,
+                    remembered: Memory::new(),
+                }
+            }
+
+            /// The state that it is in.
+            #[must_use]
+            pub const fn state(&self) -> State {
+                self.state
+            }
+
+            /// Takes the first transition whose guard holds, and does what it and the states that
+            /// are left and entered ask for.
+            pub fn step<B: Behaviour + ?Sized>(&mut self, event: Event<'_, B::Envelope>, behaviour: &mut B) -> Outcome {
+                match event {
+                    Event::Stop(message) => self.on_stop(message, behaviour),
+                    Event::Open(message, envelope) => self.on_open(message, envelope, behaviour),
+                    Event::Unlock(message) => self.on_unlock(message, behaviour),
+                    Event::Close(message, envelope) => self.on_close(message, envelope, behaviour),
+                    Event::Moved(number_0) => self.on_moved(number_0, behaviour),
+                    Event::Timedout => self.on_timedout(behaviour),
+                }
+            }
+
+            fn on_stop<B: Behaviour + ?Sized>(&mut self, message: &super::super::Stop, behaviour: &mut B) -> Outcome {
+                match self.state {
+                    State::WorkingClosed => {
+                        if self.remembered.has_room() {
+                            self.remembered.push(self.state);
+                            behaviour.light_off();
+                            self.state = State::Stopped;
+                            Outcome::Handled
+                        } else {
+                            Outcome::Rejected
+                        }
+                    }
+                    State::WorkingOpened => {
+                        if self.remembered.has_room() {
+                            self.remembered.push(self.state);
+                            behaviour.start_motor("down");
+                            behaviour.light_off();
+                            self.state = State::Stopped;
+                            Outcome::Handled
+                        } else {
+                            Outcome::Rejected
+                        }
+                    }
+                    _ => {
+                        if self.remembered.is_used() {
+                            if let Some(to) = self.remembered.pop() {
+                                behaviour.ring();
+                                match to {
+                                    State::WorkingClosed => {
+                                        behaviour.light_on();
+                                    }
+                                    State::WorkingOpened => {
+                                        behaviour.light_on();
+                                        behaviour.start_motor("up");
+                                    }
+                                    _ => {}
+                                }
+                                self.state = to;
+                            }
+                            Outcome::Handled
+                        } else {
+                            Outcome::Rejected
+                        }
+                    }
+                }
+            }
+
+            fn on_open<B: Behaviour + ?Sized>(&mut self, message: &super::super::Open, envelope: &B::Envelope, behaviour: &mut B) -> Outcome {
+                match self.state {
+                    State::WorkingClosed => {
+                        if behaviour.is_allowed(message) && !(behaviour.is_locked() || behaviour.is_late("night", envelope)) {
+                            behaviour.remember(RememberMessage::Open(message));
+                            behaviour.send_report_door("OPEN", envelope);
+                            behaviour.start_motor("up");
+                            self.state = State::WorkingOpened;
+                            Outcome::Handled
+                        } else {
+                            Outcome::Rejected
+                        }
+                    }
+                    _ => Outcome::Ignored,
+                }
+            }
+
+            fn on_unlock<B: Behaviour + ?Sized>(&mut self, message: &[u8], behaviour: &mut B) -> Outcome {
+                match self.state {
+                    State::WorkingClosed => {
+                        behaviour.unlock(message);
+                        Outcome::Handled
+                    }
+                    _ => Outcome::Ignored,
+                }
+            }
+
+            fn on_close<B: Behaviour + ?Sized>(&mut self, message: &super::super::Close, envelope: &B::Envelope, behaviour: &mut B) -> Outcome {
+                match self.state {
+                    State::WorkingOpened => {
+                        behaviour.start_motor("down");
+                        behaviour.remember(RememberMessage::Close(message));
+                        behaviour.send_report_door("CLOSED", envelope);
+                        self.state = State::WorkingClosed;
+                        Outcome::Handled
+                    }
+                    _ => Outcome::Ignored,
+                }
+            }
+
+            fn on_moved<B: Behaviour + ?Sized>(&mut self, number_0: i64, behaviour: &mut B) -> Outcome {
+                match self.state {
+                    State::WorkingOpened => {
+                        if behaviour.steps_0(number_0) {
+                            behaviour.start_motor("down");
+                            behaviour.count(number_0);
+                            behaviour.start_motor("up");
+                            Outcome::Handled
+                        } else {
+                            Outcome::Rejected
+                        }
+                    }
+                    _ => Outcome::Ignored,
+                }
+            }
+
+            fn on_timedout<B: Behaviour + ?Sized>(&mut self, behaviour: &mut B) -> Outcome {
+                match self.state {
+                    State::WorkingOpened => {
+                        behaviour.start_motor("down");
+                        self.state = State::WorkingClosed;
+                        Outcome::Handled
+                    }
+                    _ => Outcome::Ignored,
+                }
+            }
+        }
+    }
+}
+
+/// The services of the set, by URN and version.
+pub static SERVICES: &[codec::ServiceInfo] = &[
+    codec::ServiceInfo {
+        name: "Door",
+        id: door::V1_0,
+        inherits_from: None,
+        inputs: &[0xD001, 0xD002, 0xD003],
+        outputs: &[0xD004],
+    },
+];
+
+/// The message types of the set, by code; of several with one code the newest first.
+pub static MESSAGES: &[codec::MessageInfo] = &[
+    codec::MessageInfo::of::<Open>(&[
+        door::V1_0,
+    ]),
+    codec::MessageInfo::of::<Close>(&[
+        door::V1_0,
+    ]),
+    codec::MessageInfo::of::<Stop>(&[
+        door::V1_0,
+    ]),
+    codec::MessageInfo::of::<ReportDoor>(&[
+        door::V1_0,
+    ]),
+];
+
+/// `Open` (D001h), a command.
+///
+/// Opens it.
+///
+/// Declared by `urn:example:Door 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Open;
+
+impl codec::Message for Open {
+    const CODE: u16 = 0xD001;
+    const NAME: &'static str = "Open";
+    const IS_COMMAND: bool = true;
+
+    fn encoded_len(&self) -> usize {
+        2
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        Ok(Self)
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for Open {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object(0)
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            codec::view::Object::new(value, &[])?;
+            Ok(Self)
+        }
+    }
+    codec::view::serde_by_view!(Open);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for Open {
+        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self)
+        }
+    }
+}
+
+/// `Close` (D002h), a command.
+///
+/// Closes it.
+///
+/// Declared by `urn:example:Door 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Close;
+
+impl codec::Message for Close {
+    const CODE: u16 = 0xD002;
+    const NAME: &'static str = "Close";
+    const IS_COMMAND: bool = true;
+
+    fn encoded_len(&self) -> usize {
+        2
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        Ok(Self)
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for Close {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object(0)
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            codec::view::Object::new(value, &[])?;
+            Ok(Self)
+        }
+    }
+    codec::view::serde_by_view!(Close);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for Close {
+        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self)
+        }
+    }
+}
+
+/// `Stop` (D003h), a command.
+///
+/// Stops it.
+///
+/// Declared by `urn:example:Door 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Stop;
+
+impl codec::Message for Stop {
+    const CODE: u16 = 0xD003;
+    const NAME: &'static str = "Stop";
+    const IS_COMMAND: bool = true;
+
+    fn encoded_len(&self) -> usize {
+        2
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        Ok(Self)
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for Stop {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object(0)
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            codec::view::Object::new(value, &[])?;
+            Ok(Self)
+        }
+    }
+    codec::view::serde_by_view!(Stop);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for Stop {
+        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self)
+        }
+    }
+}
+
+/// `ReportDoor` (D004h).
+///
+/// Tells how it is.
+///
+/// Declared by `urn:example:Door 1.0`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReportDoor;
+
+impl codec::Message for ReportDoor {
+    const CODE: u16 = 0xD004;
+    const NAME: &'static str = "ReportDoor";
+    const IS_COMMAND: bool = false;
+
+    fn encoded_len(&self) -> usize {
+        2
+    }
+
+    fn write(&self, output: &mut codec::Writer<'_>) -> Result<(), codec::EncodeError> {
+        output.fixed(<Self as codec::Message>::CODE);
+        Ok(())
+    }
+
+    fn read(input: &mut codec::Reader<'_>) -> Result<Self, codec::DecodeError> {
+        input.code(Self::CODE)?;
+        Ok(Self)
+    }
+}
+
+codec::if_serde! {
+    impl codec::view::View for ReportDoor {
+        #[inline(never)]
+        fn view(&self) -> codec::view::Value {
+            codec::view::Value::object(0)
+        }
+
+        #[inline(never)]
+        fn from_view(value: &codec::view::Value) -> Result<Self, codec::view::Error> {
+            codec::view::Object::new(value, &[])?;
+            Ok(Self)
+        }
+    }
+    codec::view::serde_by_view!(ReportDoor);
+}
+
+codec::if_arbitrary! {
+    impl<'a> codec::arbitrary::Arbitrary<'a> for ReportDoor {
+        fn arbitrary(_: &mut codec::arbitrary::Unstructured<'a>) -> codec::arbitrary::Result<Self> {
+            Ok(Self)
+        }
+    }
+}
