@@ -47,3 +47,8 @@ pub mod world;
 #[cfg(all(doctest, feature = "node", feature = "mobility"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// So do those of the guide to JSIDL.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/jsidl.md")]
+struct Jsidl;

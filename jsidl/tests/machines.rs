@@ -11,7 +11,7 @@ use jsidl::behaviour::{
     Machine, Name, Outcome, Run, Stimulus, Transition, TransitionKind, dot, mermaid,
 };
 use jsidl::model::Service;
-use jsidl::{Library, Loaded, Loader};
+use jsidl::{Library, Loaded, Loader, rust};
 
 const LAMP: &str = r#"<service_def xmlns="urn:jaus:jsidl:1.1" name="Lamp" id="urn:lamp" version="1.0">
 <message_set><input_set/><output_set/></message_set>
@@ -192,5 +192,30 @@ fn every_published_machine_starts_and_leads_to_states_that_exist() {
         }
         assert_eq!((source, with.len()), (source, services));
         assert_eq!(found, unsound, "{source}");
+    }
+}
+
+/// One type for each machine of each service that says something about its behaviour itself.
+#[test]
+fn every_published_machine_can_be_written_as_rust() {
+    let Some(shared) = support::shared() else {
+        return;
+    };
+    for (source, ..) in PUBLISHED {
+        let mut loader = Loader::new();
+        loader.path(shared.join("jsidl-corpus").join(source));
+        let library = loader.load().library;
+        let services = || library.services().map(AsRef::<Service>::as_ref);
+        let text = rust::module(&library, services(), "::jaus::codec");
+        let with = services().filter(|service| !service.behaviour.is_empty());
+        let machines: usize = with.map(|service| library.machines(service).len()).sum();
+        assert!(machines > 0, "{source}");
+        assert_eq!(
+            text.matches("pub struct Machine {").count(),
+            machines,
+            "{source}"
+        );
+        let leads_nowhere = text.matches("State:: ").count() + text.matches("State::}").count();
+        assert_eq!(leads_nowhere, 0, "{source}");
     }
 }

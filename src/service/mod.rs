@@ -34,6 +34,8 @@ mod handlers;
 mod inquiries;
 mod list;
 mod liveness;
+#[cfg(test)]
+mod machines;
 #[cfg(feature = "mobility")]
 pub mod mobility;
 mod outbox;

@@ -74,9 +74,9 @@ pub mod door {
             Timedout,
         }
 
-        /// The messages that `remember` is for.
+        /// One of several messages that are treated alike.
         #[derive(Debug, Clone, Copy)]
-        pub enum RememberMessage<'a> {
+        pub enum OpenOrClose<'a> {
             /// `Open`
             Open(&'a super::super::Open),
             /// `Close`
@@ -110,7 +110,7 @@ pub mod door {
             fn light_off(&mut self);
 
             /// `remember`.
-            fn remember(&mut self, message: RememberMessage<'_>);
+            fn remember(&mut self, message: OpenOrClose<'_>);
 
             /// `Send ReportDoor`.
             ///
@@ -225,7 +225,7 @@ pub mod door {
                 match self.state {
                     State::WorkingClosed => {
                         if behaviour.is_allowed(message) && !(behaviour.is_locked() || behaviour.is_late("night", envelope)) {
-                            behaviour.remember(RememberMessage::Open(message));
+                            behaviour.remember(OpenOrClose::Open(message));
                             behaviour.send_report_door("OPEN", envelope);
                             behaviour.start_motor("up");
                             self.state = State::WorkingOpened;
@@ -252,7 +252,7 @@ pub mod door {
                 match self.state {
                     State::WorkingOpened => {
                         behaviour.start_motor("down");
-                        behaviour.remember(RememberMessage::Close(message));
+                        behaviour.remember(OpenOrClose::Close(message));
                         behaviour.send_report_door("CLOSED", envelope);
                         self.state = State::WorkingClosed;
                         Outcome::Handled

@@ -5,18 +5,20 @@
 //! service: its only machine in a module `machine`, several in modules of their names, and those of
 //! older versions in modules of the version around them.
 
+mod states;
 mod steps;
 mod vocabulary;
 
-use std::collections::HashMap;
+use std::collections::BTreeSet;
 
+use self::states::States;
 use self::steps::Steps;
-use self::vocabulary::{Event, Kind, Method, Vocabulary};
+use self::vocabulary::{Choice, Event, Kind, Method, Vocabulary};
 use super::docs;
 use super::ident::{Names, version_module};
 use super::messages::Plan;
 use super::writer::Writer;
-use crate::behaviour::{MOST_REMEMBERED, Machine, Name, StateIndex, TransitionKind};
+use crate::behaviour::{MOST_REMEMBERED, Machine, TransitionKind};
 use crate::library::Library;
 use crate::model::{Message, Service};
 
@@ -82,55 +84,6 @@ fn of_service(out: &mut Writer, messages: Messages<'_>, service: &Service, root:
         let module = modules.snake(name);
         Emitter::new(machine, service, messages, root).write(out, &module);
     }
-}
-
-/// The states that hold no others, and what they are called.
-struct States {
-    leaves: Vec<StateIndex>,
-    idents: HashMap<StateIndex, String>,
-}
-
-impl States {
-    fn of(machine: &Machine<'_>) -> Self {
-        let leaf = machine
-            .states()
-            .filter(|(_, state)| state.children.is_empty());
-        let leaves: Vec<_> = leaf.map(|(index, _)| index).collect();
-        let paths: Vec<_> = leaves
-            .iter()
-            .map(|leaf| &machine.state(*leaf).path)
-            .collect();
-        let shared = shared_names(&paths);
-        let mut names = Names::default();
-        let named = leaves.iter().zip(paths);
-        let idents = named.map(|(&leaf, path)| {
-            let own = path.parts().get(shared..).unwrap_or_default();
-            (leaf, names.camel(&own.join("_")))
-        });
-        let idents = idents.collect();
-        Self { leaves, idents }
-    }
-
-    fn leaves(&self) -> &[StateIndex] {
-        &self.leaves
-    }
-
-    fn ident(&self, leaf: StateIndex) -> &str {
-        self.idents.get(&leaf).map_or("", String::as_str)
-    }
-}
-
-/// How many names all paths begin with; the last one of each stays.
-fn shared_names(paths: &[&Name]) -> usize {
-    let Some((first, rest)) = paths.split_first() else {
-        return 0;
-    };
-    let most = paths.iter().map(|path| path.parts().len() - 1).min();
-    let same = |position: &usize| {
-        let part = first.parts().get(*position);
-        rest.iter().all(|path| path.parts().get(*position) == part)
-    };
-    (0..most.unwrap_or(0)).take_while(same).count()
 }
 
 /// Writes one machine.
@@ -310,8 +263,8 @@ impl<'a> Emitter<'a> {
 
     fn behaviour(&self, out: &mut Writer) {
         let methods = &self.vocabulary.methods;
-        for method in methods.iter().filter(|it| !it.message_type.is_empty()) {
-            self.message_enum(out, method);
+        for choice in &self.vocabulary.choices {
+            self.choice(out, choice);
         }
         out.gap();
         out.push(
@@ -332,18 +285,12 @@ impl<'a> Emitter<'a> {
         out.push("}");
     }
 
-    fn message_enum(&self, out: &mut Writer, method: &Method) {
-        let given = method
-            .parameters()
-            .find(|(_, given)| given.events.len() > 1);
-        let Some((_, given)) = given else {
-            return;
-        };
+    fn choice(&self, out: &mut Writer, choice: &Choice) {
         out.gap();
-        out.push(format!("/// The messages that `{}` is for.", method.name));
+        out.push("/// One of several messages that are treated alike.");
         out.push("#[derive(Debug, Clone, Copy)]");
-        out.push(format!("pub enum {}<'a> {{", method.message_type));
-        for &event in &given.events {
+        out.push(format!("pub enum {}<'a> {{", choice.ident));
+        for &event in &choice.events {
             let event = &self.vocabulary.events[event];
             let message = event.message.as_deref().unwrap_or_default();
             let ty = self.message_type(message, "'a ");
@@ -384,11 +331,7 @@ impl<'a> Emitter<'a> {
         ));
     }
 
-    fn parameter_type(
-        &self,
-        method: &Method,
-        events: &std::collections::BTreeSet<usize>,
-    ) -> String {
+    fn parameter_type(&self, method: &Method, events: &BTreeSet<usize>) -> String {
         if events.len() > 1 {
             return format!("{}<'_>", method.message_type);
         }

@@ -1,7 +1,7 @@
 //! The functions of a generated machine: what each state does with each event.
 
 use super::super::writer::Writer;
-use super::States;
+use super::states::States;
 use super::vocabulary::{Event, Kind, Method, Value, Vocabulary};
 use crate::behaviour::{
     Action, Declared, Guard, Machine, StateIndex, Stimulus, Transition, TransitionKind, Trigger,

@@ -11,7 +11,17 @@ use crate::behaviour::{Action, Argument, Guard, Machine, Transition, Trigger};
 pub(super) struct Vocabulary {
     pub(super) events: Vec<Event>,
     pub(super) methods: Vec<Method>,
+    pub(super) choices: Vec<Choice>,
 }
+
+/// Messages of several types for one parameter.
+pub(super) struct Choice {
+    pub(super) ident: String,
+    pub(super) events: BTreeSet<usize>,
+}
+
+/// A choice of more messages is named after a method, not after them all.
+const MOST_NAMED: usize = 2;
 
 /// Something that happens to the machine.
 pub(super) struct Event {
@@ -119,6 +129,7 @@ impl Vocabulary {
         let mut collected = Self {
             events: Vec::new(),
             methods: Vec::new(),
+            choices: Vec::new(),
         };
         for (_, state) in machine.states() {
             for effect in state.entry.iter().chain(&state.exit) {
@@ -220,10 +231,28 @@ impl Vocabulary {
         let mut methods = Names::default();
         for method in &mut self.methods {
             method.ident = methods.snake(&method.key.base);
-            let several = method.arguments.iter().any(|given| given.events.len() > 1);
-            if several {
-                method.message_type = types.camel(&format!("{} message", method.ident));
-            }
+            let mut given = method.arguments.iter().map(|given| &given.events);
+            let Some(several) = given.find(|events| events.len() > 1) else {
+                continue;
+            };
+            let known = self.choices.iter().find(|choice| choice.events == *several);
+            method.message_type = match known {
+                Some(known) => known.ident.clone(),
+                None => {
+                    let alternatives = several.iter().map(|&it| self.events[it].ident.as_str());
+                    let name = if several.len() > MOST_NAMED {
+                        format!("{} message", method.ident)
+                    } else {
+                        alternatives.collect::<Vec<_>>().join(" or ")
+                    };
+                    let ident = types.camel(&name);
+                    let events = several.clone();
+                    self.choices.push(Choice { ident, events });
+                    self.choices
+                        .last()
+                        .map_or_else(String::new, |it| it.ident.clone())
+                }
+            };
         }
     }
 
