@@ -4,7 +4,12 @@
 //! Definitions are grouped into sets, for example `core` (AS5710) and `mobility` (AS6009).
 //! [`Loader::catalogue`](crate::Loader::catalogue) loads all of them.
 
-use crate::model::Id;
+use std::path::{Path, PathBuf};
+
+use crate::model::{Id, Location};
+
+/// The folder that the embedded files stand in when they are named.
+const FOLDER: &str = "catalogue";
 
 /// One embedded file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +64,18 @@ pub fn find(id: &Id) -> Option<&'static Entry> {
     ENTRIES
         .iter()
         .find(|entry| entry.urn == &*id.urn && entry.version == version)
+}
+
+/// Whether a place is in an embedded file, as [`Loader::catalogue`](crate::Loader::catalogue) names
+/// them.
+pub fn holds(location: &Location) -> bool {
+    let path = location.file.strip_prefix(FOLDER);
+    path.is_ok_and(|path| ENTRIES.iter().any(|entry| Path::new(entry.path) == path))
+}
+
+/// What an embedded file is called in findings.
+pub(crate) fn name(entry: &Entry) -> PathBuf {
+    Path::new(FOLDER).join(entry.path)
 }
 
 #[cfg(test)]

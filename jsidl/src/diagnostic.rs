@@ -1,7 +1,10 @@
 //! What is wrong with the definitions of a load: every finding with its place and a sentence that
 //! says what to do about it.
 
+use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
+use std::sync::Arc;
 
 use crate::model::Location;
 use crate::source::{Sources, Span};
@@ -58,7 +61,11 @@ impl fmt::Display for Diagnostic {
 
 /// All findings of a load, ordered by file and place.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Diagnostics(Vec<Diagnostic>);
+pub struct Diagnostics {
+    findings: Vec<Diagnostic>,
+    /// The files that the findings are about.
+    texts: BTreeMap<Arc<Path>, Arc<str>>,
+}
 
 impl Diagnostics {
     /// Whether anything was left out.
@@ -68,17 +75,17 @@ impl Diagnostics {
 
     /// Whether there is no finding at all.
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.findings.is_empty()
     }
 
     /// Number of findings.
     pub fn len(&self) -> usize {
-        self.0.len()
+        self.findings.len()
     }
 
     /// All findings.
     pub fn iter(&self) -> std::slice::Iter<'_, Diagnostic> {
-        self.0.iter()
+        self.findings.iter()
     }
 
     /// The errors among them.
@@ -89,6 +96,12 @@ impl Diagnostics {
     /// The warnings among them.
     pub fn warnings(&self) -> impl Iterator<Item = &Diagnostic> {
         self.iter().filter(|d| d.severity == Severity::Warning)
+    }
+
+    /// The texts of the files that the findings are about.
+    #[cfg(feature = "excerpts")]
+    pub(crate) fn texts(&self) -> &BTreeMap<Arc<Path>, Arc<str>> {
+        &self.texts
     }
 }
 
@@ -106,7 +119,7 @@ impl IntoIterator for Diagnostics {
     type IntoIter = std::vec::IntoIter<Diagnostic>;
 
     fn into_iter(self) -> Self::IntoIter {
-        self.0.into_iter()
+        self.findings.into_iter()
     }
 }
 
@@ -171,6 +184,14 @@ impl Report {
     /// Orders the findings and turns offsets into lines and columns.
     pub(crate) fn finish(mut self, sources: &Sources) -> Diagnostics {
         self.findings.sort_by_key(|finding| finding.span);
+        let spans = |finding: &Finding| {
+            let notes = finding.notes.iter().map(|(span, _)| *span);
+            std::iter::once(finding.span)
+                .chain(notes)
+                .collect::<Vec<_>>()
+        };
+        let texts = self.findings.iter().flat_map(spans);
+        let texts = texts.map(|span| sources.text(span)).collect();
         let located = self.findings.into_iter().map(|finding| Diagnostic {
             severity: finding.severity,
             location: sources.location(finding.span),
@@ -184,6 +205,9 @@ impl Report {
                 })
                 .collect(),
         });
-        Diagnostics(located.collect())
+        Diagnostics {
+            findings: located.collect(),
+            texts,
+        }
     }
 }

@@ -24,6 +24,8 @@ pub mod catalogue;
 mod check;
 mod diagnostic;
 pub mod dynamic;
+#[cfg(feature = "excerpts")]
+mod excerpt;
 mod expr;
 mod library;
 mod loader;
@@ -34,5 +36,7 @@ mod source;
 mod syntax;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Note, Severity};
+#[cfg(feature = "excerpts")]
+pub use excerpt::Style;
 pub use library::Library;
 pub use loader::{Loaded, Loader};

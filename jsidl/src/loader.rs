@@ -77,8 +77,7 @@ impl Loader {
     pub fn load(mut self) -> Loaded {
         if self.with_catalogue {
             for entry in catalogue::entries() {
-                let name = Path::new("catalogue").join(entry.path);
-                self.add(&name, &entry.text(), Strictness::Named);
+                self.add(&catalogue::name(entry), &entry.text(), Strictness::Named);
             }
         }
         let library = resolve(&self.program, &self.sources, &mut self.report);

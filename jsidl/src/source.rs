@@ -123,6 +123,12 @@ impl Sources {
         &self.source(span).path
     }
 
+    /// Name and text of the file in which a place lies.
+    pub(crate) fn text(&self, span: Span) -> (Arc<Path>, Arc<str>) {
+        let source = self.source(span);
+        (Arc::clone(&source.path), Arc::clone(&source.text))
+    }
+
     fn source(&self, span: Span) -> &Source {
         &self.0[span.file as usize]
     }

@@ -11,6 +11,7 @@ mod demo;
 mod discover;
 mod doctor;
 mod encode;
+mod jsidl;
 mod judge;
 mod monitor;
 mod node;
@@ -26,7 +27,7 @@ mod watch;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use jaus::cli::failure::{Failure, Outcome};
+use jaus::cli::failure::Failure;
 use jaus::cli::logging::Logging;
 use jaus::cli::output;
 
@@ -70,11 +71,12 @@ enum Command {
     Replay(replay::Replay),
     Decode(decode::Decode),
     Encode(encode::Encode),
+    Jsidl(jsidl::Jsidl),
 }
 
 impl Command {
-    fn run(&self) -> Result<Outcome, Failure> {
-        match self {
+    fn run(self) -> Result<ExitCode, Failure> {
+        let outcome = match self {
             Self::Demo(demo) => demo.run(),
             #[cfg(target_os = "linux")]
             Self::Up(up) => up.run(),
@@ -95,17 +97,17 @@ impl Command {
             Self::Replay(replay) => replay.run(),
             Self::Decode(decode) => decode.run(),
             Self::Encode(encode) => encode.run(),
-        }
+            Self::Jsidl(jsidl) => return jsidl.run(),
+        };
+        outcome.map(ExitCode::from)
     }
 }
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let outcome = cli.logging.start("error").and_then(|()| cli.command.run());
-    match outcome {
-        Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::Incomplete) => ExitCode::from(1),
-        Ok(Outcome::Broken) => ExitCode::from(2),
+    let ended = cli.logging.start("error").and_then(|()| cli.command.run());
+    match ended {
+        Ok(status) => status,
         // Whoever read our output has seen enough, as `head` does.
         Err(Failure::OutputClosed) => ExitCode::SUCCESS,
         Err(failure) => {

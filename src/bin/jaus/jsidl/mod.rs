@@ -1,0 +1,31 @@
+//! `jaus jsidl`: work on service definitions, one file per subcommand.
+
+mod check;
+
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+use jaus::cli::failure::Failure;
+
+/// Check, compare and lay out service definitions (JSIDL), and make things from them
+#[derive(Args)]
+#[command(after_help = "Begin with `jaus jsidl check my-services/`.\n\n\
+    Wherever definitions are read, they may refer to the built-in ones (the core set and all others \
+    that come with this program) without naming them.")]
+pub(crate) struct Jsidl {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Check(check::Arguments),
+}
+
+impl Jsidl {
+    pub(crate) fn run(self) -> Result<ExitCode, Failure> {
+        match self.command {
+            Command::Check(arguments) => check::run(&arguments),
+        }
+    }
+}
