@@ -29,6 +29,7 @@ mod excerpt;
 mod expr;
 mod library;
 mod loader;
+pub mod lua;
 pub mod model;
 mod resolve;
 pub mod rust;

@@ -1,0 +1,281 @@
+//! The fields that a filter can name: unique, typed, and called alike wherever they mean alike.
+//!
+//! Wireshark lets several fields have one name if their types go together. So equal names in one
+//! message share the name of the filter, and only where the types differ one of them gets its type
+//! appended, as in `jaus.setx.value_text`.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write as _;
+
+use super::text;
+use crate::model::{NamedValue, Number, Signed, Unsigned};
+
+/// The names that stand for the transport's and for all messages' fields, below `jaus.`.
+const RESERVED: [&str; 30] = [
+    "acknowledgement",
+    "address",
+    "broadcast",
+    "code",
+    "data",
+    "data_control",
+    "destination",
+    "experimental",
+    "fault",
+    "fragment",
+    "hc_flags",
+    "hc_length",
+    "hc_number",
+    "limits",
+    "malformed",
+    "message",
+    "presence_vector",
+    "priority",
+    "ra_priority",
+    "ra_version",
+    "sequence",
+    "service",
+    "service_connection",
+    "size",
+    "source",
+    "stale",
+    "transport",
+    "type",
+    "unknown",
+    "whole_in",
+];
+
+/// What kind of values a field has; where two claim one name, the lesser gets it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Kind {
+    /// Unsigned, up to 4 octets.
+    Uint,
+    /// Unsigned, 8 octets.
+    Uint64,
+    /// Signed, up to 4 octets.
+    Int,
+    /// Signed, 8 octets.
+    Int64,
+    /// A real number, scaled ones included.
+    Real,
+    /// A string.
+    Text,
+    /// Raw octets.
+    Octets,
+    /// A composite, which is there or not.
+    None,
+}
+
+impl Kind {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Uint => "uint",
+            Self::Uint64 => "uint64",
+            Self::Int => "int",
+            Self::Int64 => "int64",
+            Self::Real => "real",
+            Self::Text => "text",
+            Self::Octets => "octets",
+            Self::None => "none",
+        }
+    }
+
+    /// The largest value that can be given a name.
+    const fn greatest(self) -> u64 {
+        match self {
+            Self::Int => i32::MAX as u64,
+            Self::Int64 => i64::MAX as u64,
+            Self::Uint64 => u64::MAX,
+            _ => u32::MAX as u64,
+        }
+    }
+}
+
+impl From<Unsigned> for Kind {
+    fn from(unsigned: Unsigned) -> Self {
+        if unsigned == Unsigned::U64 {
+            Self::Uint64
+        } else {
+            Self::Uint
+        }
+    }
+}
+
+impl From<Number> for Kind {
+    fn from(number: Number) -> Self {
+        match number {
+            Number::Unsigned(unsigned) => unsigned.into(),
+            Number::Signed(Signed::I64) => Self::Int64,
+            Number::Signed(_) => Self::Int,
+            Number::F32 | Number::F64 => Self::Real,
+        }
+    }
+}
+
+/// What filters call a message.
+pub(super) fn prefix(message: &str) -> String {
+    let name = plain(message);
+    if RESERVED.contains(&name.as_str()) {
+        format!("jaus.{name}_message")
+    } else {
+        format!("jaus.{name}")
+    }
+}
+
+/// What filters call a field of the message that they call `prefix`.
+pub(super) fn within(prefix: &str, field: &str) -> String {
+    format!("{prefix}.{}", plain(field))
+}
+
+/// Lower case, and nothing but letters, digits and `_`.
+fn plain(name: &str) -> String {
+    let character = |c: char| {
+        if c.is_ascii_alphanumeric() {
+            c.to_ascii_lowercase()
+        } else {
+            '_'
+        }
+    };
+    name.chars().map(character).collect()
+}
+
+/// All fields, and the names of values that they share.
+#[derive(Debug, Default)]
+pub(super) struct Fields {
+    entries: Vec<Entry>,
+    places: HashMap<Entry, usize>,
+    claims: BTreeMap<String, Kind>,
+    settled: bool,
+    values: Vec<String>,
+    value_places: HashMap<String, usize>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Entry {
+    filter: String,
+    name: String,
+    kind: Kind,
+    values: Option<usize>,
+}
+
+impl Fields {
+    /// The number (from 1) of a field; `values` is a number given by [`names`](Self::names).
+    pub(super) fn field(
+        &mut self,
+        filter: String,
+        name: &str,
+        kind: Kind,
+        values: Option<usize>,
+    ) -> usize {
+        if !self.settled {
+            let claim = self.claims.entry(filter).or_insert(kind);
+            *claim = kind.min(*claim);
+            return 0;
+        }
+        let filter = if self.claims.get(&filter) == Some(&kind) {
+            filter
+        } else {
+            format!("{filter}_{}", kind.name())
+        };
+        let entry = Entry {
+            filter,
+            name: name.to_owned(),
+            kind,
+            values,
+        };
+        let next = self.entries.len() + 1;
+        let place = *self.places.entry(entry.clone()).or_insert(next);
+        if place == next {
+            self.entries.push(entry);
+        }
+        place
+    }
+
+    /// The number (from 1) of a table of named values; none if there is nothing to name.
+    pub(super) fn names(&mut self, kind: Kind, values: &[NamedValue]) -> Option<usize> {
+        let mut named: BTreeMap<u64, &str> = BTreeMap::new();
+        for value in values.iter().filter(|v| v.index <= kind.greatest()) {
+            named.entry(value.index).or_insert(&value.name);
+        }
+        self.names_of(named)
+    }
+
+    /// As [`names`](Self::names), for values that are numbered.
+    pub(super) fn names_of<'n>(
+        &mut self,
+        named: impl IntoIterator<Item = (u64, &'n str)>,
+    ) -> Option<usize> {
+        let entries = named.into_iter();
+        let entries: Vec<_> = entries
+            .map(|(index, name)| format!("[{index}]={}", text::quoted(name)))
+            .collect();
+        if entries.is_empty() {
+            return None;
+        }
+        let table = entries.join(",");
+        let next = self.values.len() + 1;
+        let place = *self.value_places.entry(table.clone()).or_insert(next);
+        if place == next {
+            self.values.push(table);
+        }
+        Some(place)
+    }
+
+    /// Ends the claiming of names.
+    pub(super) fn settle(&mut self) {
+        self.settled = true;
+    }
+
+    /// Writes the tables.
+    pub(super) fn write(&self, out: &mut String) {
+        out.push_str("local value_names = {\n");
+        for table in &self.values {
+            // Writing to a string does not fail.
+            let _ = writeln!(out, "{{{table}}},");
+        }
+        out.push_str("}\nlocal field_table = {\n");
+        for entry in &self.entries {
+            let (filter, name) = (text::quoted(&entry.filter), text::quoted(&entry.name));
+            let _ = write!(out, "{{{filter},{name},\"{}\"", entry.kind.name());
+            if let Some(values) = entry.values {
+                let _ = write!(out, ",{values}");
+            }
+            out.push_str("},\n");
+        }
+        out.push_str("}\n");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lua::RUNTIME;
+
+    #[test]
+    fn every_name_of_the_interpreter_is_reserved() {
+        let names = RUNTIME[0].split("\"jaus.").skip(1).map(|rest| {
+            let end = rest.find(['.', '"']).unwrap_or(rest.len());
+            &rest[..end]
+        });
+        let names: Vec<_> = names.collect();
+        assert!(names.len() > 20, "{names:?}");
+        for name in names {
+            assert!(RESERVED.contains(&name), "{name}");
+        }
+    }
+
+    #[test]
+    fn where_types_differ_the_less_common_one_is_told_apart() {
+        let mut fields = Fields::default();
+        for settled in [false, true] {
+            fields.settled = settled;
+            fields.field("jaus.m.f".into(), "F", Kind::None, None);
+            fields.field("jaus.m.f".into(), "F", Kind::Real, None);
+            fields.field("jaus.m.f".into(), "F", Kind::Real, None);
+        }
+        let mut out = String::new();
+        fields.write(&mut out);
+        assert!(
+            out.contains("{\"jaus.m.f_none\",\"F\",\"none\"},\n{\"jaus.m.f\",\"F\",\"real\"},\n}")
+        );
+    }
+}

@@ -1,0 +1,142 @@
+//! Every golden message in a packet: tshark prints the values that our own codec reads.
+
+use std::cmp::Reverse;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use jsidl::Library;
+use jsidl::dynamic::{Limits, Value, decode_with};
+use jsidl::model::Message;
+use roxmltree::{Document, Node};
+use serde_json::Value as Json;
+
+use crate::expected::{agrees, fields, shown};
+use crate::packets::Packets;
+use crate::{support, tshark};
+
+/// Where the definitions of a source lie, the source's own first.
+fn directories(shared: &Path, source: &str) -> Vec<PathBuf> {
+    let corpus = shared.join("jsidl-corpus");
+    match source.split_once('-') {
+        Some(("jts", "examples")) => vec![corpus.join(source), corpus.join("jts")],
+        Some((family, set)) => {
+            let family = corpus.join(family);
+            vec![family.join(format!("urn.jaus.jss.{set}")), family]
+        }
+        None => vec![corpus.join(source)],
+    }
+}
+
+fn load(shared: &Path, source: &str) -> Library {
+    let mut loader = jsidl::Loader::new();
+    for directory in directories(shared, source) {
+        loader.path(directory);
+    }
+    loader.load().library
+}
+
+/// The messages of a golden file, each once.
+fn vectors(path: &Path) -> Vec<Vec<u8>> {
+    let text = fs::read_to_string(path).unwrap();
+    let octets = |line: &str| {
+        let row: Json = serde_json::from_str(line).unwrap();
+        let digits = row["hex"].as_str().unwrap().as_bytes();
+        let octet = |pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
+        digits.chunks(2).map(octet).collect()
+    };
+    text.lines().map(octets).collect()
+}
+
+/// How the dissector is to read a message: by the newest definition that fits.
+fn read<'l>(library: &'l Library, octets: &[u8]) -> Option<(&'l Message, Value)> {
+    let code = u16::from_le_bytes(*octets.first_chunk()?);
+    let mut candidates: Vec<_> = library.by_code(code).collect();
+    candidates.sort_by_key(|(service, _)| Reverse(service.id.version));
+    candidates.into_iter().find_map(|(_, message)| {
+        let value = decode_with(message, octets, Limits::Ignored).ok()?;
+        Some((message.as_ref(), value))
+    })
+}
+
+/// What is different, if anything is.
+fn compare(packet: Node<'_, '_>, message: &Message, value: &Value) -> Result<(), String> {
+    let items = tshark::messages(packet);
+    let [item] = items[..] else {
+        return Err(format!("{} messages in one packet", items.len()));
+    };
+    let called = tshark::show(item, "jaus.message");
+    if called != Some(&message.name) {
+        return Err(format!("{called:?} instead of {}", message.name));
+    }
+    let prefix = format!("jaus.{}", message.name.to_ascii_lowercase());
+    let body = item
+        .children()
+        .find(|child| tshark::name(*child).starts_with(&prefix))
+        .ok_or("no body")?;
+    let (mut found, wanted) = (Vec::new(), fields(message, value));
+    shown(body, &format!("{prefix}."), &mut found);
+    for (item, field) in found.iter().zip(&wanted) {
+        if !agrees(*item, field) {
+            let (name, show) = (tshark::name(*item), item.attribute("show"));
+            return Err(format!("{name} {show:?} instead of {field:?}"));
+        }
+    }
+    if found.len() != wanted.len() {
+        return Err(format!("{} fields, not {}", found.len(), wanted.len()));
+    }
+    Ok(())
+}
+
+#[test]
+fn tshark_prints_the_values_of_every_golden_message() {
+    let Some(shared) = support::shared() else {
+        return;
+    };
+    if !tshark::is_there() {
+        return;
+    }
+    let mut files: Vec<_> = fs::read_dir(shared.join("golden"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "jsonl"))
+        .filter(|path| !path.to_string_lossy().contains("scaling_"))
+        .collect();
+    files.sort();
+    let mut total = 0;
+    for file in files {
+        let source = file.file_stem().unwrap().to_str().unwrap();
+        total += check_source(&load(&shared, source), source, &vectors(&file));
+    }
+    println!("{total} messages in all");
+    assert!(total > 2000, "the golden data have 2116 messages");
+}
+
+/// Answers how many messages were compared.
+fn check_source(library: &Library, source: &str, vectors: &[Vec<u8>]) -> usize {
+    let directory = tshark::directory(source);
+    let capture = directory.join("golden.pcap");
+    let mut packets = Packets::new();
+    let known: Vec<_> = vectors
+        .iter()
+        .filter_map(|octets| Some((octets, read(library, octets)?)))
+        .map(|(octets, read)| (packets.message(octets), read))
+        .collect();
+    packets.write(&capture);
+    let pdml = tshark::pdml(library, &directory, &capture);
+    let document = Document::parse(&pdml).unwrap();
+    let packets = tshark::packets(&document);
+    let differences: Vec<_> = known
+        .iter()
+        .filter_map(|(place, (message, value))| {
+            let problem = compare(packets[*place], message, value).err()?;
+            Some(format!(
+                "{source}, packet {}, {}: {problem}",
+                place + 1,
+                message.name
+            ))
+        })
+        .collect();
+    assert!(differences.is_empty(), "{}", differences.join("\n"));
+    println!("{source}: {} of {} messages", known.len(), vectors.len());
+    known.len()
+}

@@ -1,0 +1,15 @@
+//! The generated dissector, run by Wireshark's own `tshark`.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on fails"
+)]
+
+mod expected;
+mod golden;
+mod packets;
+#[path = "../support/mod.rs"]
+mod support;
+mod transport;
+mod tshark;
