@@ -15,7 +15,6 @@ mod text;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
-use std::path::Path;
 
 use self::fields::{Fields, Kind};
 use crate::catalogue;
@@ -119,13 +118,13 @@ fn layouts<'m>(library: &'m Library, fields: &mut Fields) -> Vec<Layout<'m>> {
 /// Services in the order in which their messages are to be tried.
 fn in_order(library: &Library) -> Vec<&Service> {
     let mut services: Vec<_> = library.services().map(AsRef::<Service>::as_ref).collect();
-    services.sort_by_key(|service| (is_built_in(service), Reverse(service.id.version)));
+    services.sort_by_key(|service| {
+        (
+            catalogue::holds(&service.location),
+            Reverse(service.id.version),
+        )
+    });
     services
-}
-
-fn is_built_in(service: &Service) -> bool {
-    catalogue::find(&service.id)
-        .is_some_and(|entry| *service.location.file == *Path::new("catalogue").join(entry.path))
 }
 
 fn introduction(library: &Library, layouts: usize) -> String {

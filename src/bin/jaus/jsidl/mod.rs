@@ -1,6 +1,9 @@
 //! `jaus jsidl`: work on service definitions, one file per subcommand.
 
 mod check;
+mod lua;
+mod rust;
+mod sources;
 
 use std::process::ExitCode;
 
@@ -20,12 +23,16 @@ pub(crate) struct Jsidl {
 #[derive(Subcommand)]
 enum Command {
     Check(check::Arguments),
+    Rust(rust::Arguments),
+    Lua(lua::Arguments),
 }
 
 impl Jsidl {
     pub(crate) fn run(self) -> Result<ExitCode, Failure> {
         match self.command {
             Command::Check(arguments) => check::run(&arguments),
+            Command::Rust(arguments) => rust::run(&arguments),
+            Command::Lua(arguments) => lua::run(&arguments),
         }
     }
 }

@@ -1,0 +1,15 @@
+//! A component that offers the service. Ask it with
+//! `jaus query 101.1.40 QueryLamp --jsidl services --host 127.0.0.1`.
+
+use jaus::component::{Component, Kind};
+use jaus::node::{Config, Node};
+
+#[tokio::main(flavor = "current_thread")]
+async fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let node = Node::start(Config::loopback(101, 1))?;
+    let lamp = Component::builder(Kind::Vehicle, "Lamp")
+        .offer(own_service::service())
+        .attach(&node, 40)?;
+    println!("{} is up; Ctrl-C ends it", lamp.id());
+    Ok(tokio::signal::ctrl_c().await?)
+}

@@ -1,0 +1,37 @@
+//! Random messages of every type that comes with the crate: tshark prints the values that our own
+//! codec reads.
+
+use jsidl::dynamic::{arbitrary, encode};
+
+use crate::golden::check_source;
+use crate::tshark;
+
+/// Octets that look random and are always the same (an xorshift generator).
+fn entropy(seed: u64) -> Vec<u8> {
+    let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+    let mut octet = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state.to_le_bytes()[3]
+    };
+    (0..300).map(|_| octet()).collect()
+}
+
+#[test]
+fn tshark_prints_the_values_of_random_messages_of_every_built_in_type() {
+    if !tshark::is_there() {
+        return;
+    }
+    let mut loader = jsidl::Loader::new();
+    loader.catalogue();
+    let library = loader.load().library;
+    let messages = library.services().flat_map(|service| service.messages());
+    let vectors: Vec<_> = (0..)
+        .zip(messages)
+        .filter_map(|(seed, message)| encode(message, &arbitrary(message, &entropy(seed))).ok())
+        .collect();
+    assert!(vectors.len() > 200, "{} messages", vectors.len());
+    let checked = check_source(&library, "random", &vectors);
+    assert_eq!(checked, vectors.len());
+}

@@ -1,0 +1,76 @@
+//! The definitions that something is to be made from, and the files that are made.
+
+use std::fs;
+use std::path::Path;
+
+use jaus::cli::failure::Failure;
+use jaus::cli::output::say;
+use jsidl::{Library, Loaded, Loader, catalogue};
+
+/// What was loaded, with what is wrong in it said on standard error.
+pub(super) struct Sources {
+    pub(super) loaded: Loaded,
+    /// Whether the user's own files are without errors.
+    pub(super) sound: bool,
+}
+
+/// Loads files and directories, which may refer to each other and to the built-in definitions.
+pub(super) fn load<P: AsRef<Path>>(paths: &[P]) -> Result<Sources, Failure> {
+    let mut loader = Loader::new();
+    for path in paths {
+        let path = path.as_ref();
+        path.metadata()
+            .map_err(|error| Failure::file(path, &error))?;
+        loader.path(path);
+    }
+    loader.catalogue();
+    let loaded = loader.load();
+    let mut sound = true;
+    for error in loaded.diagnostics.errors() {
+        // What built-in definitions suffer from the user's is not what the user can mend.
+        if !catalogue::holds(&error.location) {
+            say(error);
+            sound = false;
+        }
+    }
+    Ok(Sources { loaded, sound })
+}
+
+/// The services of the user's own files alone.
+pub(super) fn own(library: &Library) -> Library {
+    let mut own = Library::default();
+    let services = library.services();
+    for service in services.filter(|service| !catalogue::holds(&service.location)) {
+        own.insert(service.clone());
+    }
+    own
+}
+
+/// Writes a file, and makes the directories that lead to it.
+pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    if let Some(parent) = path
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty())
+    {
+        fs::create_dir_all(parent).map_err(|error| Failure::file(parent, &error))?;
+    }
+    fs::write(path, text).map_err(|error| Failure::file(path, &error))
+}
+
+/// For example `3 services with 14 messages`.
+pub(super) fn summary(library: &Library) -> String {
+    let messages = library.services().map(|s| s.messages().count()).sum();
+    format!(
+        "{} with {}",
+        counted(library.services().count(), "service"),
+        counted(messages, "message")
+    )
+}
+
+fn counted(count: usize, what: &str) -> String {
+    if count == 1 {
+        format!("1 {what}")
+    } else {
+        format!("{count} {what}s")
+    }
+}
