@@ -110,9 +110,7 @@ fn theirs(script: &Path, path: &Path) -> Packets {
 
 fn packet(line: &str) -> (u64, (Vec<String>, bool)) {
     let columns: Vec<_> = line.split('\t').collect();
-    let [number, info, malformed, unknown, fault] = columns[..] else {
-        panic!("{line}");
-    };
+    let [number, info, malformed, unknown, fault]: [&str; 5] = columns[..].try_into().unwrap();
     assert_eq!(fault, "", "a fault of the script: {line}");
     let name = |message: &str| {
         // `Name (from 3 fragments) 1.1.1 -> 2.1.1`

@@ -1,5 +1,5 @@
 //! A component that offers the service. Ask it with
-//! `jaus query 101.1.40 QueryLamp --jsidl services --host 127.0.0.1`.
+//! `jaus query --loopback --jsidl services 101.1.40 QueryLamp`.
 
 use jaus::component::{Component, Kind};
 use jaus::node::{Config, Node};

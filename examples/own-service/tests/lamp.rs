@@ -15,7 +15,7 @@ async fn the_lamp_is_as_bright_as_it_was_set() -> Result<(), Box<dyn std::error:
 
     let brightness = Brightness::new(40.0)?;
     client.send(lamp.id(), &SetLamp { brightness })?;
-    let report: ReportLamp = client.query(lamp.id(), &QueryLamp::default()).await?;
+    let report: ReportLamp = client.query(lamp.id(), &QueryLamp).await?;
     assert_eq!(report.brightness_percent(), 40.0);
     Ok(())
 }
