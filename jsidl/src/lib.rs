@@ -26,6 +26,7 @@ mod diagnostic;
 pub mod dynamic;
 #[cfg(feature = "excerpts")]
 mod excerpt;
+pub mod explain;
 mod expr;
 mod library;
 mod loader;

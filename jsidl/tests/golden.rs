@@ -9,25 +9,13 @@
 mod support;
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
 
-use jsidl::Library;
 use jsidl::dynamic::{
     decode, encode, from_json, raw_from_real, real_from_raw, shortest_real, to_json,
 };
-use jsidl::model::{
-    Id, Item, Meaning, Message, Number, Rounding, Scalar, Scale, Shape, Unsigned, Version,
-};
+use jsidl::model::{Item, Meaning, Message, Number, Rounding, Scalar, Scale, Shape, Unsigned};
 use serde_json::{Map, Value as Json, json};
-
-/// The lines of a file of golden data.
-fn lines(path: &Path) -> Vec<Json> {
-    let text = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
-}
+use support::golden;
 
 fn scale_of(row: &Json) -> (Scale, Unsigned) {
     let width = match row["type"].as_str().unwrap() {
@@ -53,7 +41,7 @@ fn real_numbers_become_the_integers_of_exact_rounding() {
     let Some(shared) = support::shared() else {
         return;
     };
-    let rows = lines(&shared.join("golden/scaling_encode.jsonl"));
+    let rows = golden::lines(&shared.join("golden/scaling_encode.jsonl"));
     for row in &rows {
         let (scale, width) = scale_of(row);
         let raw = raw_from_real(&scale, width, row["real"].as_f64().unwrap());
@@ -68,7 +56,7 @@ fn integers_become_the_real_numbers_they_stand_for() {
     let Some(shared) = support::shared() else {
         return;
     };
-    let rows = lines(&shared.join("golden/scaling_decode.jsonl"));
+    let rows = golden::lines(&shared.join("golden/scaling_decode.jsonl"));
     for row in &rows {
         let (scale, width) = scale_of(row);
         let raw = row["raw"].as_u64().unwrap();
@@ -86,58 +74,6 @@ fn integers_become_the_real_numbers_they_stand_for() {
     }
     println!("{} integers", rows.len());
     assert!(rows.len() > 300);
-}
-
-/// Where the definitions of a source lie, the source's own first.
-fn directories(shared: &Path, source: &str) -> Vec<PathBuf> {
-    let corpus = shared.join("jsidl-corpus");
-    // Types and services of one set are used in others of the same family.
-    match source.split_once('-') {
-        Some(("jts", "examples")) => vec![corpus.join(source), corpus.join("jts")],
-        Some((family, set)) => {
-            let family = corpus.join(family);
-            vec![family.join(format!("urn.jaus.jss.{set}")), family]
-        }
-        None => vec![corpus.join(source)],
-    }
-}
-
-fn load(shared: &Path, source: &str) -> Library {
-    let mut loader = jsidl::Loader::new();
-    for directory in directories(shared, source) {
-        loader.path(directory);
-    }
-    loader.load().library
-}
-
-fn id_of(row: &Json) -> Id {
-    let (major, minor) = row["version"].as_str().unwrap().split_once('.').unwrap();
-    let version = Version {
-        major: major.parse().unwrap(),
-        minor: minor.parse().unwrap(),
-    };
-    Id {
-        urn: row["service_id"].as_str().unwrap().into(),
-        version,
-    }
-}
-
-fn message_of<'a>(library: &'a Library, row: &Json) -> &'a Message {
-    let id = id_of(row);
-    let service = library
-        .service(&id)
-        .unwrap_or_else(|| panic!("service {id} is not loaded"));
-    let code = u16::from_str_radix(row["message_id"].as_str().unwrap(), 16).unwrap();
-    let mut messages = service.messages();
-    messages
-        .find(|message| message.code == code && row["message"] == message.name)
-        .unwrap_or_else(|| panic!("{id} has no message {} {code:04X}h", row["message"]))
-}
-
-fn octets_of(hex: &Json) -> Vec<u8> {
-    let hex = hex.as_str().unwrap().as_bytes();
-    let octet = |pair: &[u8]| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
-    hex.chunks(2).map(octet).collect()
 }
 
 /// Which number of a scaled field goes into the JSON.
@@ -262,7 +198,7 @@ fn integer(golden: &Json) -> Json {
 
 /// Checks one vector: octets to view, octets to octets, and both views to octets.
 fn check(message: &Message, row: &Json) {
-    let octets = octets_of(&row["hex"]);
+    let octets = golden::octets_of(&row["hex"]);
     let value = decode(message, &octets).unwrap_or_else(|error| panic!("{error}\n{row}"));
     assert_eq!(encode(message, &value).as_ref(), Ok(&octets), "{row}");
     let body = |real| match &message.body {
@@ -284,39 +220,16 @@ fn check(message: &Message, row: &Json) {
     }
 }
 
-/// The files of golden messages.
-fn golden_files(shared: &Path) -> Vec<PathBuf> {
-    let mut files: Vec<_> = fs::read_dir(shared.join("golden"))
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| {
-            path.extension()
-                .is_some_and(|extension| extension == "jsonl")
-        })
-        .filter(|path| {
-            !path
-                .file_name()
-                .unwrap()
-                .to_string_lossy()
-                .starts_with("scaling_")
-        })
-        .collect();
-    files.sort();
-    files
-}
-
 #[test]
 fn every_golden_message_is_read_shown_and_written_as_it_is() {
     let Some(shared) = support::shared() else {
         return;
     };
     let mut total = 0;
-    for file in golden_files(&shared) {
-        let source = file.file_stem().unwrap().to_str().unwrap();
-        let library = load(&shared, source);
-        let rows = lines(&file);
+    for (source, rows) in golden::sources(&shared) {
+        let library = golden::load(&shared, &source);
         for row in &rows {
-            check(message_of(&library, row), row);
+            check(golden::message_of(&library, row), row);
         }
         println!("{source}: {} vectors", rows.len());
         total += rows.len();
@@ -349,13 +262,13 @@ fn our_own_definitions_read_show_and_write_the_golden_messages_of_their_services
     loader.catalogue();
     let ours = loader.load().library;
     let mut vectors = BTreeMap::<String, usize>::new();
-    for row in golden_files(&shared).iter().flat_map(|file| lines(file)) {
-        let id = id_of(&row);
+    for row in golden::sources(&shared).into_iter().flat_map(|(_, rows)| rows) {
+        let id = golden::id_of(&row);
         let other = |&(source, message): &(&str, &str)| {
             row["source"] == source && row["message"] == message
         };
         if ours.service(&id).is_some() && !LAID_OUT_OTHERWISE.iter().any(other) {
-            check(message_of(&ours, &row), &row);
+            check(golden::message_of(&ours, &row), &row);
             *vectors.entry(id.to_string()).or_default() += 1;
         }
     }

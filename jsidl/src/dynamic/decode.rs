@@ -4,9 +4,10 @@
 //! made for the next: a count that the octets cannot pay for ends in an error, not in memory.
 
 use super::error::{DecodeError, DecodeProblem, Fault, Step};
+use super::trace::{Part, Place, Trace};
 use super::{EmptyElements, Limits, Raw, Value};
 use crate::model::{
-    Array, Count, Group, Item, List, Message, Number, Shape, Signed, Unsigned, Variant,
+    Array, Count, Group, Item, List, Message, Number, Scalar, Shape, Signed, Unsigned, Variant,
 };
 
 /// Reads a whole message: its code, header, body and footer, and nothing behind it.
@@ -25,11 +26,22 @@ pub fn decode(message: &Message, octets: &[u8]) -> Result<Value, DecodeError> {
 /// # Errors
 /// As [`decode`], but no [`DecodeProblem::Count`] if limits are ignored.
 pub fn decode_with(message: &Message, octets: &[u8], limits: Limits) -> Result<Value, DecodeError> {
+    decode_traced(message, octets, limits, ())
+}
+
+/// [`decode_with`], telling which octets became which field.
+pub(crate) fn decode_traced<'m>(
+    message: &'m Message,
+    octets: &[u8],
+    limits: Limits,
+    trace: impl Trace<'m>,
+) -> Result<Value, DecodeError> {
     let mut reader = Reader {
         octets,
         position: 0,
         limits,
         empty: EmptyElements::new(),
+        trace,
     };
     reader
         .message(message)
@@ -38,15 +50,16 @@ pub fn decode_with(message: &Message, octets: &[u8], limits: Limits) -> Result<V
 
 type Read<T> = Result<T, Fault<DecodeProblem>>;
 
-struct Reader<'a> {
+struct Reader<'a, T> {
     octets: &'a [u8],
     position: usize,
     limits: Limits,
     empty: EmptyElements,
+    trace: T,
 }
 
-impl<'a> Reader<'a> {
-    fn message(&mut self, message: &Message) -> Read<Value> {
+impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
+    fn message(&mut self, message: &'m Message) -> Read<Value> {
         let found = u16::from_le_bytes(self.array()?);
         if found != message.code {
             return Err(Fault::at(
@@ -57,6 +70,7 @@ impl<'a> Reader<'a> {
                 },
             ));
         }
+        self.told(0, Part::Code(message));
         let value = if message.header.is_none() && message.footer.is_none() {
             self.section(message.body.as_ref())?
                 .unwrap_or(Value::Group(Vec::new()))
@@ -72,25 +86,36 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn section(&mut self, section: Option<&Item>) -> Read<Option<Value>> {
+    fn section(&mut self, section: Option<&'m Item>) -> Read<Option<Value>> {
         section.map(|item| self.shape(&item.shape)).transpose()
     }
 
-    fn shape(&mut self, shape: &Shape) -> Read<Value> {
+    fn shape(&mut self, shape: &'m Shape) -> Read<Value> {
         Ok(match shape {
             Shape::Group(group) => self.group(group)?,
             Shape::List(list) => self.list(list)?,
             Shape::Variant(variant) => self.variant(variant)?,
-            Shape::Scalar(scalar) => Value::Number(self.number(scalar.number)?),
-            Shape::Bits(bits) => Value::Bits(self.unsigned(bits.base)?),
+            Shape::Scalar(scalar) => Value::Number(self.scalar(scalar)?),
+            Shape::Bits(bits) => {
+                let start = self.position;
+                let raw = self.unsigned(bits.base)?;
+                self.told(start, Part::Bits(bits, raw));
+                Value::Bits(raw)
+            }
             Shape::FixedString { length } => Value::Text(self.padded(*length)?),
-            Shape::VariableString { count } => Value::Text(self.counted(count)?),
-            Shape::Blob { count, .. } => Value::Blob(self.counted(count)?),
-            Shape::FormattedBlob { count, .. } => {
+            Shape::VariableString { count } => Value::Text(self.counted(count, Part::Text)?),
+            Shape::Blob { count, format } => {
+                Value::Blob(self.counted(count, Part::Octets(format))?)
+            }
+            Shape::FormattedBlob { formats, count } => {
+                let start = self.position;
                 let [format] = self.array()?;
+                self.told(start, Part::Format(formats, format));
+                let name = formats.iter().find(|known| known.index == format);
+                let name = name.map_or("", |known| &known.name);
                 Value::Formatted {
                     format,
-                    octets: self.counted(count)?,
+                    octets: self.counted(count, Part::Octets(name))?,
                 }
             }
             Shape::Measure { choices } => {
@@ -98,16 +123,17 @@ impl<'a> Reader<'a> {
                 let [index] = self.array()?;
                 let choice = choices.iter().find(|choice| choice.index == index);
                 let choice = choice.ok_or(Fault::at(offset, DecodeProblem::Index { index }))?;
+                self.told(offset, Part::Index(choice));
                 Value::Measure {
                     index,
-                    number: self.number(choice.scalar.number)?,
+                    number: self.scalar(&choice.scalar)?,
                 }
             }
             Shape::Array(array) => self.elements_of_array(array)?,
         })
     }
 
-    fn group(&mut self, group: &Group) -> Read<Value> {
+    fn group(&mut self, group: &'m Group) -> Read<Value> {
         let mut presence = self.presence(group)?;
         let mut slots = Vec::with_capacity(group.members.len());
         for member in &group.members {
@@ -116,16 +142,27 @@ impl<'a> Reader<'a> {
                 presence >>= 1;
                 bit
             };
-            let read = |item: &Item| self.shape(&item.shape);
-            let value = present.then_some(member).map(read).transpose();
-            slots.push(value.map_err(|fault| fault.member(&member.name))?);
+            slots.push(if present {
+                Some(self.member(member)?)
+            } else {
+                self.trace.absent(member);
+                None
+            });
         }
         Ok(Value::Group(slots))
     }
 
+    /// A member of a group, or an alternative of a variant.
+    fn member(&mut self, member: &'m Item) -> Read<Value> {
+        self.trace.enter(Place::Member(member));
+        let value = self.shape(&member.shape);
+        self.trace.leave();
+        value.map_err(|fault| fault.member(&member.name))
+    }
+
     /// The presence vector; bits beyond the last optional member are refused, because encoding
     /// could not bring them back.
-    fn presence(&mut self, group: &Group) -> Read<u64> {
+    fn presence(&mut self, group: &'m Group) -> Read<u64> {
         let Some(width) = group.presence else {
             return Ok(0);
         };
@@ -141,6 +178,7 @@ impl<'a> Reader<'a> {
             .and_then(|shift| u64::MAX.checked_shl(shift))
             .map_or(0, |mask| vector & mask);
         if undefined == 0 {
+            self.told(offset, Part::Presence(group, width, vector));
             Ok(vector)
         } else {
             Err(Fault::at(
@@ -150,22 +188,23 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn list(&mut self, list: &List) -> Read<Value> {
+    fn list(&mut self, list: &'m List) -> Read<Value> {
         let count = self.count(&list.count)?;
         Ok(Value::List(self.elements(count, &list.element)?))
     }
 
-    fn elements_of_array(&mut self, array: &Array) -> Read<Value> {
+    fn elements_of_array(&mut self, array: &'m Array) -> Read<Value> {
         Ok(Value::Array(
             self.elements(array.elements(), &array.element)?,
         ))
     }
 
-    fn elements(&mut self, count: u64, element: &Item) -> Read<Vec<Value>> {
+    fn elements(&mut self, count: u64, element: &'m Item) -> Read<Vec<Value>> {
         let mut elements = Vec::new();
         for _ in 0..count {
             let start = self.position;
             let place = Step::Element(elements.len());
+            self.trace.enter(Place::Element(elements.len()));
             let value = match self.shape(&element.shape) {
                 Ok(value) => value,
                 Err(fault) => return Err(fault.under(place)),
@@ -173,12 +212,13 @@ impl<'a> Reader<'a> {
             if self.position == start && !self.empty.take() {
                 return Err(Fault::at(start, DecodeProblem::EmptyElements).under(place));
             }
+            self.trace.leave();
             elements.push(value);
         }
         Ok(elements)
     }
 
-    fn variant(&mut self, variant: &Variant) -> Read<Value> {
+    fn variant(&mut self, variant: &'m Variant) -> Read<Value> {
         let offset = self.position;
         let tag = self.unsigned(variant.tag)?;
         let alternatives = variant.alternatives.len();
@@ -187,22 +227,25 @@ impl<'a> Reader<'a> {
             .and_then(|tag| variant.alternatives.get(tag));
         match chosen {
             Some(item) => {
-                let value = self
-                    .shape(&item.shape)
-                    .map_err(|fault| fault.member(&item.name))?;
+                self.told(offset, Part::Tag(variant, tag));
                 Ok(Value::Variant {
                     tag,
-                    value: Some(Box::new(value)),
+                    value: Some(Box::new(self.member(item)?)),
                 })
             }
-            None if alternatives == 0 && tag == 0 => Ok(Value::Variant { tag, value: None }),
+            None if alternatives == 0 && tag == 0 => {
+                self.told(offset, Part::Tag(variant, tag));
+                Ok(Value::Variant { tag, value: None })
+            }
             None => Err(Fault::at(offset, DecodeProblem::Tag { tag, alternatives })),
         }
     }
 
     /// A fixed length string without its padding.
     fn padded(&mut self, length: u32) -> Read<Vec<u8>> {
+        let start = self.position;
         let octets = self.take(u64::from(length))?;
+        self.told(start, Part::Text);
         let end = octets
             .iter()
             .rposition(|&octet| octet != 0)
@@ -211,15 +254,19 @@ impl<'a> Reader<'a> {
     }
 
     /// A count of octets and the octets.
-    fn counted(&mut self, count: &Count) -> Read<Vec<u8>> {
+    fn counted(&mut self, count: &'m Count, part: Part<'m>) -> Read<Vec<u8>> {
         let length = self.count(count)?;
-        Ok(self.take(length)?.to_vec())
+        let start = self.position;
+        let octets = self.take(length)?.to_vec();
+        self.told(start, part);
+        Ok(octets)
     }
 
-    fn count(&mut self, count: &Count) -> Read<u64> {
+    fn count(&mut self, count: &'m Count) -> Read<u64> {
         let offset = self.position;
         let number = self.unsigned(count.unsigned)?;
         if self.limits.admit(count, number) {
+            self.told(offset, Part::Count(count, number));
             Ok(number)
         } else {
             let Count { min, max, .. } = *count;
@@ -232,6 +279,13 @@ impl<'a> Reader<'a> {
                 },
             ))
         }
+    }
+
+    fn scalar(&mut self, scalar: &'m Scalar) -> Read<Raw> {
+        let start = self.position;
+        let raw = self.number(scalar.number)?;
+        self.told(start, Part::Number(scalar, raw));
+        Ok(raw)
     }
 
     fn number(&mut self, number: Number) -> Read<Raw> {
@@ -281,6 +335,11 @@ impl<'a> Reader<'a> {
         };
         self.position += taken.len();
         Ok(taken)
+    }
+
+    /// Tells what the octets since `start` are.
+    fn told(&mut self, start: usize, part: Part<'m>) {
+        self.trace.read(start..self.position, part);
     }
 
     const fn left(&self) -> usize {

@@ -11,6 +11,7 @@ mod decode;
 mod encode;
 mod error;
 mod scale;
+pub(crate) mod trace;
 mod value;
 
 #[cfg(feature = "arbitrary")]
@@ -20,6 +21,7 @@ mod json;
 
 #[cfg(feature = "arbitrary")]
 pub use arbitrary::arbitrary;
+pub(crate) use decode::decode_traced;
 pub use decode::{decode, decode_with};
 pub use encode::{encode, encode_with};
 pub use error::{DecodeError, DecodeProblem, EncodeError, EncodeProblem, Path, Step};

@@ -4,7 +4,7 @@
 //! keeps the integers of the wire, so that decoding and encoding is exact; what they mean (names,
 //! units, scaling) is in the definition.
 
-use crate::model::{Array, Number, Shape, Signed, Unsigned};
+use crate::model::{Array, Number, Shape, Signed, SubField, Unsigned};
 
 /// What a message or a part of it holds.
 ///
@@ -129,7 +129,7 @@ impl Shape {
 
 impl Number {
     /// The type as the language spells it.
-    pub(super) const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Unsigned(Unsigned::U8) => "unsigned byte",
             Self::Unsigned(Unsigned::U16) => "unsigned short integer",
@@ -147,12 +147,23 @@ impl Number {
 
 impl Array {
     /// How many elements it has in all dimensions together.
-    pub(super) fn elements(&self) -> u64 {
+    pub(crate) fn elements(&self) -> u64 {
         let sizes = self.dimensions.iter().map(|&size| u64::from(size));
         if sizes.clone().any(|size| size == 0) {
             0
         } else {
             sizes.fold(1, u64::saturating_mul)
         }
+    }
+}
+
+impl SubField {
+    /// The bits that it owns; none where the definition reaches beyond 64.
+    pub(crate) const fn mask(&self) -> u64 {
+        if self.from > self.to || self.to >= u64::BITS as u8 {
+            return 0;
+        }
+        let width = self.to - self.from + 1;
+        (u64::MAX >> (u64::BITS as u8 - width)) << self.from
     }
 }

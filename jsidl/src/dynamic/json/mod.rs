@@ -30,7 +30,6 @@ pub use write::to_json;
 
 use super::Path;
 use super::error::{Fault, write_place};
-use crate::model::SubField;
 
 /// The key for the bits of a bit field that no sub-field owns.
 const RESERVED: &str = "_reserved";
@@ -106,16 +105,5 @@ impl Fault<JsonProblem> {
             path,
             problem,
         }
-    }
-}
-
-impl SubField {
-    /// The bits that it owns; none where the definition reaches beyond 64.
-    pub(super) const fn mask(&self) -> u64 {
-        if self.from > self.to || self.to >= u64::BITS as u8 {
-            return 0;
-        }
-        let width = self.to - self.from + 1;
-        (u64::MAX >> (u64::BITS as u8 - width)) << self.from
     }
 }

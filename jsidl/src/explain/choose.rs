@@ -1,0 +1,265 @@
+//! Which definition octets are explained by.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::rows::joined;
+use super::{Explanation, Kind, Row, explain_as};
+use crate::library::Library;
+use crate::model::{Id, Message, Service, Version};
+
+/// Messages within each other that are taken apart.
+const DEEPEST: usize = 4;
+
+/// A service as people name it: by its URN or the last part of it, with or without a version, as in
+/// `urn:jaus:jss:core:Events`, `urn:jaus:jss:core:Events 1.0` and `Events@1.0`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ServiceName {
+    /// The URN, or what stands behind its last colon.
+    pub urn: String,
+    /// The version; any if not given.
+    pub version: Option<Version>,
+}
+
+impl ServiceName {
+    /// Whether the service may be meant.
+    pub fn matches(&self, id: &Id) -> bool {
+        let last = id.urn.rsplit(':').next().unwrap_or_default();
+        let named = self.urn.eq_ignore_ascii_case(&id.urn) || self.urn.eq_ignore_ascii_case(last);
+        named && self.version.is_none_or(|version| version == id.version)
+    }
+}
+
+impl FromStr for ServiceName {
+    type Err = Unexplained;
+
+    fn from_str(text: &str) -> Result<Self, Unexplained> {
+        let text = text.trim();
+        let (urn, version) = match text.split_once([' ', '@']) {
+            Some((urn, version)) => (urn, Some(version.trim())),
+            None => (text, None),
+        };
+        let parsed = |text: &str| {
+            let (major, minor) = text.split_once('.')?;
+            Some(Version {
+                major: major.parse().ok()?,
+                minor: minor.parse().ok()?,
+            })
+        };
+        let version = version.map(|version| {
+            parsed(version).ok_or_else(|| Unexplained::Version {
+                text: version.to_owned(),
+            })
+        });
+        Ok(Self {
+            urn: urn.to_owned(),
+            version: version.transpose()?,
+        })
+    }
+}
+
+impl fmt::Display for ServiceName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.urn)?;
+        self.version
+            .map_or(Ok(()), |version| write!(f, " {version}"))
+    }
+}
+
+/// Why octets cannot be explained at all.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Unexplained {
+    /// Fewer octets than a message code has.
+    #[error("a message begins with the two octets of its code, here are {length}")]
+    TooShort {
+        /// How many there are.
+        length: usize,
+    },
+    /// No definition has this code.
+    #[error("no definition here has the message code {code:04X}h; name the file that has it")]
+    UnknownCode {
+        /// The code.
+        code: u16,
+    },
+    /// No service has this name.
+    #[error("there is no service {name}{}", .similar.as_ref().map_or_else(String::new, |id| format!("; perhaps {id} is meant")))]
+    UnknownService {
+        /// What was asked for.
+        name: ServiceName,
+        /// A service with a similar name.
+        similar: Option<Id>,
+    },
+    /// The service has no message with this code.
+    #[error("{name} has no message {code:04X}h; it is in {}", listed(.services))]
+    NotInService {
+        /// What was asked for.
+        name: ServiceName,
+        /// The code.
+        code: u16,
+        /// Who has it.
+        services: Vec<Id>,
+    },
+    /// Not the version of a service.
+    #[error("`{text}` is not a version; write it like 1.0")]
+    Version {
+        /// What was given.
+        text: String,
+    },
+}
+
+fn listed(ids: &[Id]) -> String {
+    let ids: Vec<_> = ids.iter().map(ToString::to_string).collect();
+    ids.join(", ")
+}
+
+/// Explains a whole message, which begins with its code.
+///
+/// Where several definitions have the code, newer versions are tried first, and the first that can
+/// be read to the end is taken; if there is none, the one that gets farthest. A service name
+/// restricts the choice to what that service declares or inherits.
+///
+/// # Errors
+/// If there is no code, or no such definition. What is wrong within a message is no error here:
+/// [`Explanation::stop`] tells it.
+pub fn explain(
+    library: &Library,
+    octets: &[u8],
+    service: Option<&ServiceName>,
+) -> Result<Explanation, Unexplained> {
+    let mut explanation = outermost(library, octets, service)?;
+    explanation.rows = opened(library, explanation.rows, DEEPEST);
+    Ok(explanation)
+}
+
+/// Puts the rows of messages that are carried within a message in the place of their octets.
+fn opened(library: &Library, rows: Vec<Row>, depth: usize) -> Vec<Row> {
+    if depth == 0 {
+        return rows;
+    }
+    let mut all = Vec::with_capacity(rows.len());
+    for mut row in rows {
+        if row.kind != Kind::Message {
+            all.push(row);
+            continue;
+        }
+        match outermost(library, &row.octets, None) {
+            Ok(inner) if inner.stop.is_none() => {
+                let inner = inner.shifted(row.offset);
+                let rows = opened(library, inner.rows, depth - 1);
+                all.extend(rows.into_iter().map(|mut inner| {
+                    inner.field = joined(&row.field, &inner.field);
+                    inner
+                }));
+            }
+            Ok(inner) => {
+                row.note = inner
+                    .stop
+                    .map(|stop| format!("a message that cannot be read: {stop}"));
+                all.push(row);
+            }
+            Err(_) => all.push(row),
+        }
+    }
+    all
+}
+
+fn outermost(
+    library: &Library,
+    octets: &[u8],
+    service: Option<&ServiceName>,
+) -> Result<Explanation, Unexplained> {
+    let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
+    let length = octets.len();
+    let code = code.ok_or(Unexplained::TooShort { length })?;
+    let candidates = match service {
+        Some(name) => of_service(library, name, code)?,
+        None => newest_first(library, code),
+    };
+    let mut explained: Vec<_> = candidates
+        .into_iter()
+        .map(|(service, message)| explain_with(service, message, octets))
+        .collect();
+    // The sort is stable: among equals the newest stays first.
+    explained.sort_by_key(|e| {
+        e.stop
+            .as_ref()
+            .map_or(0, |stop| octets.len() + 1 - stop.offset)
+    });
+    let mut explained = explained.into_iter();
+    let mut best = explained.next().ok_or(Unexplained::UnknownCode { code })?;
+    best.others = explained
+        .filter(|other| other.rows != best.rows)
+        .map(|other| other.service)
+        .collect();
+    best.others.dedup();
+    Ok(best)
+}
+
+fn explain_with(service: &Service, message: &Message, octets: &[u8]) -> Explanation {
+    let (rows, stop) = explain_as(message, octets);
+    Explanation {
+        message: message.name.clone(),
+        code: message.code,
+        service: service.id.clone(),
+        rows,
+        stop,
+        others: Vec::new(),
+    }
+}
+
+fn newest_first(library: &Library, code: u16) -> Vec<(&Service, &Message)> {
+    let mut all: Vec<_> = library
+        .by_code(code)
+        .map(|(service, message)| (service, message.as_ref()))
+        .collect();
+    all.sort_by_key(|(service, _)| std::cmp::Reverse(service.id.version));
+    all
+}
+
+fn of_service<'a>(
+    library: &'a Library,
+    name: &ServiceName,
+    code: u16,
+) -> Result<Vec<(&'a Service, &'a Message)>, Unexplained> {
+    let mut services: Vec<_> = library
+        .services()
+        .filter(|service| name.matches(&service.id))
+        .collect();
+    if services.is_empty() {
+        let name = name.clone();
+        let similar = similar(library, &name);
+        return Err(Unexplained::UnknownService { name, similar });
+    }
+    services.reverse();
+    let messages: Vec<_> = services
+        .into_iter()
+        .flat_map(|service| library.vocabulary(service))
+        .filter(|(_, message)| message.code == code)
+        .map(|(service, message)| (service, message.as_ref()))
+        .collect();
+    if !messages.is_empty() {
+        return Ok(messages);
+    }
+    let mut services: Vec<_> = library.by_code(code).map(|(s, _)| s.id.clone()).collect();
+    services.dedup();
+    Err(if services.is_empty() {
+        Unexplained::UnknownCode { code }
+    } else {
+        Unexplained::NotInService {
+            name: name.clone(),
+            code,
+            services,
+        }
+    })
+}
+
+/// A service whose name holds what was asked for, or that has it at another version.
+fn similar(library: &Library, name: &ServiceName) -> Option<Id> {
+    let wanted = name.urn.to_lowercase();
+    let wanted = wanted.rsplit(':').next().unwrap_or_default();
+    let ids = library.services().map(|service| &service.id);
+    ids.filter(|id| id.urn.to_lowercase().contains(wanted))
+        .last()
+        .cloned()
+}
