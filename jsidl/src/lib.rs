@@ -23,6 +23,7 @@ pub mod build;
 pub mod catalogue;
 mod check;
 mod diagnostic;
+pub mod docs;
 pub mod dynamic;
 #[cfg(feature = "excerpts")]
 mod excerpt;

@@ -1,0 +1,79 @@
+//! The values that a number may have, in words.
+
+use super::block::{Cell, Line, code, muted, text};
+use crate::model::{Meaning, Number, Scalar, Scale, Unsigned, ValueRange, ValueSet};
+
+/// Range and resolution, or the named values.
+pub(super) fn of(scalar: &Scalar) -> Cell {
+    match (&scalar.meaning, scalar.number) {
+        (Meaning::Scaled(scale), Number::Unsigned(width)) => scaled(scale, width),
+        (Meaning::Values(set), _) => of_set(set),
+        _ => Vec::new(),
+    }
+}
+
+fn scaled(scale: &Scale, width: Unsigned) -> Cell {
+    let step = (scale.upper - scale.lower) / width.max() as f64;
+    vec![
+        vec![text(format!(
+            "{} to {}",
+            number(scale.lower),
+            number(scale.upper)
+        ))],
+        vec![muted(format!("in steps of {}", significant(step)))],
+    ]
+}
+
+/// Named values, a line each, and ranges.
+pub(super) fn of_set(set: &ValueSet) -> Cell {
+    let ranges = set.ranges.iter().map(range);
+    let named = set.values.iter().map(|value| {
+        let line = vec![text(format!("{} ", value.index)), code(&value.name)];
+        explained(line, &value.interpretation)
+    });
+    named.chain(ranges).collect()
+}
+
+fn range(range: &ValueRange) -> Line {
+    let limit = |value, exclusive, word: &str| {
+        let exclusive = if exclusive { word } else { "" };
+        format!("{exclusive}{}", number(value))
+    };
+    let words = format!(
+        "{} to {}",
+        limit(range.lower, range.lower_exclusive, "above "),
+        limit(range.upper, range.upper_exclusive, "below ")
+    );
+    explained(vec![text(words)], &range.interpretation)
+}
+
+fn explained(mut line: Line, words: &str) -> Line {
+    if !words.is_empty() {
+        line.push(muted(format!(" {words}")));
+    }
+    line
+}
+
+/// A limit, without the digits of π that nobody reads.
+fn number(value: f64) -> String {
+    let shortened = (value * 1e6).round() / 1e6;
+    if shortened != 0.0 && (shortened - value).abs() < 1e-6 {
+        shortened.to_string()
+    } else {
+        value.to_string()
+    }
+}
+
+/// Three significant digits.
+fn significant(value: f64) -> String {
+    if !(1e-3..1e6).contains(&value) {
+        return format!("{value:.2e}");
+    }
+    let decimals = (2.0 - value.log10().floor()).clamp(0.0, 9.0) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
