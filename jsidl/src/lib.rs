@@ -35,6 +35,8 @@ pub mod lua;
 pub mod model;
 mod resolve;
 pub mod rust;
+#[cfg(feature = "json")]
+pub mod schema;
 mod source;
 mod syntax;
 
