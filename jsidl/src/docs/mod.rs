@@ -21,7 +21,7 @@ mod index;
 mod layout;
 mod machine;
 mod markdown;
-mod names;
+pub(crate) mod names;
 mod service;
 mod values;
 

@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::model::{Id, Message, Service};
 
 /// The pages of services, by identity.
-pub(super) struct Names(BTreeMap<Id, String>);
+pub(crate) struct Names(BTreeMap<Id, String>);
 
 impl Names {
     /// Gives every service a page whose name is its own even where the case of letters does not
     /// count: `core.Discovery.1.1`.
-    pub(super) fn new<'a>(services: impl Iterator<Item = &'a Service>) -> Self {
+    pub(crate) fn new<'a>(services: impl Iterator<Item = &'a Service>) -> Self {
         let mut taken = BTreeSet::from(["index".to_owned()]);
         let mut names = BTreeMap::new();
         for service in services {
@@ -27,7 +27,7 @@ impl Names {
     }
 
     /// The page of a service, if it has one.
-    pub(super) fn page(&self, id: &Id) -> Option<&str> {
+    pub(crate) fn page(&self, id: &Id) -> Option<&str> {
         self.0.get(id).map(String::as_str)
     }
 }

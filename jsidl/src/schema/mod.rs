@@ -22,10 +22,24 @@ mod shape;
 
 use serde_json::{Map, Value as Json, json};
 
+use crate::docs::names::Names;
+use crate::library::Library;
 use crate::model::{Message, Service};
 
 /// The dialect in which the schemas are written.
 pub const DIALECT: &str = "https://json-schema.org/draft/2020-12/schema";
+
+/// The schemas of all services that are wanted, each with the name of its file, for example
+/// `core.Discovery.1.1.schema.json`.
+pub fn files(library: &Library, wanted: impl Fn(&Service) -> bool) -> Vec<(String, Json)> {
+    let wanted = || library.services().map(AsRef::as_ref).filter(|s| wanted(s));
+    let names = Names::new(wanted());
+    let file = |service: &Service| {
+        let name = names.page(&service.id).unwrap_or_default();
+        (format!("{name}.schema.json"), of_service(service))
+    };
+    wanted().map(file).collect()
+}
 
 /// The schema of the messages that a service declares itself.
 pub fn of_service(service: &Service) -> Json {

@@ -1,8 +1,12 @@
 //! `jaus jsidl`: work on service definitions, one file per subcommand.
 
 mod check;
+mod datagram;
+mod docs;
+mod explain;
 mod lua;
 mod rust;
+mod schema;
 mod sources;
 
 use std::process::ExitCode;
@@ -25,6 +29,9 @@ enum Command {
     Check(check::Arguments),
     Rust(rust::Arguments),
     Lua(lua::Arguments),
+    Docs(docs::Arguments),
+    Schema(schema::Arguments),
+    Explain(explain::Arguments),
 }
 
 impl Jsidl {
@@ -33,6 +40,9 @@ impl Jsidl {
             Command::Check(arguments) => check::run(&arguments),
             Command::Rust(arguments) => rust::run(&arguments),
             Command::Lua(arguments) => lua::run(&arguments),
+            Command::Docs(arguments) => docs::run(&arguments),
+            Command::Schema(arguments) => schema::run(&arguments),
+            Command::Explain(arguments) => explain::run(&arguments),
         }
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use jaus::cli::failure::Failure;
 use jaus::cli::output::say;
+use jsidl::model::Service;
 use jsidl::{Library, Loaded, Loader, catalogue};
 
 /// What was loaded, with what is wrong in it said on standard error.
@@ -73,4 +74,19 @@ fn counted(count: usize, what: &str) -> String {
     } else {
         format!("{count} {what}s")
     }
+}
+
+/// Which services something is made of: the user's own, or all if no paths are given.
+pub(super) fn wanted<P>(
+    library: &Library,
+    paths: &[P],
+) -> Result<impl Fn(&Service) -> bool + use<P>, Failure> {
+    let all = paths.is_empty();
+    let wanted = move |service: &Service| all || !catalogue::holds(&service.location);
+    if library.services().any(|service| wanted(service)) {
+        return Ok(wanted);
+    }
+    Err(Failure::new(
+        "no service is usable in these files; `jaus jsidl check` says why",
+    ))
 }
