@@ -262,7 +262,10 @@ fn our_own_definitions_read_show_and_write_the_golden_messages_of_their_services
     loader.catalogue();
     let ours = loader.load().library;
     let mut vectors = BTreeMap::<String, usize>::new();
-    for row in golden::sources(&shared).into_iter().flat_map(|(_, rows)| rows) {
+    for row in golden::sources(&shared)
+        .into_iter()
+        .flat_map(|(_, rows)| rows)
+    {
         let id = golden::id_of(&row);
         let other = |&(source, message): &(&str, &str)| {
             row["source"] == source && row["message"] == message

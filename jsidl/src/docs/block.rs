@@ -36,6 +36,12 @@ pub(super) enum Block {
     Table(Table),
     /// Something that most readers pass over.
     Details { summary: String, blocks: Vec<Self> },
+    /// Source text of another language.
+    Source {
+        /// Its name in a fence of Markdown.
+        language: &'static str,
+        text: String,
+    },
     /// States, those within others inside them.
     States(Vec<StateBox>),
 }

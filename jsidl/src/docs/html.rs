@@ -84,6 +84,7 @@ fn block(out: &mut String, block: &Block) {
             blocks(out, inner);
             writeln!(out, "</details>")
         }
+        Block::Source { text, .. } => writeln!(out, "<pre><code>{}</code></pre>", escaped(text)),
         Block::States(boxes) => {
             states(out, boxes);
             Ok(())

@@ -1,7 +1,9 @@
 //! State machines: each state a box with what happens in it, those within others inside them.
 
 use super::block::{Block, Inline, Line, StateBox, code, heading, muted, text};
-use crate::behaviour::{Action, Declared, Machine, StateIndex, Transition, TransitionKind};
+use crate::behaviour::{
+    Action, Declared, Machine, StateIndex, Transition, TransitionKind, dot, mermaid,
+};
 use crate::library::Library;
 use crate::model::{Id, Service};
 
@@ -24,6 +26,14 @@ pub(super) fn blocks(library: &Library, service: &Service) -> Vec<Block> {
         let outermost = machine.states().filter(|(_, state)| state.parent.is_none());
         let boxes = outermost.map(|(index, _)| state(machine, index, &service.id));
         blocks.push(Block::States(boxes.collect()));
+        let drawings = [
+            ("Drawing for Mermaid", "mermaid", mermaid(machine)),
+            ("Drawing for Graphviz (DOT)", "dot", dot(machine)),
+        ];
+        blocks.extend(drawings.map(|(summary, language, text)| Block::Details {
+            summary: summary.to_owned(),
+            blocks: vec![Block::Source { language, text }],
+        }));
     }
     blocks
 }

@@ -58,6 +58,12 @@ fn block(out: &mut String, block: &Block) {
             blocks(out, inner);
             writeln!(out, "</details>")
         }
+        Block::Source { language, text } => {
+            // A fence that is longer than any run of its character in the text.
+            let runs = text.split(|c| c != '`').map(str::len);
+            let fence = "`".repeat(3.max(runs.max().unwrap_or(0) + 1));
+            writeln!(out, "{fence}{language}\n{}\n{fence}", text.trim_end())
+        }
         Block::States(boxes) => {
             states(out, boxes, 0);
             Ok(())
