@@ -426,3 +426,35 @@ proptest! {
         }
     }
 }
+
+/// The random events mean something: a component can be brought into every state of the machine.
+#[test]
+fn a_component_reaches_every_state_of_the_machine() {
+    let life = [
+        Happening::Emergency(1),
+        Happening::Condition(Condition::Initialized),
+        Happening::Clear(1),
+        Happening::Request(0, 90),
+        Happening::Command(0, 3),
+        Happening::Emergency(1),
+        Happening::Pass(6000),
+        Happening::Clear(1),
+        Happening::Condition(Condition::Failed),
+        Happening::Condition(Condition::Initialized),
+        Happening::Request(0, 90),
+        Happening::Command(0, 0),
+        Happening::Condition(Condition::Initialized),
+        Happening::Request(0, 90),
+        Happening::Command(0, 1),
+    ];
+    let mut pair = Pair::new(true);
+    let mut reached = vec![pair.machine.state()];
+    for happening in &life {
+        pair.happen(happening);
+        pair.agree();
+        reached.push(pair.machine.state());
+    }
+    for place in Place::ALL {
+        assert!(reached.contains(&place), "{place:?} among {reached:?}");
+    }
+}

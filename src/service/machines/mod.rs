@@ -3,6 +3,7 @@
 //! against the generated ones.
 
 mod control;
+mod events;
 mod random;
 mod recorder;
 mod table;
