@@ -22,6 +22,7 @@ pub mod door {
     /// The state machine `ReceiveFSM` of version 1.0, with what it inherits.
     #[allow(unused_variables, unreachable_patterns)]
     #[allow(clippy::if_same_then_else, clippy::nonminimal_bool)]
+    #[allow(clippy::needless_pass_by_value)]
     pub mod machine {
         use super::codec::machine::{Memory, Outcome};
 

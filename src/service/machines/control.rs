@@ -368,7 +368,7 @@ impl Pair {
                 );
             }
             Happening::Release(who) => {
-                self.hear(&client(who), &ReleaseControl, Event::ReleaseControl)
+                self.hear(&client(who), &ReleaseControl, Event::ReleaseControl);
             }
             Happening::Authority(who, authority_code) => {
                 self.hear(
@@ -380,7 +380,7 @@ impl Pair {
             Happening::Ask(who, 0) => self.hear(&client(who), &QueryStatus, Event::QueryStatus),
             Happening::Ask(who, 1) => self.hear(&client(who), &QueryControl, Event::QueryControl),
             Happening::Ask(who, 2) => {
-                self.hear(&client(who), &QueryAuthority, Event::QueryAuthority)
+                self.hear(&client(who), &QueryAuthority, Event::QueryAuthority);
             }
             Happening::Ask(who, _) => self.hear(&client(who), &QueryTimeout, Event::QueryTimeout),
             Happening::Command(who, 0) => self.hear(&client(who), &Reset, Event::Reset),

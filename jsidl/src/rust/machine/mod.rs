@@ -141,6 +141,7 @@ impl<'a> Emitter<'a> {
         .as_str()]);
         out.push("#[allow(unused_variables, unreachable_patterns)]");
         out.push("#[allow(clippy::if_same_then_else, clippy::nonminimal_bool)]");
+        out.push("#[allow(clippy::needless_pass_by_value)]");
         out.push(format!("pub mod {module} {{"));
         let memory = if self.remembers {
             "{Memory, Outcome}"
