@@ -1,0 +1,119 @@
+//! `jaus jsidl lua` and `jaus jsidl rust`: what is written where, and what mistakes lead to.
+#![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+mod cli_support;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use cli_support::jaus;
+
+/// The definition of the example crate.
+const LAMP: &str = "examples/own-service/services/Lamp.xml";
+
+/// An empty directory of one test's own.
+fn directory(test: &str) -> PathBuf {
+    let directory = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("jsidl_make")
+        .join(test);
+    let _ = fs::remove_dir_all(&directory);
+    fs::create_dir_all(&directory).unwrap();
+    directory
+}
+
+/// Runs `jaus jsidl` with these arguments; exit status, standard output, standard error.
+fn jsidl(arguments: &[&str]) -> (Option<i32>, String, String) {
+    let output = jaus().arg("jsidl").args(arguments).output().unwrap();
+    let text = |octets| String::from_utf8(octets).unwrap();
+    (
+        output.status.code(),
+        text(output.stdout),
+        text(output.stderr),
+    )
+}
+
+fn lamp() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(LAMP);
+    path.to_str().unwrap().to_owned()
+}
+
+/// A definition that refers to a type which does not exist.
+fn broken(directory: &Path) -> String {
+    let path = directory.join("Broken.xml");
+    let text = fs::read_to_string(lamp()).unwrap();
+    fs::write(&path, text.replacen("types.Header", "types.Haeder", 1)).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_dissector_has_the_users_messages_and_the_built_in_ones_unless_only_theirs_are_wanted() {
+    let directory = directory("lua");
+    let (all, only) = (directory.join("all"), directory.join("only.lua"));
+    let [all_path, only_path] = [&all, &only].map(|path| path.to_str().unwrap());
+    let (status, said, _) = jsidl(&["lua", &lamp(), "-o", all_path]);
+    assert_eq!(status, Some(0));
+    assert!(
+        said.starts_with(&format!("{all_path}/jaus.lua: ")),
+        "{said}"
+    );
+    let (status, said, _) = jsidl(&["lua", &lamp(), "--only", "-o", only_path]);
+    assert_eq!(status, Some(0));
+    assert_eq!(said, format!("{only_path}: 1 service with 3 messages\n"));
+    let all = fs::read_to_string(all.join("jaus.lua")).unwrap();
+    let only = fs::read_to_string(only).unwrap();
+    for script in [&all, &only] {
+        assert!(script.contains("\"jaus.setlamp.brightness\""));
+    }
+    let built_in = "\"jaus.reportidentification.identification\"";
+    assert!(all.contains(built_in) && !only.contains(built_in));
+}
+
+#[test]
+fn a_dissector_leaves_out_what_has_errors_and_a_rust_module_is_not_written() {
+    let directory = directory("broken");
+    let (path, out) = (broken(&directory), directory.to_str().unwrap());
+    let (status, script, said) = jsidl(&["lua", &path]);
+    assert_eq!(status, Some(1));
+    assert!(said.contains("Haeder"), "{said}");
+    assert!(script.contains("jaus.reportidentification"));
+
+    let (status, _, said) = jsidl(&["rust", &path, "-o", out]);
+    assert_eq!(status, Some(1));
+    assert!(
+        said.contains("Haeder") && said.contains("nothing was written"),
+        "{said}"
+    );
+    assert!(!directory.join("messages.rs").exists());
+}
+
+#[test]
+fn a_rust_module_has_the_users_messages_alone() {
+    let directory = directory("rust");
+    let arguments = [
+        "rust",
+        &lamp(),
+        "-o",
+        directory.to_str().unwrap(),
+        "--module",
+        "lamps",
+    ];
+    let (status, said, _) = jsidl(&arguments);
+    assert_eq!(status, Some(0));
+    assert!(
+        said.ends_with("lamps.rs: 1 service with 3 messages\n"),
+        "{said}"
+    );
+    let text = fs::read_to_string(directory.join("lamps.rs")).unwrap();
+    assert!(text.contains("pub struct SetLamp") && !text.contains("QueryIdentification"));
+}
+
+#[test]
+fn paths_that_are_not_there_are_named() {
+    for command in ["lua", "rust"] {
+        let (status, _, said) = jsidl(&[command, "nowhere.xml", "-o", "nowhere"]);
+        assert_eq!(status, Some(2));
+        assert!(said.contains("nowhere.xml: No such file"), "{said}");
+    }
+    assert!(!Path::new("nowhere").exists());
+}
