@@ -7,7 +7,7 @@ mod cli_support;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use cli_support::jaus;
+use cli_support::{Run, run};
 
 /// The definition of the example crate.
 const LAMP: &str = "examples/own-service/services/Lamp.xml";
@@ -22,15 +22,9 @@ fn directory(test: &str) -> PathBuf {
     directory
 }
 
-/// Runs `jaus jsidl` with these arguments; exit status, standard output, standard error.
-fn jsidl(arguments: &[&str]) -> (Option<i32>, String, String) {
-    let output = jaus().arg("jsidl").args(arguments).output().unwrap();
-    let text = |octets| String::from_utf8(octets).unwrap();
-    (
-        output.status.code(),
-        text(output.stdout),
-        text(output.stderr),
-    )
+/// Runs `jaus jsidl` with these arguments.
+fn jsidl(arguments: &[&str]) -> Run {
+    run(&[&["jsidl"], arguments].concat(), b"")
 }
 
 fn lamp() -> String {
@@ -51,15 +45,16 @@ fn a_dissector_has_the_users_messages_and_the_built_in_ones_unless_only_theirs_a
     let directory = directory("lua");
     let (all, only) = (directory.join("all"), directory.join("only.lua"));
     let [all_path, only_path] = [&all, &only].map(|path| path.to_str().unwrap());
-    let (status, said, _) = jsidl(&["lua", &lamp(), "-o", all_path]);
-    assert_eq!(status, Some(0));
-    assert!(
-        said.starts_with(&format!("{all_path}/jaus.lua: ")),
-        "{said}"
+    let ran = jsidl(&["lua", &lamp(), "-o", all_path]);
+    assert_eq!(ran.status, 0);
+    let begins = format!("{all_path}/jaus.lua: ");
+    assert!(ran.stdout.starts_with(&begins), "{ran:?}");
+    let ran = jsidl(&["lua", &lamp(), "--only", "-o", only_path]);
+    assert_eq!(ran.status, 0);
+    assert_eq!(
+        ran.stdout,
+        format!("{only_path}: 1 service with 3 messages\n")
     );
-    let (status, said, _) = jsidl(&["lua", &lamp(), "--only", "-o", only_path]);
-    assert_eq!(status, Some(0));
-    assert_eq!(said, format!("{only_path}: 1 service with 3 messages\n"));
     let all = fs::read_to_string(all.join("jaus.lua")).unwrap();
     let only = fs::read_to_string(only).unwrap();
     for script in [&all, &only] {
@@ -73,16 +68,16 @@ fn a_dissector_has_the_users_messages_and_the_built_in_ones_unless_only_theirs_a
 fn a_dissector_leaves_out_what_has_errors_and_a_rust_module_is_not_written() {
     let directory = directory("broken");
     let (path, out) = (broken(&directory), directory.to_str().unwrap());
-    let (status, script, said) = jsidl(&["lua", &path]);
-    assert_eq!(status, Some(1));
-    assert!(said.contains("Haeder"), "{said}");
-    assert!(script.contains("jaus.reportidentification"));
+    let ran = jsidl(&["lua", &path]);
+    assert_eq!(ran.status, 1);
+    assert!(ran.stderr.contains("Haeder"), "{ran:?}");
+    assert!(ran.stdout.contains("jaus.reportidentification"));
 
-    let (status, _, said) = jsidl(&["rust", &path, "-o", out]);
-    assert_eq!(status, Some(1));
+    let ran = jsidl(&["rust", &path, "-o", out]);
+    assert_eq!(ran.status, 1);
     assert!(
-        said.contains("Haeder") && said.contains("nothing was written"),
-        "{said}"
+        ran.stderr.contains("Haeder") && ran.stderr.contains("nothing was written"),
+        "{ran:?}"
     );
     assert!(!directory.join("messages.rs").exists());
 }
@@ -98,11 +93,12 @@ fn a_rust_module_has_the_users_messages_alone() {
         "--module",
         "lamps",
     ];
-    let (status, said, _) = jsidl(&arguments);
-    assert_eq!(status, Some(0));
+    let ran = jsidl(&arguments);
+    assert_eq!(ran.status, 0);
     assert!(
-        said.ends_with("lamps.rs: 1 service with 3 messages\n"),
-        "{said}"
+        ran.stdout
+            .ends_with("lamps.rs: 1 service with 3 messages\n"),
+        "{ran:?}"
     );
     let text = fs::read_to_string(directory.join("lamps.rs")).unwrap();
     assert!(text.contains("pub struct SetLamp") && !text.contains("QueryIdentification"));
@@ -111,9 +107,9 @@ fn a_rust_module_has_the_users_messages_alone() {
 #[test]
 fn paths_that_are_not_there_are_named() {
     for command in ["lua", "rust"] {
-        let (status, _, said) = jsidl(&[command, "nowhere.xml", "-o", "nowhere"]);
-        assert_eq!(status, Some(2));
-        assert!(said.contains("nowhere.xml: No such file"), "{said}");
+        let ran = jsidl(&[command, "nowhere.xml", "-o", "nowhere"]);
+        assert_eq!(ran.status, 2);
+        assert!(ran.stderr.contains("nowhere.xml: No such file"), "{ran:?}");
     }
     assert!(!Path::new("nowhere").exists());
 }

@@ -190,21 +190,21 @@ fn what_does_not_fit_its_definition_is_said_with_its_place() {
     let bad: [(&[u8], &str); 6] = [
         (
             &IDENTIFICATION[..8],
-            "ReportIdentification, octet 4 of the body: 5 octets are needed, 2 are left",
+            "ReportIdentification, octet 4 of the body: octets needed: 5, left: 2",
         ),
         (
             b"\x00\x2B",
-            "octet 0 of the body: 1 octets are needed, 0 are left",
+            "octet 0 of the body: octets needed: 1, left: 0",
         ),
         (
             b"\x00\x2B\x02\x03",
-            "octet 1 of the body: 1 octets behind the message's end",
+            "octet 1 of the body: octets behind the message's end: 1",
         ),
         (b"\x02", "a message begins with the two octets of its code"),
         // Query Velocity State with a presence vector is a plain field; its report's is not.
         (b"\x04\x44\x00\xF8", "the presence vector has bits above"),
         // Set Element: a list that is shorter than its count.
-        (b"\x1A\x04\x01\xFF", "octets are needed, 0 are left"),
+        (b"\x1A\x04\x01\xFF", "octets needed: 2, left: 0"),
     ];
     let mut packets = Packets::new();
     for (octets, _) in bad {

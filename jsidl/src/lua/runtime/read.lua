@@ -16,7 +16,7 @@ local function take(reader, length)
     local at = reader.position
     local left = reader.limit - at
     if length > left then
-        fault(at, string.format("%.0f octets are needed, %d are left", length, left))
+        fault(at, string.format("octets needed: %.0f, left: %d", length, left))
     end
     reader.position = at + length
     return at
@@ -317,7 +317,7 @@ local function read_by(definition, tvb, at, limit, depth)
         end
         if reader.position < limit then
             local left = limit - reader.position
-            fault(reader.position, string.format("%d octets behind the message's end", left))
+            fault(reader.position, string.format("octets behind the message's end: %d", left))
         end
     end)
     if fine then

@@ -7,6 +7,22 @@ local function name_of(message)
     return definition and definition.name or string.format("message %04Xh", message.code)
 end
 
+-- The first message among nodes and what is in them.
+local function first_inside(nodes)
+    for _, node in ipairs(nodes or {}) do
+        local message = node.message or first_inside(node.children)
+        if message then
+            return message
+        end
+    end
+end
+
+-- A message's name, with that of the message in it: `Event (ReportLocalPose)`.
+local function summary_of(message)
+    local inner = first_inside(message.nodes)
+    return inner and string.format("%s (%s)", name_of(message), name_of(inner)) or name_of(message)
+end
+
 -- The item of a node; nil for a value that a fault left unread.
 local function add_item(tree, tvb, node, fault_at)
     if node.octets then

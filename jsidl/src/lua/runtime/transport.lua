@@ -39,7 +39,7 @@ local function parse_as5669a(tvb, at)
     if size < AS5669A_LEAST + extra then
         return problem_at(at, string.format("the data size %d is less than that of an empty message", size))
     elseif size > available then
-        return problem_at(at, string.format("the data size is %d, and %d octets are left", size, available))
+        return problem_at(at, string.format("the data size is %d; octets left: %d", size, available))
     end
     local flags = tvb:range(at + 3 + extra, 1):uint()
     return {
@@ -63,7 +63,7 @@ local function parse_ra(tvb, at, version)
     if not data_control then
         return problem_at(at + 12, "the data control is not defined")
     elseif size > available - RA_HEADER then
-        return problem_at(at + 12, string.format("the data size is %d, and %d octets are left", size,
+        return problem_at(at + 12, string.format("the data size is %d; octets left: %d", size,
             available - RA_HEADER))
     end
     return {
@@ -172,7 +172,7 @@ local function show_payload(tree, tvb, frame, frame_number)
         return "no message"
     end
     show_message(tree, message)
-    return name_of(message)
+    return summary_of(message)
 end
 
 -- Shows a frame as a tree of its own. Answers its summary.
