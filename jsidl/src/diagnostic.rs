@@ -14,7 +14,8 @@ use crate::source::{Sources, Span};
 pub enum Severity {
     /// Usable, but the author should look at it. Published definitions have such findings.
     Warning,
-    /// What it concerns is left out of the library.
+    /// What it concerns is left out of the library, or, of a state machine that could be read, can
+    /// never happen.
     Error,
 }
 

@@ -88,22 +88,25 @@ fn every_example_resolves_beside_the_core_services() {
     );
 }
 
-/// `CBRNDetection` cannot be encoded: 14 optional members and 8 presence bits.
+/// `CBRNDetection` cannot be encoded: 14 optional members and 8 presence bits. `Management` 1.0 has
+/// a transition on an event that nobody declares.
 #[test]
-fn of_fkie_only_the_message_that_cannot_be_encoded_is_left_out() {
+fn of_fkie_only_what_cannot_be_is_an_error() {
     let Some(corpus) = corpus() else { return };
     let loaded = load(&corpus, &["fkie"]);
     assert_eq!(counts(&loaded), (129, 753));
     assert_eq!(
         findings(&loaded, Severity::Error),
         [
+            "Management.xml: nothing triggers this transition: `Ready` is neither an event nor a message of the service or of one that it inherits from, so declare it in the `internal_events_set`, or correct the name",
             "CBRNSensor.xml: `CBRNDetection` is left out of `urn:jaus:jss:iop:CBRNSensor 1.1`, because what it refers to is missing or has errors",
             "CBRNSensorClass.xml: the record `CBRNRec` has 14 optional members, but its `presence_vector` has only 8 bits: use a wider `field_type_unsigned`",
         ]
     );
     // What is said about state machines is counted elsewhere.
     let mut warnings = findings(&loaded, Severity::Warning);
-    warnings.retain(|warning| !warning.contains("`initial_state`"));
+    warnings.retain(|w| !w.contains("`initial_state`") && !w.contains(": start there"));
+    warnings.retain(|w| !w.contains("`is_stateless`"));
     assert_eq!(
         warnings,
         [

@@ -1,13 +1,23 @@
-//! Rules for state machines: the states that they speak of should exist, in the same spelling.
+//! Rules for state machines: what they speak of exists, in the same spelling, and a service that
+//! extends a machine keeps what its base promises.
 //!
-//! All of them are warnings. The merged machine has an answer for each: a composite state begins in
-//! its first state, the case of letters is passed over, and a transition to nowhere leads nowhere.
+//! What no published definition needs is an error. Where published ones are careless and the
+//! merged machine has an answer (the case of letters is passed over, a composite state begins in
+//! its first state), it is a warning.
 
-use crate::behaviour::{Machine, Name, State, StateMachine, TransitionKind};
+use std::collections::HashMap;
+
+use super::triggers::Triggers;
+use crate::behaviour::{
+    Argument, Guard, Machine, MachineState, Name, State, StateMachine, Transition, TransitionKind,
+};
 use crate::diagnostic::Report;
 use crate::library::Library;
-use crate::model::Service;
+use crate::model::{Id, Service};
 use crate::source::Span;
+
+/// The internal events that services declare, by name.
+pub(crate) type Events<'a> = HashMap<&'a Id, Vec<&'a str>>;
 
 /// Looks at what a service itself says about its machines, beside what it inherits.
 /// `states_left` bounds the work for all services together.
@@ -15,6 +25,7 @@ pub(crate) fn behaviour(
     report: &mut Report,
     library: &Library,
     service: &Service,
+    events: &Events<'_>,
     states_left: &mut usize,
 ) {
     let Some(first) = service.behaviour.first() else {
@@ -33,10 +44,21 @@ pub(crate) fn behaviour(
     };
     *states_left = left;
     let machines = library.machines(service);
+    let base = library.lineage(service).nth(1);
+    let inherited = base.map_or_else(Vec::new, |base| library.machines(base));
+    let triggers = Triggers::of(library, service, events);
     for own in &service.behaviour {
         let same = |machine: &&Machine<'_>| machine.name() == &own.name;
+        let last = own.name.last();
+        let extended = |machine: &&Machine<'_>| machine.name().last().eq_ignore_ascii_case(last);
         if let Some(machine) = machines.iter().find(same) {
-            Check { report, machine }.machine(own);
+            let mut check = Check {
+                report,
+                machine,
+                base: inherited.iter().find(extended),
+                triggers: &triggers,
+            };
+            check.machine(own);
         }
     }
 }
@@ -44,11 +66,15 @@ pub(crate) fn behaviour(
 struct Check<'a> {
     report: &'a mut Report,
     machine: &'a Machine<'a>,
+    /// The machine that this one extends.
+    base: Option<&'a Machine<'a>>,
+    triggers: &'a Triggers<'a>,
 }
 
 impl Check<'_> {
     fn machine(&mut self, own: &StateMachine) {
         self.existing(own.span, "the start", &own.start);
+        self.refining(own);
         for state in &own.states {
             self.state(&Name::of(vec![&state.name]), state);
         }
@@ -56,9 +82,10 @@ impl Check<'_> {
 
     fn state(&mut self, path: &Name, own: &State) {
         self.initial(path, own);
-        for transition in own.transitions.iter().chain(&own.default_transitions) {
-            if let TransitionKind::To(end) | TransitionKind::Push(end) = &transition.kind {
-                self.existing(transition.span, "the `end_state`", end);
+        for transitions in [&own.transitions, &own.default_transitions] {
+            self.distinct(transitions);
+            for transition in transitions {
+                self.transition(transition);
             }
         }
         for child in &own.children {
@@ -66,24 +93,129 @@ impl Check<'_> {
         }
     }
 
-    /// A state with others inside says in which of them it begins.
+    fn transition(&mut self, transition: &Transition) {
+        if let TransitionKind::To(end) | TransitionKind::Push(end) = &transition.kind {
+            self.existing(transition.span, "the `end_state`", end);
+        }
+        let event = &transition.trigger.event;
+        if !self.triggers.know(event) {
+            let message = format!(
+                "nothing triggers this transition: `{event}` is neither an event nor a message of \
+                 the service or of one that it inherits from, so declare it in the \
+                 `internal_events_set`, or correct the name"
+            );
+            self.report.error(transition.span, message);
+        }
+        for name in unknown_variables(transition) {
+            let message = format!(
+                "`{name}` is not a parameter of this transition: add a `parameter`, or write a \
+                 text in `'`"
+            );
+            self.report.error(transition.span, message);
+        }
+    }
+
+    /// Of two transitions with the same trigger and guard the second is never taken.
+    fn distinct(&mut self, transitions: &[Transition]) {
+        for (position, transition) in transitions.iter().enumerate() {
+            let same = |other: &&Transition| {
+                other.trigger == transition.trigger && other.guard == transition.guard
+            };
+            let Some(first) = transitions[..position].iter().find(same) else {
+                continue;
+            };
+            let message = format!(
+                "the transition `{}` is there twice, with the same parameters and guard, and this \
+                 one is never taken: remove it, or change the guard",
+                transition.trigger.event
+            );
+            self.report
+                .error(transition.span, message)
+                .note(first.span, "the one that is taken");
+        }
+    }
+
+    /// A state with others inside says in which of them it begins, as its base does.
     fn initial(&mut self, path: &Name, own: &State) {
+        let merged = self.machine.find(path);
+        let merged = merged.map(|index| self.machine.state(index));
         if let Some(initial) = &own.initial {
-            self.existing(own.span, "the `initial_state`", &path.join(initial));
+            self.named_initial(own, &path.join(initial), merged);
+            self.same_as_in_base(path, own, initial);
             return;
         }
-        let merged = self
-            .machine
-            .find(path)
-            .map(|index| self.machine.state(index));
-        if let Some(merged) = merged
-            && merged.wanted_initial.is_none()
-            && let Some(first) = own.children.first()
-        {
+        let Some(first) = own.children.first() else {
+            return;
+        };
+        if merged.is_some_and(|merged| merged.wanted_initial.is_some()) {
+            return;
+        }
+        if own.children.len() > 1 {
+            let message = format!(
+                "the state `{path}` has {} others inside: say with `initial_state` in which of \
+                 them it begins",
+                own.children.len()
+            );
+            self.report.error(own.span, message);
+        } else {
             let message = format!(
                 "the state `{path}` has others inside, but no `initial_state`: it is taken to \
                  begin in `{}`",
                 first.name
+            );
+            self.report.warning(own.span, message);
+        }
+    }
+
+    /// Published machines name states that only other services have; the merged machine then begins
+    /// in its first state.
+    fn named_initial(&mut self, own: &State, path: &Name, merged: Option<&MachineState<'_>>) {
+        if self.machine.find(path).is_some() {
+            self.existing(own.span, "the `initial_state`", path);
+            return;
+        }
+        let children = merged.map_or(&[][..], |merged| &merged.children);
+        let message = match children.first() {
+            None => format!(
+                "the `initial_state` `{path}` does not exist, nor any other inside: remove the \
+                 attribute"
+            ),
+            Some(first) => format!(
+                "the `initial_state` `{path}` does not exist: it is taken to begin in `{}`",
+                self.machine.state(*first).path.last()
+            ),
+        };
+        self.report.warning(own.span, message);
+    }
+
+    fn same_as_in_base(&mut self, path: &Name, own: &State, initial: &str) {
+        let Some(base) = self.base else { return };
+        let inherited = base.find(path).map(|index| base.state(index));
+        let Some(wanted) = inherited.and_then(|state| state.wanted_initial) else {
+            return;
+        };
+        if !wanted.eq_ignore_ascii_case(initial) {
+            let message = format!(
+                "the `initial_state` of `{path}` is `{wanted}` in the service that is inherited \
+                 from: write the same"
+            );
+            self.report.warning(own.span, message);
+        }
+    }
+
+    /// A derived machine starts where its base does, or in a state within that.
+    fn refining(&mut self, own: &StateMachine) {
+        let Some(base) = self.base else { return };
+        let promised = &base.state(base.start()).path;
+        let start = &self.machine.state(self.machine.start()).path;
+        let same = |(a, b): (&String, &String)| a.eq_ignore_ascii_case(b);
+        let within = start.parts().len() >= promised.parts().len()
+            && promised.parts().iter().zip(start.parts()).all(same);
+        if !within {
+            let message = format!(
+                "`{}` starts in `{start}`, but the machine that it extends starts in \
+                 `{promised}`: start there, or in a state within",
+                own.name
             );
             self.report.warning(own.span, message);
         }
@@ -94,8 +226,11 @@ impl Check<'_> {
         match found.map(|index| &self.machine.state(index).path) {
             None => {
                 let name = self.machine.name();
-                let message = format!("{what} `{path}` is not a state of `{name}`: correct it");
-                self.report.warning(span, message);
+                let message = format!(
+                    "{what} `{path}` is not a state of `{name}`: add the state, or name one by \
+                     its whole path"
+                );
+                self.report.error(span, message);
             }
             Some(spelled) if spelled != path => {
                 let message = format!("{what} `{path}` is spelled `{spelled}` elsewhere");
@@ -103,5 +238,38 @@ impl Check<'_> {
             }
             Some(_) => {}
         }
+    }
+}
+
+/// What guards and actions are given although the trigger does not bring it along.
+fn unknown_variables(transition: &Transition) -> Vec<&Name> {
+    let mut arguments = Vec::new();
+    if let Some(guard) = &transition.guard {
+        given(guard, &mut arguments);
+    }
+    arguments.extend(transition.actions.iter().flat_map(|a| &a.arguments));
+    let parameters = &transition.trigger.parameters;
+    let unknown = arguments.into_iter().filter_map(|argument| match argument {
+        Argument::Variable(name) => Some(name),
+        Argument::Text(_) | Argument::Integer(_) => None,
+    });
+    let mut unknown: Vec<_> = unknown
+        .filter(|name| parameters.iter().all(|p| p.name != name.parts()[0]))
+        .collect();
+    unknown.sort();
+    unknown.dedup();
+    unknown
+}
+
+/// The arguments of all calls in a guard.
+fn given<'g>(guard: &'g Guard, arguments: &mut Vec<&'g Argument>) {
+    match guard {
+        Guard::Call(call) => arguments.extend(&call.arguments),
+        Guard::Not(inner) => given(inner, arguments),
+        Guard::And(left, right) | Guard::Or(left, right) | Guard::Compare(_, left, right) => {
+            given(left, arguments);
+            given(right, arguments);
+        }
+        Guard::Name(_) | Guard::Literal(_) => {}
     }
 }

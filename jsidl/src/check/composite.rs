@@ -105,18 +105,20 @@ pub(crate) fn group(
     (1..=bits).contains(&optional)
 }
 
-/// Only members of records and sequences may be optional.
-pub(crate) fn required(report: &mut Report, what: &str, node: &Node, item: &Item) -> bool {
-    if item.optional {
+/// Only members of records and sequences may be optional. What has other errors (`None`) goes by
+/// what is written.
+pub(crate) fn required(report: &mut Report, what: &str, node: &Node, item: Option<&Item>) -> bool {
+    let optional = item.map_or(node.optional == Some(true), |item| item.optional);
+    if optional {
         report.error(
             node.span,
             format!(
                 "`{}` is optional, but {what} has no presence vector: set `optional=\"false\"`",
-                item.name
+                node.name
             ),
         );
     }
-    !item.optional
+    !optional
 }
 
 /// A limit of a count must be a number that the count can be.

@@ -9,6 +9,7 @@ mod composite;
 mod field;
 mod layout;
 mod service;
+mod triggers;
 
 use std::collections::HashMap;
 
@@ -16,7 +17,7 @@ use crate::diagnostic::Report;
 use crate::source::Span;
 use crate::syntax::Node;
 
-pub(crate) use behaviour::behaviour;
+pub(crate) use behaviour::{Events, behaviour};
 pub(crate) use composite::{array, count, count_limit, group, header, required, size, tag};
 pub(crate) use field::{
     bits, enum_index, octet_index, one_meaning, overlap, scale, value_range, value_set,

@@ -154,12 +154,13 @@ impl Resolver<'_> {
 
     fn list(&mut self, scope: TypeSetIndex, count: &CountField, element: &Node) -> Option<List> {
         let count = self.count(scope, count);
-        let item = self.item(scope, element)?;
-        let sound = check::required(self.report, "the element of a list", element, &item);
+        let item = self.item(scope, element);
+        let what = "the element of a list";
+        let sound = check::required(self.report, what, element, item.as_ref());
         let count = count.filter(|_| sound)?;
         Some(List {
             count,
-            element: Box::new(item),
+            element: Box::new(item?),
         })
     }
 
@@ -171,10 +172,12 @@ impl Resolver<'_> {
     ) -> Option<Variant> {
         let mut sound = check::unique_names(self.report, "alternatives", nodes);
         let range = self.count(scope, tag);
-        let alternatives = self.items(scope, nodes)?;
-        for (node, item) in nodes.iter().zip(&alternatives) {
-            sound &= check::required(self.report, "an alternative of a variant", node, item);
+        let items: Vec<_> = nodes.iter().map(|node| self.item(scope, node)).collect();
+        let what = "an alternative of a variant";
+        for (node, item) in nodes.iter().zip(&items) {
+            sound &= check::required(self.report, what, node, item.as_ref());
         }
+        let alternatives = items.into_iter().collect::<Option<Vec<_>>>()?;
         sound &= check::tag(self.report, tag, range?, alternatives.len());
         sound.then_some(Variant {
             tag: tag.unsigned,
@@ -198,8 +201,10 @@ impl Resolver<'_> {
                 check::size(self.report, dimension.size.span, "size", size)
             })
             .collect();
-        let item = self.item(scope, element)?;
-        let required = check::required(self.report, "the element of an array", element, &item);
+        let item = self.item(scope, element);
+        let what = "the element of an array";
+        let required = check::required(self.report, what, element, item.as_ref());
+        let item = item?;
         let dimensions: Vec<u32> = sizes.into_iter().collect::<Option<_>>()?;
         let small = check::array(self.report, node.span, &dimensions);
         (unique && required && small).then(|| Array {

@@ -52,9 +52,11 @@ impl Resolver<'_> {
         match &section.content {
             Content::Empty => Some(None),
             Content::Node(node) => {
-                let whole = self.whole(scope, node)?;
+                let whole = self.whole(scope, node);
                 let what = "the composite at the top of a message";
-                check::required(self.report, what, node, &whole.item).then_some(Some(whole))
+                let item = whole.as_ref().map(|whole| &whole.item);
+                let sound = check::required(self.report, what, node, item);
+                whole.filter(|_| sound).map(Some)
             }
             Content::Reference(target) => match self.follow(scope, target)? {
                 Resolved::Section(content) => Some(content),

@@ -8,7 +8,9 @@ use crate::check;
 use crate::library::Library;
 use crate::model::{Message, Reference, Service};
 use crate::source::Span;
-use crate::syntax::{Declaration, DeclarationKind, ServiceDef, SetRef, Target, TypeSetIndex};
+use crate::syntax::{
+    Declaration, DeclarationKind, Program, ServiceDef, SetRef, Target, TypeSetIndex,
+};
 
 /// States of all services, inherited ones counted again: a long lineage must not multiply a large
 /// machine. All published definitions together have 20 000.
@@ -39,9 +41,10 @@ impl Resolver<'_> {
             check::ambiguous_codes(self.report, &library, service, places);
             check::ambiguous_names(self.report, service, places);
         }
+        let events = internal_events(self.program);
         let mut states_left = MOST_STATES;
         for (service, _) in &kept {
-            check::behaviour(self.report, &library, service, &mut states_left);
+            check::behaviour(self.report, &library, service, &events, &mut states_left);
         }
         library
     }
@@ -215,4 +218,14 @@ impl Resolver<'_> {
         };
         self.report.error(own.span, message);
     }
+}
+
+/// The names of the events that each service declares; of two with one identity the first counts.
+fn internal_events(program: &Program) -> check::Events<'_> {
+    let mut events = check::Events::new();
+    for service in program.services.iter().filter(|s| s.sound) {
+        let names = service.events.iter().map(|event| event.name.as_str());
+        events.entry(&service.id).or_insert_with(|| names.collect());
+    }
+    events
 }

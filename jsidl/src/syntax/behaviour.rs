@@ -5,23 +5,42 @@
 
 use roxmltree::Node as Xml;
 
-use super::element::{FLAGS, Reader};
+use super::element::{FLAGS, Faulty, Reader, shortened};
 use crate::behaviour::{
     Action, Argument, Guard, Name, Parameter, State, StateMachine, Transition, TransitionKind,
     Trigger,
 };
-use crate::source::Spanned;
+use crate::check::unique;
+use crate::source::{Span, Spanned};
 
 /// States of a service; published ones have up to 17.
 const MOST_STATES: usize = 500;
+
+/// `start`
+struct Start {
+    span: Span,
+    machine: Name,
+    state: Name,
+}
+
+/// What a `transition` and a `default_transition` hold.
+struct TransitionParts {
+    parameters: Vec<(Span, Parameter)>,
+    guard: Result<Option<Guard>, Faulty>,
+    /// `None` if it is missing or wrong.
+    kind: Option<TransitionKind>,
+    actions: Vec<Action>,
+}
 
 impl Reader<'_> {
     /// The machines that could be read without an error.
     pub(super) fn behaviour(&mut self, xml: Xml<'_, '_>) -> Vec<StateMachine> {
         self.only(xml, &["is_stateless"]);
-        if let Some(text) = self.attribute(xml, "is_stateless") {
-            self.word(&text, "is_stateless", &FLAGS);
-        }
+        let stateless = self.attribute(xml, "is_stateless");
+        let stateless = stateless.filter(|text| {
+            let word = self.word(text, "is_stateless", &FLAGS);
+            word == Some(true)
+        });
         let states = xml.descendants().filter(|x| x.tag_name().name() == "state");
         if states.count() > MOST_STATES {
             let at = self.span(xml);
@@ -32,7 +51,7 @@ impl Reader<'_> {
         let (mut starts, mut definitions) = (Vec::new(), Vec::new());
         for child in self.children(xml) {
             match child.tag_name().name() {
-                "start" => starts.extend(self.start(child)),
+                "start" => self.add_start(&mut starts, child),
                 "state_machine" => definitions.push(child),
                 _ => self.misplaced(
                     child,
@@ -41,21 +60,80 @@ impl Reader<'_> {
                 ),
             }
         }
+        self.starts_of_nothing(&starts, &definitions);
+        let names = definitions.iter().map(|&xml| {
+            let name = xml.attribute("name").unwrap_or_default();
+            (name, self.source.span(xml.range().start))
+        });
+        unique(self.report, "state machines", names);
         let machines = definitions.into_iter();
-        machines
+        let machines: Vec<_> = machines
             .filter_map(|child| self.state_machine(child, &starts))
-            .collect()
+            .collect();
+        if let Some(flag) = stateless {
+            self.stateless(&flag, &machines);
+        }
+        machines
     }
 
-    /// The name of a machine and the state in which it starts.
-    fn start(&mut self, xml: Xml<'_, '_>) -> Option<(Name, Name)> {
+    /// A service without states has machines of one state each.
+    fn stateless(&mut self, flag: &Spanned<String>, machines: &[StateMachine]) {
+        for machine in machines {
+            let states = machine.all_states().count();
+            if states > 1 {
+                let message = format!(
+                    "`is_stateless` is `{}`, but the machine `{}` has {states} states: set it to \
+                     `false`",
+                    flag.value, machine.name
+                );
+                self.report
+                    .warning(flag.span, message)
+                    .note(machine.span, "the machine with states");
+            }
+        }
+    }
+
+    /// Adds the name of a machine and the state in which it starts; once for each machine.
+    fn add_start(&mut self, starts: &mut Vec<Start>, xml: Xml<'_, '_>) {
         self.only(xml, &["state_machine_name", "state_name", "interpretation"]);
         let machine = self.dotted(xml, "state_machine_name");
         let state = self.dotted(xml, "state_name");
-        Some((machine?.value, state?.value))
+        let (Some(machine), Some(state)) = (machine, state) else {
+            return;
+        };
+        let span = self.span(xml);
+        if let Some(first) = starts.iter().find(|start| start.machine == machine.value) {
+            let message = format!(
+                "it is said twice where `{}` starts: keep one `start`",
+                machine.value
+            );
+            self.report
+                .error(span, message)
+                .note(first.span, "the other one");
+            return;
+        }
+        starts.push(Start {
+            span,
+            machine: machine.value,
+            state: state.value,
+        });
     }
 
-    fn state_machine(&mut self, xml: Xml<'_, '_>, starts: &[(Name, Name)]) -> Option<StateMachine> {
+    fn starts_of_nothing(&mut self, starts: &[Start], definitions: &[Xml<'_, '_>]) {
+        for start in starts {
+            let name = start.machine.to_string();
+            let named = |xml: &Xml<'_, '_>| xml.attribute("name").is_some_and(|n| n.trim() == name);
+            if !definitions.iter().any(named) {
+                let message = format!(
+                    "there is no `state_machine` named `{name}` here to start: add it, or correct \
+                     `state_machine_name`"
+                );
+                self.report.error(start.span, message);
+            }
+        }
+    }
+
+    fn state_machine(&mut self, xml: Xml<'_, '_>, starts: &[Start]) -> Option<StateMachine> {
         self.only(xml, &["name", "interpretation"]);
         let before = self.report.errors();
         let name = self.dotted(xml, "name");
@@ -69,8 +147,12 @@ impl Reader<'_> {
             }
         }
         let name = name?.value;
-        let start = starts.iter().find(|(machine, _)| *machine == name);
+        let start = starts.iter().find(|start| start.machine == name);
         let span = self.span(xml);
+        if states.is_empty() && self.report.errors() == before {
+            let message = format!("the machine `{name}` has no states: add one, or remove it");
+            self.report.error(span, message);
+        }
         if start.is_none() {
             let message = format!(
                 "it is not said where `{name}` starts: add a `start` with this \
@@ -78,10 +160,10 @@ impl Reader<'_> {
             );
             self.report.error(span, message);
         }
-        let (_, start) = start.filter(|_| self.report.errors() == before)?;
+        let start = start.filter(|_| self.report.errors() == before)?;
         Some(StateMachine {
             name,
-            start: start.clone(),
+            start: start.state.clone(),
             states,
             location: self.location(xml),
             span,
@@ -108,9 +190,7 @@ impl Reader<'_> {
     fn state(&mut self, xml: Xml<'_, '_>) -> Option<State> {
         self.only(xml, &["name", "initial_state", "interpretation"]);
         let name = self.name(xml);
-        let initial = self
-            .attribute(xml, "initial_state")
-            .and_then(|initial| self.identifier(initial));
+        let initial = self.initial_state(xml);
         let mut state = State {
             name: name.unwrap_or_default(),
             initial,
@@ -130,7 +210,7 @@ impl Reader<'_> {
                 "entry" => self.once(&mut once[0], child, xml),
                 "exit" => self.once(&mut once[1], child, xml),
                 "default_state" => self.once(&mut once[2], child, xml),
-                "default_transition" => self.not_understood(child),
+                "default_transition" => self.default_transition(child),
                 _ => self.misplaced(
                     child,
                     "state",
@@ -145,13 +225,24 @@ impl Reader<'_> {
         (!state.name.is_empty()).then_some(state)
     }
 
+    fn initial_state(&mut self, xml: Xml<'_, '_>) -> Option<String> {
+        let initial = self.attribute(xml, "initial_state")?;
+        if initial.value.is_empty() {
+            let message = "the attribute `initial_state` is empty: name the state inside in which \
+                           this one begins, or remove it";
+            self.report.error(initial.span, message);
+            return None;
+        }
+        self.identifier(initial)
+    }
+
     fn default_state(&mut self, xml: Xml<'_, '_>) -> Vec<Transition> {
         self.only(xml, &["interpretation"]);
         let mut transitions = Vec::new();
         for child in self.children(xml) {
             match child.tag_name().name() {
                 "transition" => transitions.extend(self.transition(child)),
-                "default_transition" => self.not_understood(child),
+                "default_transition" => self.default_transition(child),
                 _ => self.misplaced(child, "default_state", "`transition`s"),
             }
         }
@@ -166,7 +257,7 @@ impl Reader<'_> {
         for child in self.children(xml) {
             match child.tag_name().name() {
                 "action" => actions.extend(self.action(child)),
-                "send_action" => self.not_understood(child),
+                "send_action" => self.send_action(child),
                 _ => self.misplaced(child, &parent, "`action`s"),
             }
         }
@@ -176,11 +267,30 @@ impl Reader<'_> {
     fn transition(&mut self, xml: Xml<'_, '_>) -> Option<Transition> {
         self.only(xml, &["name", "interpretation"]);
         let event = self.dotted(xml, "name");
+        let parts = self.transition_parts(xml, "transition");
+        let parameters = parts.parameters.into_iter();
+        Some(Transition {
+            trigger: Trigger {
+                event: event?.value,
+                parameters: parameters.map(|(_, parameter)| parameter).collect(),
+            },
+            guard: parts.guard.ok()?,
+            kind: parts.kind?,
+            actions: parts.actions,
+            location: self.location(xml),
+            span: self.span(xml),
+        })
+    }
+
+    fn transition_parts(&mut self, xml: Xml<'_, '_>, parent: &str) -> TransitionParts {
         let (mut parameters, mut actions) = (Vec::new(), Vec::new());
         let (mut guard, mut kind) = (None, None);
         for child in self.children(xml) {
             match child.tag_name().name() {
-                "parameter" => parameters.extend(self.parameter(child)),
+                "parameter" => {
+                    let at = self.span(child);
+                    parameters.extend(self.parameter(child).map(|parameter| (at, parameter)));
+                }
                 "guard" => self.once(&mut guard, child, xml),
                 "internal" | "simple" | "push" | "pop" if kind.is_some() => {
                     let at = self.span(child);
@@ -190,18 +300,20 @@ impl Reader<'_> {
                 }
                 "internal" | "simple" | "push" | "pop" => kind = Some(child),
                 "action" => actions.extend(self.action(child)),
-                "send_action" => self.not_understood(child),
+                "send_action" => self.send_action(child),
                 _ => self.misplaced(
                     child,
-                    "transition",
+                    parent,
                     "`parameter`s, a `guard`, one of `internal`, `simple`, `push` and `pop`, and \
                      `action`s",
                 ),
             }
         }
+        let named = parameters.iter().map(|(at, p)| (p.name.as_str(), *at));
+        unique(self.report, "parameters", named);
         let guard = match guard {
-            Some(guard) => Some(self.guard(guard)?),
-            None => None,
+            Some(guard) => self.guard(guard).map(Some).ok_or(Faulty),
+            None => Ok(None),
         };
         let kind = match kind {
             Some(kind) => self.kind(kind),
@@ -210,17 +322,12 @@ impl Reader<'_> {
                 None
             }
         };
-        Some(Transition {
-            trigger: Trigger {
-                event: event?.value,
-                parameters,
-            },
+        TransitionParts {
+            parameters,
             guard,
-            kind: kind?,
+            kind,
             actions,
-            location: self.location(xml),
-            span: self.span(xml),
-        })
+        }
     }
 
     fn kind(&mut self, xml: Xml<'_, '_>) -> Option<TransitionKind> {
@@ -312,13 +419,52 @@ impl Reader<'_> {
 
     fn argument(&mut self, xml: Xml<'_, '_>) -> Option<Argument> {
         self.only(xml, &["value", "interpretation"]);
-        let text = self.required(xml, "value")?;
+        let mut text = self.required(xml, "value")?;
+        let quotes = text.value.strip_prefix('‘');
+        let curly = quotes.and_then(|rest| rest.strip_suffix('’'));
+        if let Some(quoted) = curly.map(|inner| format!("'{inner}'")) {
+            let message = format!("the quotes of `{}` are curly: write `{quoted}`", text.value);
+            self.report.warning(text.span, message);
+            text.value = quoted;
+        }
         let read = Argument::parse(&text.value);
         self.understood(
             read,
             &text,
             "`value` must be a parameter's name or a text in `'`",
         )
+    }
+
+    /// As a transition, without what a trigger would bring along.
+    fn default_transition(&mut self, xml: Xml<'_, '_>) {
+        self.only(xml, &["interpretation"]);
+        let parts = self.transition_parts(xml, "default_transition");
+        if let Some(parameter) = parts.parameters.first() {
+            let at = parameter.0;
+            let message = "a `default_transition` reacts to anything, so it has no parameters: \
+                           remove them, or write a `transition`";
+            self.report.error(at, message);
+        }
+        let variable = parts.actions.iter().flat_map(|action| &action.arguments);
+        let mut variables = variable.filter_map(|argument| match argument {
+            Argument::Variable(name) => Some(name),
+            Argument::Text(_) | Argument::Integer(_) => None,
+        });
+        if let Some(name) = variables.next() {
+            let at = self.span(xml);
+            let message = format!(
+                "`{name}` is not a text in `'`, and a `default_transition` has no parameters: \
+                 write a `transition`, or a text"
+            );
+            self.report.error(at, message);
+        }
+        self.not_understood(xml);
+    }
+
+    fn send_action(&mut self, xml: Xml<'_, '_>) {
+        // Its mistakes count all the same.
+        let _ = self.action(xml);
+        self.not_understood(xml);
     }
 
     /// Elements of the standard that no published definition has.
@@ -348,7 +494,11 @@ impl Reader<'_> {
         let text = self.required(xml, attribute)?;
         let name = Name::parse(&text.value);
         if name.is_none() {
-            let message = format!("`{attribute}` must be names joined by dots");
+            let message = format!(
+                "`{}` cannot be a `{attribute}`: use names made of letters, digits and \
+                 underscores, joined by dots",
+                shortened(&text.value)
+            );
             self.report.error(text.span, message);
         }
         Some(Spanned {

@@ -350,7 +350,7 @@ fn begins_like_a_name(text: &str) -> bool {
 }
 
 /// The beginning of a text that is too long to be repeated.
-fn shortened(text: &str) -> String {
+pub(super) fn shortened(text: &str) -> String {
     match text.char_indices().nth(40) {
         Some((end, _)) => format!("{}…", &text[..end]),
         None => text.to_owned(),
