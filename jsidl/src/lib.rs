@@ -29,6 +29,7 @@ pub mod dynamic;
 mod excerpt;
 pub mod explain;
 mod expr;
+pub mod format;
 mod library;
 mod loader;
 pub mod lua;

@@ -17,7 +17,7 @@ use crate::model::{GroupKind, Id, Number, Rounding, Unsigned};
 use crate::source::{Span, Spanned};
 
 pub(crate) use limits::LARGEST;
-pub(crate) use root::{Strictness, read};
+pub(crate) use root::{Strictness, is_definition, read};
 
 /// Everything that was read, of all files.
 #[derive(Debug, Default)]

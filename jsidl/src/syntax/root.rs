@@ -26,25 +26,42 @@ pub(crate) fn read(
     program: &mut Program,
     report: &mut Report,
 ) {
+    if let Some(document) = parse(source, report) {
+        let mut reader = Reader { source, report };
+        reader.root(document.root_element(), strictness, program);
+    }
+}
+
+/// Whether a text is XML and its root an element of the language; if not, the report says so.
+pub(crate) fn is_definition(source: &Source, report: &mut Report) -> bool {
+    let Some(document) = parse(source, report) else {
+        return false;
+    };
+    let root = document.root_element();
+    let known = belongs(root) != Belongs::Foreign && ROOTS.contains(&root.tag_name().name());
+    if !known {
+        let mut reader = Reader { source, report };
+        reader.stranger(root, Strictness::Named);
+    }
+    known
+}
+
+fn parse<'s>(source: &'s Source, report: &mut Report) -> Option<Document<'s>> {
     let text = source.text();
     if let Some((at, what)) = limits::excess(text) {
         report.error(source.span(at), what);
-        return;
+        return None;
     }
     // A node takes at least three octets of text, so the size limit bounds the nodes as well.
     let options = ParsingOptions {
         allow_dtd: false,
         ..ParsingOptions::default()
     };
-    match Document::parse_with_options(text, options) {
-        Ok(document) => {
-            let mut reader = Reader { source, report };
-            reader.root(document.root_element(), strictness, program);
-        }
-        Err(error) => {
+    Document::parse_with_options(text, options)
+        .map_err(|error| {
             report.error(malformed_at(source, &error), malformed(&error));
-        }
-    }
+        })
+        .ok()
 }
 
 fn malformed(error: &roxmltree::Error) -> String {
