@@ -23,6 +23,7 @@ pub mod build;
 pub mod catalogue;
 mod check;
 mod diagnostic;
+pub mod diff;
 pub mod docs;
 pub mod dynamic;
 #[cfg(feature = "excerpts")]
@@ -31,6 +32,7 @@ pub mod explain;
 mod expr;
 pub mod format;
 mod library;
+mod listing;
 mod loader;
 pub mod lua;
 pub mod model;
@@ -45,4 +47,5 @@ pub use diagnostic::{Diagnostic, Diagnostics, Note, Severity};
 #[cfg(feature = "excerpts")]
 pub use excerpt::Style;
 pub use library::Library;
+pub use listing::definition_files;
 pub use loader::{Loaded, Loader};

@@ -1,17 +1,15 @@
 //! Gathers definitions from files, directories and texts, and compiles them together.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::catalogue;
 use crate::diagnostic::{Diagnostics, Report};
 use crate::library::Library;
+use crate::listing::Listing;
 use crate::resolve::resolve;
 use crate::source::Sources;
 use crate::syntax::{Program, Strictness, read};
-
-/// Directories within each other.
-const DEEPEST: usize = 32;
 
 /// Collects definitions; [`load`](Self::load) compiles them.
 ///
@@ -45,13 +43,16 @@ impl Loader {
     pub fn path(&mut self, path: impl AsRef<Path>) -> &mut Self {
         let path = path.as_ref();
         if path.is_dir() {
-            let before = self.report.errors();
-            let mut files = Vec::new();
-            self.directory(path, 0, &mut files);
-            if files.is_empty() && self.report.errors() == before {
-                self.unreadable(path, "there is no `.xml` file in this directory");
+            let found = Listing::of(path);
+            if found.files.is_empty() && found.unreadable.is_empty() {
+                let message = "there is no `.xml` file in this directory: service definitions are \
+                               XML files whose names end so";
+                self.unreadable(path, message);
             }
-            for file in files {
+            for (path, reason) in found.unreadable {
+                self.unreadable(&path, &reason);
+            }
+            for file in found.files {
                 self.file(&file, Strictness::Found);
             }
         } else {
@@ -90,36 +91,6 @@ impl Loader {
     fn add(&mut self, name: &Path, text: &str, strictness: Strictness) {
         let source = self.sources.add(name, text);
         read(source, strictness, &mut self.program, &mut self.report);
-    }
-
-    /// Lists the definitions of a directory in an order that does not depend on the file system.
-    fn directory(&mut self, path: &Path, depth: usize, files: &mut Vec<PathBuf>) {
-        if depth > DEEPEST {
-            self.unreadable(path, "directories are nested too deeply here");
-            return;
-        }
-        let entries = fs::read_dir(path).and_then(Iterator::collect::<Result<Vec<_>, _>>);
-        let mut entries = match entries {
-            Ok(entries) => entries,
-            Err(error) => {
-                self.unreadable(path, &format!("the directory cannot be read: {error}"));
-                return;
-            }
-        };
-        entries.sort_by_key(fs::DirEntry::file_name);
-        for entry in entries {
-            let path = entry.path();
-            // Links to directories are not followed: they may lead in a circle.
-            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
-                self.directory(&path, depth + 1, files);
-            } else if path.is_file()
-                && path
-                    .extension()
-                    .is_some_and(|e| e.eq_ignore_ascii_case("xml"))
-            {
-                files.push(path);
-            }
-        }
     }
 
     fn file(&mut self, path: &Path, strictness: Strictness) {

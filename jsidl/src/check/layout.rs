@@ -19,7 +19,7 @@ fn same_section(a: Option<&Item>, b: Option<&Item>) -> bool {
     }
 }
 
-fn same_item(a: &Item, b: &Item) -> bool {
+pub(crate) fn same_item(a: &Item, b: &Item) -> bool {
     a.name == b.name && a.optional == b.optional && same_shape(&a.shape, &b.shape)
 }
 
@@ -27,7 +27,7 @@ fn same_items(a: &[Item], b: &[Item]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same_item(a, b))
 }
 
-fn same_shape(a: &Shape, b: &Shape) -> bool {
+pub(crate) fn same_shape(a: &Shape, b: &Shape) -> bool {
     match (a, b) {
         (Shape::Group(a), Shape::Group(b)) => {
             a.presence == b.presence && same_items(&a.members, &b.members)

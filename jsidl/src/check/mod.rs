@@ -23,6 +23,7 @@ pub(crate) use field::{
     bits, enum_index, octet_index, one_meaning, overlap, scale, value_range, value_set,
     values_of_bits, values_of_number,
 };
+pub(crate) use layout::same_shape;
 pub(crate) use service::{ambiguous_codes, ambiguous_names, left_out, same_service};
 
 /// Names must differ, because they are how everyone speaks of the things. `what` is their plural.

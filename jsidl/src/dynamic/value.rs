@@ -111,7 +111,7 @@ impl std::fmt::Display for Raw {
 
 impl Shape {
     /// What kind of value belongs here, in the same words as [`Value::kind`].
-    pub(super) const fn kind(&self) -> &'static str {
+    pub(crate) const fn kind(&self) -> &'static str {
         match self {
             Self::Group(_) => "a record or sequence",
             Self::List(_) => "a list",

@@ -1,15 +1,16 @@
 //! `jaus jsidl check`: what is wrong with definitions, where, and what to do about it.
 
-use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 use jaus::cli::failure::Failure;
-use jaus::cli::output::{Output, colours_wanted};
-use jsidl::model::{Location, Service};
-use jsidl::{Diagnostic, Loaded, Loader, Severity, Style, catalogue};
+use jaus::cli::output::Output;
+use jsidl::model::Location;
+use jsidl::{Diagnostic, Loaded, Severity};
 use serde_json::{Value, json};
+
+use super::definitions::{counted, load, own_findings, own_services, style};
 
 /// Check service definitions: form, references, rules, state machines
 ///
@@ -58,47 +59,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(u8::from(failed)))
 }
 
-/// The definitions of these paths, which may refer to the built-in ones.
-fn load(paths: &[PathBuf]) -> Result<Loaded, Failure> {
-    let mut loader = Loader::new();
-    for path in paths {
-        if path == Path::new("-") {
-            loader.text("standard input", &standard_input()?);
-            continue;
-        }
-        path.metadata()
-            .map_err(|error| Failure::file(path, &error))?;
-        loader.path(path);
-    }
-    loader.catalogue();
-    Ok(loader.load())
-}
-
-fn standard_input() -> Result<String, Failure> {
-    let mut text = String::new();
-    io::stdin()
-        .read_to_string(&mut text)
-        .map_err(|error| Failure::new(format!("cannot read standard input: {error}")))?;
-    Ok(text)
-}
-
-/// What is found in the user's own files. Built-in definitions may suffer from them, but that is
-/// not what the user can mend.
-fn own_findings(loaded: &Loaded) -> Vec<&Diagnostic> {
-    let findings = loaded.diagnostics.iter();
-    findings
-        .filter(|finding| !catalogue::holds(&finding.location))
-        .collect()
-}
-
-fn style() -> Style {
-    Style {
-        colours: colours_wanted(&io::stdout()),
-        width: terminal_size::terminal_size()
-            .map_or(Style::default().width, |(width, _)| usize::from(width.0)),
-    }
-}
-
 fn to_json(finding: &Diagnostic) -> Value {
     let place = |location: &Location, message: &str| {
         json!({
@@ -119,11 +79,12 @@ fn to_json(finding: &Diagnostic) -> Value {
 
 /// For example `1 error, no warnings; 3 services with 14 messages are usable`.
 fn summary(loaded: &Loaded, errors: usize, warnings: usize) -> String {
-    let own = |service: &&std::sync::Arc<Service>| !catalogue::holds(&service.location);
-    let services = loaded.library.services().filter(own);
+    let services = own_services(loaded);
     let messages = services.clone().map(|s| s.messages().count()).sum();
     let usable = match (services.count(), messages) {
-        (0, _) if errors == 0 => "these files define no service".to_owned(),
+        (0, _) if errors == 0 => {
+            "no service is defined here (that is a file whose root is `service_def`)".to_owned()
+        }
         (0, _) => "no service is usable".to_owned(),
         (services, messages) => format!(
             "{} with {} {} usable",
@@ -134,12 +95,4 @@ fn summary(loaded: &Loaded, errors: usize, warnings: usize) -> String {
     };
     let (errors, warnings) = (counted(errors, "error"), counted(warnings, "warning"));
     format!("{errors}, {warnings}; {usable}")
-}
-
-fn counted(count: usize, what: &str) -> String {
-    match count {
-        0 => format!("no {what}s"),
-        1 => format!("1 {what}"),
-        count => format!("{count} {what}s"),
-    }
 }

@@ -2,8 +2,11 @@
 
 mod check;
 mod datagram;
+mod definitions;
+mod diff;
 mod docs;
 mod explain;
+mod fmt;
 mod lua;
 mod rust;
 mod schema;
@@ -27,6 +30,8 @@ pub(crate) struct Jsidl {
 #[derive(Subcommand)]
 enum Command {
     Check(check::Arguments),
+    Fmt(fmt::Arguments),
+    Diff(diff::Arguments),
     Rust(rust::Arguments),
     Lua(lua::Arguments),
     Docs(docs::Arguments),
@@ -38,6 +43,8 @@ impl Jsidl {
     pub(crate) fn run(self) -> Result<ExitCode, Failure> {
         match self.command {
             Command::Check(arguments) => check::run(&arguments),
+            Command::Fmt(arguments) => fmt::run(&arguments),
+            Command::Diff(arguments) => diff::run(&arguments),
             Command::Rust(arguments) => rust::run(&arguments),
             Command::Lua(arguments) => lua::run(&arguments),
             Command::Docs(arguments) => docs::run(&arguments),
