@@ -1,13 +1,13 @@
 //! Loading definitions for a subcommand, and printing what is wrong with them.
 
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use jaus::cli::failure::Failure;
 use jaus::cli::output::colours_wanted;
 use jsidl::model::Service;
-use jsidl::{Diagnostic, Loaded, Loader, Style, catalogue};
+use jsidl::{Diagnostic, Diagnostics, Loaded, Loader, Style, catalogue};
 
 /// The name of standard input among paths.
 pub(crate) const STANDARD_INPUT: &str = "-";
@@ -49,6 +49,15 @@ pub(crate) fn own_findings(loaded: &Loaded) -> Vec<&Diagnostic> {
 pub(crate) fn own_services(loaded: &Loaded) -> impl Iterator<Item = &Arc<Service>> + Clone {
     let services = loaded.library.services();
     services.filter(|service| !catalogue::holds(&service.location))
+}
+
+/// Prints a finding on standard error. If nobody reads that, it is not said.
+pub(crate) fn complain(diagnostics: &Diagnostics, finding: &Diagnostic) {
+    let _ = writeln!(
+        io::stderr().lock(),
+        "{}",
+        diagnostics.excerpt(finding, style())
+    );
 }
 
 /// How excerpts look on this standard output or terminal.

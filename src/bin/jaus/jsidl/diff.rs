@@ -5,13 +5,13 @@ use std::process::ExitCode;
 
 use clap::Args;
 use jaus::cli::failure::Failure;
-use jaus::cli::output::{Output, say};
+use jaus::cli::output::Output;
 use jsidl::diff::{Change, compare};
 use jsidl::model::Location;
 use jsidl::{Loaded, Severity, catalogue};
 use serde_json::{Value, json};
 
-use super::definitions::{counted, load, own_findings, style};
+use super::definitions::{complain, counted, load, own_findings};
 
 /// Compare two sets of service definitions, and tell whether the wire is affected
 ///
@@ -64,10 +64,7 @@ fn sound(path: &Path) -> Result<Loaded, Failure> {
         .filter(|finding| finding.severity == Severity::Error)
         .collect();
     for error in &errors {
-        say(format_args!(
-            "\n{}",
-            loaded.diagnostics.excerpt(error, style())
-        ));
+        complain(&loaded.diagnostics, error);
     }
     if errors.is_empty() {
         return Ok(loaded);

@@ -10,7 +10,7 @@ use jaus::cli::failure::Failure;
 use jaus::cli::output::{Output, say};
 use jsidl::{Diagnostics, format};
 
-use super::definitions::{STANDARD_INPUT, counted, standard_input, style};
+use super::definitions::{STANDARD_INPUT, complain, counted, standard_input};
 
 /// How the namespaces of the language begin.
 const NAMESPACE: &str = "urn:jaus:jsidl:";
@@ -114,7 +114,7 @@ impl Run {
     fn report(&mut self, findings: &Diagnostics) {
         self.faulty += 1;
         for finding in findings {
-            say(format_args!("\n{}", findings.excerpt(finding, style())));
+            complain(findings, finding);
         }
     }
 
