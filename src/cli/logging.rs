@@ -46,7 +46,10 @@ impl Logging {
             .with_target(self.verbose > 1)
             // It would complain on standard error that standard error is closed, and panic.
             .log_internal_errors(false);
-        tracing_subscriber::registry().with(filter).with(told).init();
+        tracing_subscriber::registry()
+            .with(filter)
+            .with(told)
+            .init();
         Ok(())
     }
 }

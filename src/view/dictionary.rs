@@ -189,7 +189,9 @@ impl Dictionary {
         }
         let wanted = service.urn.to_lowercase();
         let wanted = wanted.rsplit(':').next().unwrap_or_default();
-        let similar = all().find(|known| known.urn.to_lowercase().contains(wanted));
+        let similar = all().filter(|known| known.urn.to_lowercase().contains(wanted));
+        // The one that has little else in its name.
+        let similar = similar.min_by_key(|known| known.urn.len());
         Err(Unreadable::new(
             match similar {
                 Some(similar) => format!(

@@ -1,5 +1,6 @@
 //! Which definition octets are explained by.
 
+use std::cmp::Reverse;
 use std::fmt;
 use std::str::FromStr;
 
@@ -254,12 +255,12 @@ fn of_service<'a>(
     })
 }
 
-/// A service whose name holds what was asked for, or that has it at another version.
+/// A service whose name holds what was asked for and little else, the newest of its versions.
 fn similar(library: &Library, name: &ServiceName) -> Option<Id> {
     let wanted = name.urn.to_lowercase();
     let wanted = wanted.rsplit(':').next().unwrap_or_default();
     let ids = library.services().map(|service| &service.id);
     ids.filter(|id| id.urn.to_lowercase().contains(wanted))
-        .last()
+        .min_by_key(|id| (id.urn.len(), Reverse(id.version)))
         .cloned()
 }
