@@ -214,7 +214,7 @@ fn newest_first(library: &Library, code: u16) -> Vec<(&Service, &Message)> {
         .by_code(code)
         .map(|(service, message)| (service, message.as_ref()))
         .collect();
-    all.sort_by_key(|(service, _)| std::cmp::Reverse(service.id.version));
+    all.sort_by_key(|(service, _)| Reverse(service.id.version));
     all
 }
 

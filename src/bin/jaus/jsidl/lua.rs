@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let Sources { loaded, sound } = sources::load(&arguments.paths)?;
     let library = if arguments.only {
-        sources::own(&loaded.library)
+        sources::own(&loaded)
     } else {
         loaded.library
     };

@@ -53,12 +53,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         say("nothing was written: mend the definitions first; `jaus jsidl check` says more");
         return Ok(ExitCode::from(1));
     }
-    let library = sources::own(&loaded.library);
+    let library = sources::own(&loaded);
     if library.services().next().is_none() {
         return Err(Failure::new("these files define no service"));
     }
     let services = library.services().map(AsRef::<Service>::as_ref);
-    let text = jsidl::rust::module(services, &arguments.runtime);
+    let text = jsidl::rust::module(&loaded.library, services, &arguments.runtime);
     let path = arguments.output.join(format!("{}.rs", arguments.module));
     sources::write(&path, &text)?;
     let summary = sources::summary(&library);

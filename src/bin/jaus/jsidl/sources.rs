@@ -1,12 +1,13 @@
 //! The definitions that something is to be made from, and the files that are made.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use jaus::cli::failure::Failure;
-use jaus::cli::output::say;
 use jsidl::model::Service;
-use jsidl::{Library, Loaded, Loader, catalogue};
+use jsidl::{Library, Loaded, Severity, catalogue};
+
+use super::definitions::{self, counted};
 
 /// What was loaded, with what is wrong in it said on standard error.
 pub(super) struct Sources {
@@ -16,21 +17,12 @@ pub(super) struct Sources {
 }
 
 /// Loads files and directories, which may refer to each other and to the built-in definitions.
-pub(super) fn load<P: AsRef<Path>>(paths: &[P]) -> Result<Sources, Failure> {
-    let mut loader = Loader::new();
-    for path in paths {
-        let path = path.as_ref();
-        path.metadata()
-            .map_err(|error| Failure::file(path, &error))?;
-        loader.path(path);
-    }
-    loader.catalogue();
-    let loaded = loader.load();
+pub(super) fn load(paths: &[PathBuf]) -> Result<Sources, Failure> {
+    let loaded = definitions::load(paths)?;
     let mut sound = true;
-    for error in loaded.diagnostics.errors() {
-        // What built-in definitions suffer from the user's is not what the user can mend.
-        if !catalogue::holds(&error.location) {
-            say(error);
+    for finding in definitions::own_findings(&loaded) {
+        if finding.severity == Severity::Error {
+            definitions::complain(&loaded.diagnostics, finding);
             sound = false;
         }
     }
@@ -38,10 +30,9 @@ pub(super) fn load<P: AsRef<Path>>(paths: &[P]) -> Result<Sources, Failure> {
 }
 
 /// The services of the user's own files alone.
-pub(super) fn own(library: &Library) -> Library {
+pub(super) fn own(loaded: &Loaded) -> Library {
     let mut own = Library::default();
-    let services = library.services();
-    for service in services.filter(|service| !catalogue::holds(&service.location)) {
+    for service in definitions::own_services(loaded) {
         own.insert(service.clone());
     }
     own
@@ -66,14 +57,6 @@ pub(super) fn summary(library: &Library) -> String {
         counted(library.services().count(), "service"),
         counted(messages, "message")
     )
-}
-
-fn counted(count: usize, what: &str) -> String {
-    if count == 1 {
-        format!("1 {what}")
-    } else {
-        format!("{count} {what}s")
-    }
 }
 
 /// Which services something is made of: the user's own, or all if no paths are given.
