@@ -329,7 +329,7 @@ fn what_cannot_be_read_is_a_finding() {
         found[1..],
         [
             "the file is not UTF-8 at octet 3: convert it",
-            "there is no `.xml` file in this directory"
+            "there is no `.xml` file in this directory: service definitions are XML files whose names end so"
         ]
     );
 }
