@@ -147,7 +147,7 @@ impl Walk<'_> {
             let (was, is) = (place(field.from, field.to), place(same.from, same.to));
             self.value(true, &what, &was, &is);
             self.part(name.clone(), |walk| {
-                walk.values(&field.values, &same.values)
+                walk.values(&field.values, &same.values);
             });
         }
         for field in &new.fields {
@@ -184,7 +184,9 @@ impl Walk<'_> {
             let name = format!("choice {}", choice.index);
             match new.iter().find(|other| other.index == choice.index) {
                 Some(same) => {
-                    self.part(name, |walk| walk.scalar(&choice.scalar, &same.scalar));
+                    self.part(name, |walk| {
+                        walk.scalar(&choice.scalar, &same.scalar);
+                    });
                 }
                 None => self.report(true, format!("the {name} is gone")),
             }
