@@ -1,5 +1,6 @@
 //! `jaus jsidl explain`, `docs` and `schema` as a user runs them.
 #![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 mod cli_support;
 
