@@ -1,6 +1,8 @@
 //! The generated and the dynamic codec, which share nothing but the definitions, against each
 //! other: for every generated message they accept the same octets, refuse the same, show the same
 //! JSON text and write the same octets.
+//!
+//! `JAUS_CASES=500` tries so many inputs for each message in place of a few.
 
 #![cfg(feature = "view")]
 #![allow(
@@ -117,16 +119,22 @@ fn check(info: &MessageInfo, message: &Message, cases: u32) {
 #[test]
 fn both_codecs_agree_on_every_generated_message() {
     let library = catalogue();
+    let wanted = std::env::var("JAUS_CASES").ok();
+    let wanted = wanted.map_or(24, |cases| cases.parse().unwrap());
     let mut types = 0;
     for info in messages::registry().iter() {
         for service in info.services {
             let message = definition(&library, service, info);
-            let cases = if *service == info.services[0] { 24 } else { 2 };
+            let cases = if *service == info.services[0] {
+                wanted
+            } else {
+                2
+            };
             check(info, &message, cases);
         }
         types += 1;
     }
-    println!("{types} message types");
+    println!("{types} message types, {wanted} inputs for each, five readings of each input");
     assert!(types > 100, "the registry has only {types} message types");
 }
 
