@@ -13,10 +13,19 @@ use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(30);
+
+/// Held by a test that has a driver: the group stops every driver on this host.
+static DRIVER: Mutex<()> = Mutex::new(());
+
+fn alone_with_a_driver() -> MutexGuard<'static, ()> {
+    // A test that failed leaves nothing behind that matters here.
+    DRIVER.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// An example that runs until it is dropped.
 struct Example {
@@ -92,6 +101,7 @@ fn the_client_listens_to_the_sensor_and_notices_that_it_restarts() {
 
 #[test]
 fn the_operator_drives_the_driver_and_lets_it_go() {
+    let _alone = alone_with_a_driver();
     let mut driver = Example::start("driver");
     driver.expect("102.1.33 is up");
     let mut operator = Example::start("operator");
@@ -104,6 +114,7 @@ fn the_operator_drives_the_driver_and_lets_it_go() {
 
 #[test]
 fn the_group_stops_everybody_when_one_is_too_fast() {
+    let _alone = alone_with_a_driver();
     let _sensor = Example::start("sensor");
     let mut driver = Example::start("driver");
     driver.expect("102.1.33 is up");
