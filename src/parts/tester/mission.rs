@@ -241,8 +241,13 @@ impl<'a> Reports<'a> {
         }
     }
 
-    async fn now(&self) -> Result<ReportMission, String> {
-        ask(self.component, self.planner, &QueryMission {}).await
+    /// The report as it is now; events that came before it are old news.
+    async fn now(&mut self) -> Result<ReportMission, String> {
+        let report = ask(self.component, self.planner, &QueryMission {}).await?;
+        if let Some(events) = &mut self.events {
+            while let Ok(Some(_)) = tokio::time::timeout(Duration::ZERO, events.report()).await {}
+        }
+        Ok(report)
     }
 
     /// The next report that an event brings; asks if none comes.
