@@ -69,21 +69,31 @@ fn view(value: &Value) -> Value {
                 .map(|(name, value)| (name.clone(), view(value)))
                 .collect(),
         },
-        Value::String(text) => text
-            .parse::<u64>()
-            .map_or_else(|_| value.clone(), |n| big(n, text)),
+        Value::String(text) => big(text).unwrap_or_else(|| value.clone()),
         plain => plain.clone(),
     }
 }
 
-/// The vectors write integers from 2^53 as text.
-fn big(number: u64, text: &str) -> Value {
-    if number >= 1 << 53 {
-        number.into()
-    } else {
-        text.into()
-    }
+/// The vectors write integers from 2^53 as text, on both sides of 0.
+fn big(text: &str) -> Option<Value> {
+    let number: i128 = text.parse().ok()?;
+    let is_big = number.unsigned_abs() >= 1 << 53;
+    let unsigned = || u64::try_from(number).map(Value::from);
+    let signed = || i64::try_from(number).map(Value::from);
+    is_big.then(|| unsigned().or_else(|_| signed()).ok())?
 }
+
+/// Messages that one source lays out or spells otherwise than the definitions that our types are
+/// generated from, under the same service and version: the dynamic codec reads them with that
+/// source's own definitions.
+const OTHERWISE: &[(&str, &str)] = &[
+    // Two numbers for each stabilizer, where the two other sources have five.
+    ("fkie-ugv.jsonl", "ReportStabilizerPosition"),
+    // The names of the lights in another order.
+    ("jts-ugv.jsonl", "ReportIlluminationState"),
+    // Small letters at the beginning of names.
+    ("jts-ugv.jsonl", "ReportPlatformSpecifications"),
+];
 
 /// A list element is wrapped in an object with its name; an array's element is not.
 fn element(value: &Value) -> Value {
@@ -149,7 +159,9 @@ fn every_vector_decodes_shows_its_values_and_encodes_to_the_same_octets() {
         }
         for row in rows(&name).unwrap() {
             let types = generated(&row);
-            if types.is_empty() {
+            let otherwise =
+                |&(file, message): &(&str, &str)| file == name && row["message"] == message;
+            if types.is_empty() || OTHERWISE.iter().any(otherwise) {
                 continue;
             }
             checked += 1;
