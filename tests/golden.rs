@@ -87,7 +87,7 @@ fn big(text: &str) -> Option<Value> {
 /// generated from, under the same service and version: the dynamic codec reads them with that
 /// source's own definitions.
 const OTHERWISE: &[(&str, &str)] = &[
-    // Two numbers for each stabilizer, where the two other sources have five.
+    // One position for each stabilizer, where the two other sources have two.
     ("fkie-ugv.jsonl", "ReportStabilizerPosition"),
     // The names of the lights in another order.
     ("jts-ugv.jsonl", "ReportIlluminationState"),
