@@ -42,12 +42,13 @@ const PROGRAMS: &[(&str, &[&str])] = &[
 
 #[tokio::main(flavor = "current_thread")]
 async fn main() {
-    let node = Node::start(Config::loopback(42, 1)).expect("a node");
-    let watcher = Component::builder(Kind::OperatorControlUnit, "Watcher").attach(&node, 1);
-    let watcher = watcher.expect("a free number");
     println!("| program | stripped | resident, idle | start to discovered, median (most) |");
     println!("|---|---|---|---|");
     for (number, (program, flags)) in (1..).zip(PROGRAMS) {
+        // A new one for each program: it would go on asking those that were killed before.
+        let node = Node::start(Config::loopback(42, 1)).expect("a node");
+        let watcher = Component::builder(Kind::OperatorControlUnit, "Watcher").attach(&node, 1);
+        let watcher = watcher.expect("a free number");
         let mut starts = Vec::new();
         let mut resident = 0.0;
         for start in 0..STARTS {

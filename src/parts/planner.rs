@@ -19,7 +19,7 @@ use tokio::sync::{Notify, mpsc};
 
 use super::{Part, PartError, Seat};
 use crate::address::JausId;
-use crate::component::{AccessControl, Component, Management, Scope};
+use crate::component::{AccessControl, Component, Management};
 use crate::mission::{Link, Settings, Vehicle};
 use crate::service::ground::Missions;
 use desk::Desk;
@@ -63,7 +63,6 @@ impl Part for Planner {
         let control = AccessControl::new().authority(self.least_authority);
         let component = seat
             .component("Planner")
-            .scope(Scope::Subsystem)
             .management(Management::new().access_control(control))
             .offer(missions.service())
             .live_on(seat.port)?;
