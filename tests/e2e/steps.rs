@@ -6,7 +6,8 @@ use crate::browser::{Browser, SCREENS};
 
 /// Takes control unless it is held already, and has the vehicle ready.
 pub(crate) fn take_control(page: &mut Browser) {
-    if page.value("document.body.dataset.control") != "held" {
+    // What is asked for already comes by itself; the button would take that back.
+    if page.value("document.body.dataset.control") == "none" {
         page.press("#control-button");
     }
     page.wait("document.body.dataset.control === 'held'");
