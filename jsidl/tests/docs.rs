@@ -7,18 +7,15 @@
     reason = "a test that cannot go on fails"
 )]
 
+mod support;
+
 use std::collections::{BTreeMap, BTreeSet};
 
+use jsidl::Loader;
 use jsidl::docs::{Format, Page, pages};
 use jsidl::dynamic::{arbitrary, encode};
 use jsidl::explain::{Kind, Row, explain_as};
-use jsidl::{Library, Loader};
-
-fn catalogue() -> Library {
-    let mut loader = Loader::new();
-    loader.catalogue();
-    loader.load().library
-}
+use support::catalogue;
 
 /// The page as the XML that it is as well, but for its first line.
 fn parsed(page: &Page) -> roxmltree::Document<'_> {

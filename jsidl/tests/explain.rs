@@ -12,15 +12,9 @@ mod support;
 use jsidl::dynamic::{Limits, arbitrary, decode_with, encode};
 use jsidl::explain::{Explanation, Kind, Row, Unexplained, explain, explain_as, table};
 use jsidl::model::Message;
-use jsidl::{Library, Loader};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-
-fn catalogue() -> Library {
-    let mut loader = Loader::new();
-    loader.catalogue();
-    loader.load().library
-}
+use support::catalogue;
 
 /// The rows hold the octets, once and in order.
 #[track_caller]

@@ -13,15 +13,9 @@ use std::collections::BTreeMap;
 use jsidl::dynamic::{arbitrary, decode, from_json, to_json};
 use jsidl::model::Message;
 use jsidl::schema::{of_message, of_service};
-use jsidl::{Library, Loader};
 use jsonschema::Validator;
 use serde_json::{Value as Json, json};
-
-fn catalogue() -> Library {
-    let mut loader = Loader::new();
-    loader.catalogue();
-    loader.load().library
-}
+use support::catalogue;
 
 fn validator(schema: &Json) -> Validator {
     jsonschema::draft202012::new(schema).unwrap_or_else(|error| panic!("{error}\n{schema:#}"))

@@ -56,6 +56,30 @@ pub enum ComponentEvent {
     },
 }
 
+impl ComponentEvent {
+    /// What has happened, as a line for people; nothing for components of the node's own process.
+    #[must_use]
+    pub fn in_words(&self) -> Option<String> {
+        match self {
+            Self::Attached { id, process } => {
+                let process = process.as_ref()?;
+                Some(format!("{id} is attached by {process}"))
+            }
+            Self::Detached { id, process, why } => {
+                let process = process.as_ref()?;
+                Some(format!("{id} of {process} {why}"))
+            }
+            Self::Refused { process, why } => Some(format!("{process} was refused: {why}")),
+            Self::Stuck { id, process } => Some(format!(
+                "{id} of {process} reads nothing; what it cannot keep is dropped"
+            )),
+            Self::Resumed { id, dropped } => Some(format!(
+                "{id} reads again; {dropped} messages were dropped since it came"
+            )),
+        }
+    }
+}
+
 /// Why a component is not attached any more.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]

@@ -12,7 +12,7 @@ use std::net::SocketAddr;
 use super::{Part, PartError, Seat};
 use crate::component::{Component, Watch};
 use crate::endpoint::{Event, Remote};
-use crate::node::{ComponentEvent, ComponentEvents, Events, Node};
+use crate::node::{ComponentEvents, Events, Node};
 use crate::view::debug::{self, DebugView};
 use crate::view::{Journal, JournalSettings, tree};
 
@@ -148,32 +148,11 @@ async fn tell(component: &Component, news: (Events, ComponentEvents)) -> PartErr
                 }
                 _ => None,
             },
-            Some(arrival) = arrivals.recv() => in_words(&arrival),
+            Some(arrival) = arrivals.recv() => arrival.in_words(),
             else => return PartError::NodeStopped,
         };
         if let Some(words) = words {
             tracing::info!("{words}");
         }
-    }
-}
-
-/// News of the component processes that are attached to the node.
-fn in_words(event: &ComponentEvent) -> Option<String> {
-    match event {
-        ComponentEvent::Attached {
-            id,
-            process: Some(process),
-        } => Some(format!("{id} is attached by {process}")),
-        ComponentEvent::Detached {
-            id,
-            process: Some(process),
-            why,
-        } => Some(format!("{id} of {process} {why}")),
-        ComponentEvent::Refused { process, why } => Some(format!("{process} was refused: {why}")),
-        ComponentEvent::Stuck { id, process } => Some(format!("{id} of {process} reads nothing")),
-        ComponentEvent::Resumed { id, dropped } => Some(format!(
-            "{id} reads again; {dropped} messages were dropped since it came"
-        )),
-        _ => None,
     }
 }

@@ -1,5 +1,7 @@
 //! What a page holds, before it is HTML or Markdown: the two are written from the same blocks.
 
+use std::fmt::Write as _;
+
 /// A page of the documentation.
 pub(super) struct Page {
     /// File name without ending.
@@ -106,6 +108,20 @@ pub(super) struct Target {
     pub(super) page: String,
     /// The place on it.
     pub(super) anchor: Option<String>,
+}
+
+impl Target {
+    /// Relative to a page beside it, where pages are files with this extension.
+    pub(super) fn address(&self, extension: &str) -> String {
+        let mut address = String::new();
+        if !self.page.is_empty() {
+            address = format!("{}.{extension}", self.page);
+        }
+        if let Some(anchor) = &self.anchor {
+            let _ = write!(address, "#{anchor}");
+        }
+        address
+    }
 }
 
 pub(super) fn text(words: impl Into<String>) -> Inline {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::block::{Block, Inline, Line, Page, Row, StateBox, Table, Target};
+use super::block::{Block, Inline, Line, Page, Row, StateBox, Table};
 
 const STYLE: &str = include_str!("style.css");
 
@@ -169,22 +169,11 @@ fn inline(inline: &Inline) -> String {
         Inline::Link { text, to } => {
             format!(
                 "<a href=\"{}\">{}</a>",
-                escaped(&address(to)),
+                escaped(&to.address("html")),
                 escaped(text)
             )
         }
     }
-}
-
-fn address(to: &Target) -> String {
-    let mut address = String::new();
-    if !to.page.is_empty() {
-        address = format!("{}.html", to.page);
-    }
-    if let Some(anchor) = &to.anchor {
-        let _ = write!(address, "#{anchor}");
-    }
-    address
 }
 
 /// Text in which nothing is markup, within elements and within quoted attributes.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::block::{Block, Inline, Line, Page, StateBox, Table, Target};
+use super::block::{Block, Inline, Line, Page, StateBox, Table};
 
 /// A whole page.
 pub(super) fn page(page: &Page) -> String {
@@ -105,19 +105,8 @@ fn inline(inline: &Inline) -> String {
         Inline::Code(name) if name.contains(['`', '|', '\\']) => escaped(name),
         Inline::Code(name) => format!("`{name}`"),
         Inline::Badge(word) => format!("*{}*", escaped(word)),
-        Inline::Link { text, to } => format!("[{}]({})", escaped(text), address(to)),
+        Inline::Link { text, to } => format!("[{}]({})", escaped(text), to.address("md")),
     }
-}
-
-fn address(to: &Target) -> String {
-    let mut address = String::new();
-    if !to.page.is_empty() {
-        address = format!("{}.md", to.page);
-    }
-    if let Some(anchor) = &to.anchor {
-        let _ = write!(address, "#{anchor}");
-    }
-    address
 }
 
 /// Text in which nothing is markup.

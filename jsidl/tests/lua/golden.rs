@@ -1,8 +1,6 @@
 //! Every golden message in a packet: tshark prints the values that our own codec reads.
 
 use std::cmp::Reverse;
-use std::fs;
-use std::path::{Path, PathBuf};
 use std::thread;
 
 use jsidl::Library;
@@ -13,40 +11,8 @@ use serde_json::Value as Json;
 
 use crate::expected::{agrees, fields, shown};
 use crate::packets::Packets;
-use crate::{support, tshark};
-
-/// Where the definitions of a source lie, the source's own first.
-fn directories(shared: &Path, source: &str) -> Vec<PathBuf> {
-    let corpus = shared.join("jsidl-corpus");
-    match source.split_once('-') {
-        Some(("jts", "examples")) => vec![corpus.join(source), corpus.join("jts")],
-        Some((family, set)) => {
-            let family = corpus.join(family);
-            vec![family.join(format!("urn.jaus.jss.{set}")), family]
-        }
-        None => vec![corpus.join(source)],
-    }
-}
-
-fn load(shared: &Path, source: &str) -> Library {
-    let mut loader = jsidl::Loader::new();
-    for directory in directories(shared, source) {
-        loader.path(directory);
-    }
-    loader.load().library
-}
-
-/// The messages of a golden file, each once.
-fn vectors(path: &Path) -> Vec<Vec<u8>> {
-    let text = fs::read_to_string(path).unwrap();
-    let octets = |line: &str| {
-        let row: Json = serde_json::from_str(line).unwrap();
-        let digits = row["hex"].as_str().unwrap().as_bytes();
-        let octet = |pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap();
-        digits.chunks(2).map(octet).collect()
-    };
-    text.lines().map(octets).collect()
-}
+use crate::support::{self, golden};
+use crate::tshark;
 
 /// How the dissector is to read a message: by the newest definition that fits.
 fn read<'l>(library: &'l Library, octets: &[u8]) -> Option<(&'l Message, Value)> {
@@ -96,21 +62,18 @@ fn tshark_prints_the_values_of_every_golden_message() {
     if !tshark::is_there() {
         return;
     }
-    let mut files: Vec<_> = fs::read_dir(shared.join("golden"))
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|e| e == "jsonl"))
-        .filter(|path| !path.to_string_lossy().contains("scaling_"))
-        .collect();
-    files.sort();
-    let check = |file: &PathBuf| {
-        let source = file.file_stem().unwrap().to_str().unwrap();
-        check_source(&load(&shared, source), source, &vectors(file))
+    let sources = golden::sources(&shared);
+    let check = |source: &str, rows: &[Json]| {
+        let vectors: Vec<_> = rows
+            .iter()
+            .map(|row| golden::octets_of(&row["hex"]))
+            .collect();
+        check_source(&golden::load(&shared, source), source, &vectors)
     };
     let total: usize = thread::scope(|scope| {
-        let running: Vec<_> = files
+        let running: Vec<_> = sources
             .iter()
-            .map(|file| scope.spawn(|| check(file)))
+            .map(|(source, rows)| scope.spawn(|| check(source, rows)))
             .collect();
         running.into_iter().map(|one| one.join().unwrap()).sum()
     });

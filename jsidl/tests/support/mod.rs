@@ -9,6 +9,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use jsidl::model::*;
+use jsidl::{Library, Loader};
+
+/// The definitions that come with the crate.
+pub(crate) fn catalogue() -> Library {
+    let mut loader = Loader::new();
+    loader.catalogue();
+    loader.load().library
+}
 
 /// The directory of shared test data, or `None` (said loudly) if it is not on this machine.
 ///

@@ -13,7 +13,7 @@ use jaus::cli::statistics::{self, DropWatch};
 use jaus::cli::tree;
 use jaus::component::{Component, Kind};
 use jaus::endpoint::Event;
-use jaus::node::{ComponentEvent, ComponentEvents, Events, Local, Node, units};
+use jaus::node::{ComponentEvents, Events, Local, Node, units};
 use tokio::time::{MissedTickBehavior, interval};
 
 /// Run a node with one component that others can find
@@ -129,7 +129,7 @@ impl NodeCommand {
                     Event::IdConflict { path, .. } if !conflicts.insert(path.peer) => None,
                     event => in_words(&event),
                 },
-                Some(event) = arrivals.recv() => arrival_in_words(&event),
+                Some(event) = arrivals.recv() => event.in_words(),
                 else => return Err(Failure::new("the node has stopped")),
             };
             if let Some(words) = words {
@@ -189,29 +189,6 @@ fn in_words(event: &Event) -> Option<String> {
         Event::IdConflict { id, path } => Some(format!(
             "somebody at {} has our id {id} too: one of us must choose another (--id)",
             path.peer
-        )),
-        _ => None,
-    }
-}
-
-/// News of the components of other processes.
-fn arrival_in_words(event: &ComponentEvent) -> Option<String> {
-    match event {
-        ComponentEvent::Attached {
-            id,
-            process: Some(process),
-        } => Some(format!("{id} is attached by {process}")),
-        ComponentEvent::Detached {
-            id,
-            process: Some(process),
-            why,
-        } => Some(format!("{id} of {process} {why}")),
-        ComponentEvent::Refused { process, why } => Some(format!("{process} was refused: {why}")),
-        ComponentEvent::Stuck { id, process } => Some(format!(
-            "{id} of {process} reads nothing; what it cannot keep is dropped"
-        )),
-        ComponentEvent::Resumed { id, dropped } => Some(format!(
-            "{id} reads again; {dropped} messages were dropped since it came"
         )),
         _ => None,
     }
