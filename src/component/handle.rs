@@ -1,5 +1,6 @@
 //! The application's end of a component.
 
+use std::fmt;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -281,7 +282,10 @@ impl Component {
     /// # Errors
     /// [`FindError`] says how long it was looked for.
     pub async fn find_within(&self, urn: &str, limit: Duration) -> Result<JausId, FindError> {
-        self.search(urn, None, limit).await
+        self.search(&Sought::Service(urn), limit, |others| {
+            who(others, |offer| offer.urn == urn)
+        })
+        .await
     }
 
     /// Waits until another component is known that offers a service in a version that a client
@@ -302,46 +306,74 @@ impl Component {
         wanted: ServiceId,
         limit: Duration,
     ) -> Result<JausId, FindError> {
-        self.search(wanted.urn, Some(wanted), limit).await
+        self.search(&Sought::OneOf(&[wanted]), limit, |others| {
+            who(others, |offer| offer.serves(wanted))
+        })
+        .await
     }
 
-    async fn search(
+    /// Waits until another component is known that offers exactly one of `versions`, and says which
+    /// of them to speak with it: where versions differ on the wire, the one whose messages it
+    /// understands. The versions that the client knows are given with the one that it likes best
+    /// first; it gets that one if anybody offers it.
+    ///
+    /// # Errors
+    /// [`FindError`] says how long it was looked for, and who offers other versions.
+    pub async fn find_common_version(
         &self,
-        urn: &str,
-        wanted: Option<ServiceId>,
+        versions: &[ServiceId],
+    ) -> Result<(JausId, ServiceId), FindError> {
+        self.find_common_version_within(versions, Self::FIND_LIMIT)
+            .await
+    }
+
+    /// The same as [`find_common_version`](Self::find_common_version), with another limit.
+    ///
+    /// # Errors
+    /// Those of [`find_common_version`](Self::find_common_version).
+    pub async fn find_common_version_within(
+        &self,
+        versions: &[ServiceId],
         limit: Duration,
-    ) -> Result<JausId, FindError> {
+    ) -> Result<(JausId, ServiceId), FindError> {
+        self.search(&Sought::OneOf(versions), limit, |others| {
+            versions.iter().find_map(|&version| {
+                let exactly = Offer::from(version);
+                Some((who(others, |offer| *offer == exactly)?, version))
+            })
+        })
+        .await
+    }
+
+    /// Waits until `found` finds what it wants among the other components.
+    async fn search<T>(
+        &self,
+        sought: &Sought<'_>,
+        limit: Duration,
+        found: impl Fn(&Others<'_>) -> Option<T>,
+    ) -> Result<T, FindError> {
         let start = Instant::now();
         let own = self.id();
-        let serves = |offer: &Offer| match wanted {
-            Some(wanted) => offer.serves(wanted),
-            None => offer.urn == urn,
-        };
-        let found = |directory: &Directory| {
-            let mut others = directory.components().filter(|it| it.id != own);
-            let found = others.find(|it| it.offered().any(serves));
-            found.map(|component| component.id)
-        };
+        let found = |directory: &Directory| found(&Others { directory, own });
         let mut directories = self.shared.directories.clone();
         let known = directories.wait_for(|directory| found(directory).is_some());
         match tokio::time::timeout(limit, known).await {
             Ok(Ok(directory)) => found(&directory).ok_or(FindError::Stopped),
             Ok(Err(_)) => Err(FindError::Stopped),
-            Err(_) => Err(self.not_found(urn, wanted, start.elapsed())),
+            Err(_) => Err(self.not_found(sought, start.elapsed())),
         }
     }
 
-    fn not_found(&self, urn: &str, wanted: Option<ServiceId>, waited: Duration) -> FindError {
+    fn not_found(&self, sought: &Sought<'_>, waited: Duration) -> FindError {
         let directory = self.directory();
         let others = directory.components().filter(|it| it.id != self.id());
         let offers = others.flat_map(|it| it.offered().map(move |offer| (it.id, offer)));
         FindError::NotFound {
-            service: wanted
-                .map_or_else(|| urn.to_owned(), |wanted| Offer::from(wanted).to_string()),
+            service: sought.to_string(),
             waited,
             others: directory.len().saturating_sub(1),
             instead: offers
-                .filter(|(_, offer)| offer.urn == urn)
+                .filter(|(_, offer)| sought.is_of(&offer.urn))
                 .map(|(id, offer)| (id, offer.clone()))
                 .take(Self::MOST_INSTEAD)
                 .collect(),
@@ -363,4 +395,50 @@ impl Component {
         // As in `offer`.
         let _ = self.shared.commands.send(Command::Withdraw(urn)).await;
     }
+}
+
+/// What is looked for.
+enum Sought<'a> {
+    /// A service, in whatever version.
+    Service(&'a str),
+    /// A service in one of several versions.
+    OneOf(&'a [ServiceId]),
+}
+
+impl Sought<'_> {
+    /// Whether it is about the service with this URN.
+    fn is_of(&self, urn: &str) -> bool {
+        match self {
+            Self::Service(wanted) => *wanted == urn,
+            Self::OneOf(versions) => versions.iter().any(|version| version.urn == urn),
+        }
+    }
+}
+
+impl fmt::Display for Sought<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Service(urn) => f.write_str(urn),
+            Self::OneOf(versions) => {
+                for (place, version) in versions.iter().enumerate() {
+                    let gap = if place == 0 { "" } else { " or " };
+                    write!(f, "{gap}{version}")?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// All known components but the one that looks.
+struct Others<'a> {
+    directory: &'a Directory,
+    own: JausId,
+}
+
+/// The first of them with an offer that will do.
+fn who(others: &Others<'_>, will_do: impl Fn(&Offer) -> bool) -> Option<JausId> {
+    let mut components = others.directory.components();
+    let found = components.find(|it| it.id != others.own && it.offered().any(&will_do));
+    found.map(|component| component.id)
 }

@@ -1,16 +1,18 @@
 //! A service made of functions, one per message: what an application offers.
 
+use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::time::Instant;
 
-use super::{Context, Handled, Service, Standing, code_of, read};
+use super::{Context, Handled, Service, Standing, code_of};
 use crate::address::JausId;
-use crate::codec::{Message, ServiceId};
+use crate::codec::{DecodeError, Message, ServiceId};
 use crate::endpoint::Received;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
-type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) + Send>;
+/// Handles a message, or says why its octets are no message of its type.
+type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) -> Result<(), DecodeError> + Send>;
 
 /// A service whose messages are answered by functions of the application.
 ///
@@ -21,9 +23,26 @@ type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) + Send>;
 /// let speedometer = Handlers::new(mobility::velocity_state_sensor::LATEST)
 ///     .answer(|_query: QueryVelocityState| ReportVelocityState::default());
 /// ```
+///
+/// # Several versions
+///
+/// A component can offer a service at several versions. Where they lay a message out differently
+/// under the same code, each layout is a type with a handler of its own; nothing in a message says
+/// its version, so the layouts are tried in the order in which they were given, the newest first,
+/// and the first that fits the octets exactly has the message.
+///
+/// ```
+/// use jaus::messages::mobility::{self, v1_0};
+/// use jaus::service::Handlers;
+///
+/// let driver = Handlers::new(mobility::local_vector_driver::V1_1)
+///     .and_version(mobility::local_vector_driver::V1_0)
+///     .command(|vector: mobility::SetLocalVector, _, _| println!("{vector:?}"))
+///     .command(|vector: v1_0::SetLocalVector, _, _| println!("{vector:?}"));
+/// ```
 pub struct Handlers {
     offers: Vec<ServiceId>,
-    by_code: BTreeMap<u16, Handler>,
+    by_code: BTreeMap<u16, Vec<(TypeId, Handler)>>,
     told: BTreeSet<u16>,
     stops: Vec<Stop>,
 }
@@ -53,12 +72,11 @@ impl Handlers {
         mut self,
         mut function: impl FnMut(Q) -> R + Send + 'static,
     ) -> Self {
-        let handler = move |received: &Received, context: &mut Context<'_>| {
-            if let Some(query) = read(received) {
-                context.reply(received, &function(query));
-            }
-        };
-        self.by_code.insert(Q::CODE, Box::new(handler));
+        self.handle::<Q>(move |received, context| {
+            let query = Q::decode(&received.payload)?;
+            context.reply(received, &function(query));
+            Ok(())
+        });
         self
     }
 
@@ -114,15 +132,28 @@ impl Handlers {
         may: fn(&Standing, JausId) -> bool,
         mut function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
     ) -> Self {
-        let handler = move |received: &Received, context: &mut Context<'_>| {
-            if !may(context.standing(), received.source) {
+        self.handle::<M>(move |received, context| {
+            if may(context.standing(), received.source) {
+                function(M::decode(&received.payload)?, received, context);
+            } else {
                 tracing::debug!(source = %received.source, message = M::NAME, "not in control");
-            } else if let Some(message) = read(received) {
-                function(message, received, context);
             }
-        };
-        self.by_code.insert(M::CODE, Box::new(handler));
+            Ok(())
+        });
         self
+    }
+
+    /// Sets the handler of a layout, behind those of other layouts with the same code.
+    fn handle<M: Message>(
+        &mut self,
+        handler: impl FnMut(&Received, &mut Context<'_>) -> Result<(), DecodeError> + Send + 'static,
+    ) {
+        let (layout, handler) = (TypeId::of::<M>(), Box::new(handler));
+        let layouts = self.by_code.entry(M::CODE).or_default();
+        match layouts.iter_mut().find(|(known, _)| *known == layout) {
+            Some(place) => place.1 = handler,
+            None => layouts.push((layout, handler)),
+        }
     }
 }
 
@@ -146,11 +177,18 @@ impl Service for Handlers {
         message: &Received,
         context: &mut Context<'_>,
     ) -> Handled {
-        let handler = code_of(&message.payload).and_then(|code| self.by_code.get_mut(&code));
-        let Some(handler) = handler else {
+        let layouts = code_of(&message.payload).and_then(|code| self.by_code.get_mut(&code));
+        let Some(layouts) = layouts else {
             return Handled::No;
         };
-        handler(message, context);
+        for (_, handler) in layouts {
+            match handler(message, context) {
+                Ok(()) => break,
+                Err(error) => {
+                    tracing::debug!(source = %message.source, %error, "message cannot be read");
+                }
+            }
+        }
         Handled::Yes
     }
 
