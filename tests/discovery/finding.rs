@@ -149,6 +149,34 @@ fn a_dead_peer_leaves_the_tree_within_twelve_seconds() {
 }
 
 #[test]
+fn newcomers_are_found_at_once_while_many_others_have_fallen_silent() {
+    let mut world = World::new();
+    let watcher = world.start(plain(OPERATOR, "desk"));
+    let fleet: Vec<_> = (1..=40)
+        .map(|number| world.start(plain(JausId::new(200 + number, 1, 1), "rover")))
+        .collect();
+    world.run(seconds(120));
+    assert_eq!(world.stack(watcher).directory().len(), 41, "and itself");
+    for dead in fleet {
+        world.kill(dead);
+    }
+    // From before anybody notices until all are given up.
+    for newcomer in 1..=12 {
+        world.run(seconds(4));
+        let id = JausId::new(100 + newcomer, 1, 1);
+        let place = world.start(plain(id, "late"));
+        world.run(seconds(2));
+        let directory = world.stack(watcher).directory();
+        let found = directory.component(id).expect("found");
+        assert!(
+            found.offers("urn:jaus:jss:core:Liveness"),
+            "the {newcomer}th is known with its services"
+        );
+        world.kill(place);
+    }
+}
+
+#[test]
 fn a_peer_that_comes_back_is_found_again() {
     let mut world = World::new();
     let vehicle = world.start(plain(VEHICLE, "rover"));

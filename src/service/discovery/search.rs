@@ -66,6 +66,9 @@ impl Search {
     const BURST: u32 = 64;
     /// … and then one in this time.
     const REFILL: Duration = Duration::from_secs(1);
+    /// So many of the burst are kept for questions that were never asked: those about newcomers,
+    /// who are not to wait because many others have fallen silent and are asked in vain.
+    const FOR_NEWCOMERS: u32 = 32;
     /// The first call comes within this time, so that a fleet switched on together spreads out.
     const FIRST_CALL: Duration = Duration::from_millis(50);
 
@@ -171,47 +174,46 @@ impl Search {
         self.questions.remove(&question).is_some()
     }
 
-    /// Asks what is due, as far as the budget goes.
+    /// Asks what is due, as far as the budget goes: first what was never asked.
     pub(super) fn ask_due(&mut self, now: Instant, out: &mut Outbox) {
         self.questions
             .retain(|_, attempts| attempts.next > now || attempts.made < Self::TRIES);
-        for (question, attempts) in &mut self.questions {
-            if attempts.next > now {
-                continue;
+        for asked_before in [false, true] {
+            for (question, attempts) in &mut self.questions {
+                if attempts.next > now || (attempts.made > 0) != asked_before {
+                    continue;
+                }
+                if !self.budget.take_above(attempts.reserve(), now) {
+                    break;
+                }
+                attempts.made += 1;
+                let pause = if attempts.made < Self::TRIES {
+                    Self::RETRY * attempts.made
+                } else {
+                    self.timing.refresh
+                };
+                attempts.next = now + pause;
+                let listed_by = self
+                    .peers
+                    .get(&question.about())
+                    .and_then(|peer| peer.listed_by);
+                question.ask(listed_by, out);
             }
-            if !self.budget.take(now) {
-                break;
-            }
-            attempts.made += 1;
-            let pause = if attempts.made < Self::TRIES {
-                Self::RETRY * attempts.made
-            } else {
-                self.timing.refresh
-            };
-            attempts.next = now + pause;
-            let listed_by = self
-                .peers
-                .get(&question.about())
-                .and_then(|peer| peer.listed_by);
-            question.ask(listed_by, out);
         }
     }
 
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
-        let questions = self.questions.values().map(|attempts| attempts.next);
-        let probes = self.speakers().map(|(_, peer)| peer.next_probe);
-        let limited = questions
-            .chain(probes)
-            .min()
-            .map(|due| match self.budget.next() {
-                Some(refilled) => due.max(refilled),
-                None => due,
-            });
-        let refreshes = self.peers.values().map(|peer| peer.next_refresh).min();
-        [self.next_call, limited, refreshes]
-            .into_iter()
-            .flatten()
-            .min()
+        let within_budget = |due: Instant, reserve| match self.budget.next_above(reserve) {
+            Some(refilled) => due.max(refilled),
+            None => due,
+        };
+        let questions = self.questions.values();
+        let questions = questions.map(|it| within_budget(it.next, it.reserve()));
+        let probes = self.speakers();
+        let probes = probes.map(|(_, peer)| within_budget(peer.next_probe, Self::FOR_NEWCOMERS));
+        let refreshes = self.peers.values().map(|peer| peer.next_refresh);
+        let all = questions.chain(probes).chain(refreshes);
+        all.chain(self.next_call).min()
     }
 
     /// The peers that speak for themselves.
@@ -224,6 +226,17 @@ impl Search {
 
     fn direct(&self) -> usize {
         self.speakers().count()
+    }
+}
+
+impl Attempts {
+    /// What the question leaves of the budget.
+    const fn reserve(&self) -> u32 {
+        if self.made == 0 {
+            0
+        } else {
+            Search::FOR_NEWCOMERS
+        }
     }
 }
 
@@ -321,7 +334,7 @@ impl Discovery {
             }
             if peer.probes == search.timing.probes {
                 gone.push(id);
-            } else if search.budget.take(now) {
+            } else if search.budget.take_above(Search::FOR_NEWCOMERS, now) {
                 peer.probes += 1;
                 peer.next_probe = now + search.timing.probe_interval;
                 out.send(id, &identify(Level::Component));
