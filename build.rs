@@ -13,6 +13,7 @@ const SETS: &[(&str, &str)] = &[
     // The health monitor, which the profiles took over under its old name.
     ("iop", "urn:jaus:jss:exp:aeodrs:"),
     ("ground", "urn:jaus-rs:ground:"),
+    ("ra33", "urn:jaus-rs:ra33:"),
 ];
 
 fn main() {

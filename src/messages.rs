@@ -5,8 +5,8 @@
 
 use crate::codec::{MessageInfo, Registry, ServiceInfo};
 
-/// The modules of the sets, and the tables of those that are switched on.
-macro_rules! sets {
+/// The modules of the sets.
+macro_rules! modules {
     ($($(#[$doc:meta])* $set:ident $(if $feature:literal)?;)*) => {
         $(
             $(#[$doc])*
@@ -17,6 +17,13 @@ macro_rules! sets {
                 include!(concat!(env!("OUT_DIR"), "/", stringify!($set), ".rs"));
             }
         )*
+    };
+}
+
+/// The modules of the sets, and the tables of those that are switched on.
+macro_rules! sets {
+    ($($(#[$doc:meta])* $set:ident $(if $feature:literal)?;)*) => {
+        modules! { $($(#[$doc])* $set $(if $feature)?;)* }
 
         static MESSAGES: &[&[MessageInfo]] = &[
             $($(#[cfg(feature = $feature)])? $set::MESSAGES,)*
@@ -50,6 +57,15 @@ sets! {
     ground if "ground";
 }
 
+modules! {
+    /// The Reference Architecture 3.3, which came before the standards by SAE.
+    ///
+    /// Its command codes are those of other layouts in the sets above, so it has a registry of its
+    /// own: [`ra_registry`]. A command code is in the header there; here it stands before the data,
+    /// as in a [`Frame`](crate::wire::Frame).
+    ra33 if "ra33";
+}
+
 /// All messages of the service sets that are switched on.
 pub const fn registry() -> Registry {
     Registry::new(MESSAGES)
@@ -58,4 +74,17 @@ pub const fn registry() -> Registry {
 /// All services of the service sets that are switched on.
 pub fn services() -> impl Iterator<Item = &'static ServiceInfo> {
     SERVICES.iter().copied().flatten()
+}
+
+/// All messages of the Reference Architecture.
+#[cfg(feature = "ra33")]
+pub const fn ra_registry() -> Registry {
+    static MESSAGES: &[&[MessageInfo]] = &[ra33::MESSAGES];
+    Registry::new(MESSAGES)
+}
+
+/// All services of the Reference Architecture.
+#[cfg(feature = "ra33")]
+pub fn ra_services() -> impl Iterator<Item = &'static ServiceInfo> {
+    ra33::SERVICES.iter()
 }

@@ -49,7 +49,7 @@ impl Build {
     /// to; types are generated only for what [`module`](Self::module) names.
     pub fn new() -> Self {
         let mut loader = Loader::new();
-        loader.catalogue();
+        loader.catalogue().reference_architecture();
         Self {
             loader,
             runtime: "::jaus::codec".to_owned(),

@@ -2,7 +2,9 @@
 //! on a machine without the source.
 //!
 //! Definitions are grouped into sets, for example `core` (AS5710) and `mobility` (AS6009).
-//! [`Loader::catalogue`](crate::Loader::catalogue) loads all of them.
+//! [`Loader::catalogue`](crate::Loader::catalogue) loads all of them but [those of the Reference
+//! Architecture](Entry::of_reference_architecture), which has the same message codes for other
+//! layouts; [`Loader::reference_architecture`](crate::Loader::reference_architecture) loads these.
 
 use std::path::{Path, PathBuf};
 
@@ -28,7 +30,18 @@ pub struct Entry {
     packed: &'static [u8],
 }
 
+/// The sets of the Reference Architecture.
+const REFERENCE_ARCHITECTURE: &[&str] = &["ra33"];
+
 impl Entry {
+    /// Whether the messages are those of the Reference Architecture, the predecessor of the
+    /// standards by SAE: their codes mean other layouts there, so that a code alone must not lead
+    /// to them.
+    #[must_use]
+    pub fn of_reference_architecture(&self) -> bool {
+        REFERENCE_ARCHITECTURE.contains(&self.set)
+    }
+
     /// The XML text.
     #[must_use]
     pub fn text(&self) -> String {
@@ -86,11 +99,26 @@ mod tests {
     #[test]
     fn every_embedded_definition_is_sound() {
         let mut loader = Loader::new();
-        loader.catalogue();
+        loader.catalogue().reference_architecture();
         let loaded = loader.load();
         assert_eq!(loaded.diagnostics.to_string(), "");
         let services = ENTRIES.iter().filter(|e| e.element == "service_def");
         assert_eq!(loaded.library.services().count(), services.count());
+    }
+
+    #[test]
+    fn each_of_the_two_architectures_is_whole_without_the_other() {
+        let urns = |fill: fn(&mut Loader) -> &mut Loader| {
+            let mut loader = Loader::new();
+            fill(&mut loader);
+            let loaded = loader.load();
+            assert_eq!(loaded.diagnostics.to_string(), "");
+            let urns = loaded.library.services().map(|it| it.id.urn.to_string());
+            urns.collect::<Vec<_>>()
+        };
+        let of_ra = |urn: &String| urn.starts_with("urn:jaus-rs:ra33:");
+        assert!(!urns(Loader::catalogue).iter().any(of_ra));
+        assert!(urns(Loader::reference_architecture).iter().all(of_ra));
     }
 
     #[test]

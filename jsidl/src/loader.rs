@@ -21,6 +21,7 @@ pub struct Loader {
     program: Program,
     report: Report,
     with_catalogue: bool,
+    with_reference_architecture: bool,
 }
 
 /// What came of a load.
@@ -67,17 +68,29 @@ impl Loader {
         self
     }
 
-    /// Adds the definitions that come with this crate. What was added otherwise counts before
-    /// them, whatever the order.
+    /// Adds the definitions that come with this crate, but for those of the Reference
+    /// Architecture. What was added otherwise counts before them, whatever the order.
     pub fn catalogue(&mut self) -> &mut Self {
         self.with_catalogue = true;
         self
     }
 
+    /// Adds the definitions of the Reference Architecture that come with this crate. Their message
+    /// codes are those of other layouts in [the others](Self::catalogue).
+    pub fn reference_architecture(&mut self) -> &mut Self {
+        self.with_reference_architecture = true;
+        self
+    }
+
     /// Compiles everything that was added.
     pub fn load(mut self) -> Loaded {
-        if self.with_catalogue {
-            for entry in catalogue::entries() {
+        for entry in catalogue::entries() {
+            let wanted = if entry.of_reference_architecture() {
+                self.with_reference_architecture
+            } else {
+                self.with_catalogue
+            };
+            if wanted {
                 self.add(&catalogue::name(entry), &entry.text(), Strictness::Named);
             }
         }

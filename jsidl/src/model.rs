@@ -239,16 +239,20 @@ pub struct Scalar {
 pub enum Meaning {
     /// Itself.
     Plain,
-    /// A real number in a range (`scale_range`); only with unsigned integers.
+    /// A real number in a range (`scale_range`); only with integers of at most four octets.
     Scaled(Scale),
     /// One of a set of values (`value_set`). Other values occur and are kept.
     Values(ValueSet),
 }
 
 /// `scale_range`: `value = raw * (upper - lower) / (2^n - 1) + lower`.
+///
+/// In a signed integer, for which JSIDL has no rule and the Reference Architecture has this one, 0
+/// is the centre: `value = raw * (upper - lower) / (2^n - 2) + (upper + lower) / 2`. The least
+/// integer is then one step below the lower limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
-    /// Value of raw 0.
+    /// Value of the least raw number; in a signed integer, of the next.
     pub lower: f64,
     /// Value of the largest raw number; greater than `lower`.
     pub upper: f64,

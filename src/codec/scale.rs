@@ -5,7 +5,7 @@ use std::fmt;
 
 use super::exact::Expansion;
 
-/// A range of real numbers spread evenly over all values of an unsigned integer.
+/// A range of real numbers spread evenly over all values of an integer, counted from its least one.
 ///
 /// `value = raw * (upper - lower) / (2^n - 1) + lower`, both limits inclusive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +39,26 @@ impl Scale {
             step,
             rounding,
         }
+    }
+
+    /// The range for a type of integers with the limits `least` and `greatest`.
+    ///
+    /// A signed type has 0 in the centre of the range, and its least integer is one step below the
+    /// range, as the Reference Architecture has it; this is where the range given here begins.
+    pub const fn of_integer(
+        lower: f64,
+        upper: f64,
+        least: i64,
+        greatest: i64,
+        rounding: Rounding,
+    ) -> Self {
+        let max = greatest.abs_diff(least);
+        let lower = if least < 0 {
+            lower - (upper - lower) / (max - 1) as f64
+        } else {
+            lower
+        };
+        Self::new(lower, upper, max, rounding)
     }
 
     /// The least real number.
@@ -219,7 +239,7 @@ impl fmt::Display for OutOfRange {
     }
 }
 
-/// Gives a newtype over an unsigned integer what a scaled field needs.
+/// Gives a newtype over an integer what a scaled field needs.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __codec_scaled {
@@ -228,10 +248,11 @@ macro_rules! __codec_scaled {
         impl $crate::codec::Scaled for $name {
             const NAME: &'static str = $field;
             const UNIT: &'static str = $unit;
-            const SCALE: $crate::codec::Scale = $crate::codec::Scale::new(
+            const SCALE: $crate::codec::Scale = $crate::codec::Scale::of_integer(
                 $lower,
                 $upper,
-                <$raw>::MAX as u64,
+                <$raw>::MIN as i64,
+                <$raw>::MAX as i64,
                 $crate::codec::Rounding::$rounding,
             );
         }
@@ -244,7 +265,7 @@ macro_rules! __codec_scaled {
             #[inline]
             pub fn new(value: f64) -> Result<Self, $crate::codec::OutOfRange> {
                 match <Self as $crate::codec::Scaled>::SCALE.raw(value) {
-                    Some(raw) => Ok(Self(raw as $raw)),
+                    Some(count) => Ok(Self::of_count(count)),
                     None => Err($crate::codec::OutOfRange::of::<Self>(value)),
                 }
             }
@@ -252,7 +273,7 @@ macro_rules! __codec_scaled {
             /// The value in the unit of the field.
             #[inline]
             pub fn value(self) -> f64 {
-                <Self as $crate::codec::Scaled>::SCALE.value(u64::from(self.0))
+                <Self as $crate::codec::Scaled>::SCALE.value(self.count())
             }
 
             /// The integer on the wire.
@@ -263,6 +284,17 @@ macro_rules! __codec_scaled {
             /// From the integer on the wire; each one stands for a value.
             pub const fn from_raw(raw: $raw) -> Self {
                 Self(raw)
+            }
+
+            /// Steps from the least integer of the type.
+            #[inline]
+            const fn count(self) -> u64 {
+                (self.0 as i64).abs_diff(<$raw>::MIN as i64)
+            }
+
+            #[inline]
+            const fn of_count(count: u64) -> Self {
+                Self((count as i64 + <$raw>::MIN as i64) as $raw)
             }
         }
 
@@ -283,7 +315,7 @@ macro_rules! __codec_scaled {
         impl ::core::fmt::Display for $name {
             fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
                 let scale = <Self as $crate::codec::Scaled>::SCALE;
-                ::core::fmt::Display::fmt(&scale.shortest(u64::from(self.0)), f)
+                ::core::fmt::Display::fmt(&scale.shortest(self.count()), f)
             }
         }
 
@@ -297,7 +329,7 @@ macro_rules! __codec_scaled {
             impl $crate::codec::view::View for $name {
                 fn view(&self) -> $crate::codec::view::Value {
                     let scale = &<Self as $crate::codec::Scaled>::SCALE;
-                    $crate::codec::view::scaled(scale, u64::from(self.0))
+                    $crate::codec::view::scaled(scale, self.count())
                 }
 
                 fn from_view(
@@ -305,8 +337,8 @@ macro_rules! __codec_scaled {
                 ) -> Result<Self, $crate::codec::view::Error> {
                     let scale = &<Self as $crate::codec::Scaled>::SCALE;
                     let out_of_range = $crate::codec::OutOfRange::of::<Self>;
-                    let raw = $crate::codec::view::raw_scaled(value, scale, out_of_range)?;
-                    Ok(Self(raw as $raw))
+                    let count = $crate::codec::view::raw_scaled(value, scale, out_of_range)?;
+                    Ok(Self::of_count(count))
                 }
             }
         }

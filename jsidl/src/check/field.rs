@@ -3,7 +3,7 @@
 use crate::diagnostic::Report;
 use crate::model::{Number, Scale, SubField, Unsigned, ValueRange, ValueSet};
 use crate::source::Span;
-use crate::syntax::{self, ScalarField};
+use crate::syntax::{self, ScalarField, ScaleRange};
 
 use super::unique_indices;
 
@@ -21,21 +21,43 @@ pub(crate) fn one_meaning(report: &mut Report, field: &ScalarField) -> Option<()
     }
 }
 
-/// Scales need an unsigned integer and two different limits in order.
-pub(crate) fn scale(report: &mut Report, span: Span, scale: Scale, number: Number) -> Option<()> {
-    let Number::Unsigned(unsigned) = number else {
+/// Scales need an unsigned integer, or one whose zero is the centre of the range, and two different
+/// limits in order.
+pub(crate) fn scale(
+    report: &mut Report,
+    range: &ScaleRange,
+    scale: Scale,
+    number: Number,
+) -> Option<()> {
+    let span = range.span;
+    match number {
+        Number::Unsigned(_) if range.centred => {
+            report.error(
+                span,
+                "only the range of a signed integer has its zero in the centre: change the \
+                 `field_type`, or remove the attribute `bias`",
+            );
+            return None;
+        }
+        Number::Unsigned(_) => {}
+        Number::Signed(_) if range.centred => {}
+        Number::Signed(_) | Number::F32 | Number::F64 => {
+            report.error(
+                span,
+                "a `scale_range` needs an unsigned integer: change the `field_type`, or remove \
+                 the range",
+            );
+            return None;
+        }
+    }
+    if number.size() == 8 {
+        let name = number.name();
         report.error(
             span,
-            "a `scale_range` needs an unsigned integer: change the `field_type`, or remove the \
-             range",
-        );
-        return None;
-    };
-    if unsigned == Unsigned::U64 {
-        report.error(
-            span,
-            "a real number cannot tell the steps of a scaled `unsigned long integer` apart: use \
-             `unsigned integer`",
+            format!(
+                "a real number cannot tell the steps of a scaled `{name}` apart: use `{}`",
+                name.replace("long ", "")
+            ),
         );
         return None;
     }

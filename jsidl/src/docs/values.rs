@@ -1,27 +1,24 @@
 //! The values that a number may have, in words.
 
 use super::block::{Cell, Line, code, muted, text};
-use crate::model::{Meaning, Number, Scalar, Scale, Unsigned, ValueRange, ValueSet};
+use crate::dynamic::Steps;
+use crate::model::{Meaning, Number, Scalar, Scale, ValueRange, ValueSet};
 
 /// Range and resolution, or the named values.
 pub(super) fn of(scalar: &Scalar) -> Cell {
     match (&scalar.meaning, scalar.number) {
-        (Meaning::Scaled(scale), Number::Unsigned(width)) => scaled(scale, width),
+        (Meaning::Scaled(scale), number) => scaled(scale, number),
         (Meaning::Values(set), _) => of_set(set),
         _ => Vec::new(),
     }
 }
 
-fn scaled(scale: &Scale, width: Unsigned) -> Cell {
-    let step = (scale.upper - scale.lower) / width.max() as f64;
-    vec![
-        vec![text(format!(
-            "{} to {}",
-            number(scale.lower),
-            number(scale.upper)
-        ))],
-        vec![muted(format!("in steps of {}", significant(step)))],
-    ]
+fn scaled(scale: &Scale, kind: Number) -> Cell {
+    let limits = format!("{} to {}", number(scale.lower), number(scale.upper));
+    let steps = Steps::of(scale, kind);
+    let steps = steps.map(|steps| format!("in steps of {}", significant(steps.step())));
+    let steps = steps.map(|steps| vec![muted(steps)]);
+    [vec![text(limits)]].into_iter().chain(steps).collect()
 }
 
 /// Named values, a line each, and ranges.

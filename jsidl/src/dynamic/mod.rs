@@ -27,7 +27,7 @@ pub use encode::{encode, encode_with};
 pub use error::{DecodeError, DecodeProblem, EncodeError, EncodeProblem, Path, Step};
 #[cfg(feature = "json")]
 pub use json::{JsonError, JsonProblem, from_json, to_json};
-pub use scale::{raw_from_real, real_from_raw, shortest_real};
+pub use scale::{Steps, raw_from_real, real_from_raw, shortest_real};
 pub use value::{Raw, Value};
 
 /// Whether the counts of a message must keep to the limits that its definition states.

@@ -1,4 +1,4 @@
-//! Scaled integers: real numbers in a range, sent as unsigned integers.
+//! Scaled integers: real numbers in a range, sent as integers.
 //!
 //! A real number becomes the integer that the definition's `integer_function` gives for
 //! `(real - lower) * (2^n - 1) / (upper - lower)`, computed without any rounding error: limits and
@@ -7,7 +7,72 @@
 
 use std::cmp::Ordering;
 
-use crate::model::{Rounding, Scale, Unsigned};
+use super::value::Raw;
+use crate::model::{Number, Rounding, Scale, Signed, Unsigned};
+
+/// The values of a scaled integer of any type, counted from its least one.
+#[derive(Debug, Clone, Copy)]
+pub struct Steps {
+    /// From the value of the least integer.
+    scale: Scale,
+    width: Unsigned,
+    /// The least integer, if the type is signed.
+    least: Option<i64>,
+}
+
+impl Steps {
+    /// `None` if such numbers cannot be scaled.
+    pub fn of(scale: &Scale, number: Number) -> Option<Self> {
+        let width = match number {
+            Number::Unsigned(width) => width,
+            Number::Signed(Signed::I8) => Unsigned::U8,
+            Number::Signed(Signed::I16) => Unsigned::U16,
+            Number::Signed(Signed::I32) => Unsigned::U32,
+            Number::Signed(Signed::I64) | Number::F32 | Number::F64 => return None,
+        };
+        let Number::Signed(_) = number else {
+            return Some(Self {
+                scale: *scale,
+                width,
+                least: None,
+            });
+        };
+        let step = (scale.upper - scale.lower) / (width.max() - 1) as f64;
+        Some(Self {
+            scale: Scale {
+                lower: scale.lower - step,
+                ..*scale
+            },
+            width,
+            least: Some(-(1 << (width.size() * 8 - 1))),
+        })
+    }
+
+    /// The distance between neighbouring values.
+    pub fn step(&self) -> f64 {
+        (self.scale.upper - self.scale.lower) / self.width.max() as f64
+    }
+
+    /// What people are shown: see [`shortest_real`]. `None` if the integer is of another type.
+    pub fn shown(&self, raw: Raw) -> Option<f64> {
+        let count = match (raw, self.least) {
+            (Raw::Unsigned(raw), None) => raw,
+            (Raw::Signed(raw), Some(least)) => raw.checked_sub(least)?.try_into().ok()?,
+            _ => return None,
+        };
+        Some(shortest_real(&self.scale, self.width, count))
+    }
+
+    /// The integer that stands for a real number: see [`raw_from_real`].
+    pub fn raw(&self, real: f64) -> Option<Raw> {
+        let count = raw_from_real(&self.scale, self.width, real)?;
+        Some(match self.least {
+            None => Raw::Unsigned(count),
+            // A signed type has at most 32 bits.
+            Some(least) => Raw::Signed(count as i64 + least),
+        })
+    }
+}
 
 /// The real number that an integer stands for: `raw * (upper - lower) / (2^n - 1) + lower`.
 pub fn real_from_raw(scale: &Scale, width: Unsigned, raw: u64) -> f64 {

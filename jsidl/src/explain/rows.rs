@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use super::{Kind, Row};
 use crate::dynamic::trace::{Part, Place, Trace};
-use crate::dynamic::{Raw, shortest_real};
+use crate::dynamic::{Raw, Steps};
 use crate::model::{
-    BitField, Choice, Count, Format, Group, Item, Meaning, Number, Scalar, Unsigned, ValueRange,
-    ValueSet, Variant,
+    BitField, Choice, Count, Format, Group, Item, Meaning, Scalar, Unsigned, ValueRange, ValueSet,
+    Variant,
 };
 
 /// Writes a row for everything that the decoder tells.
@@ -211,8 +211,8 @@ fn number(mut row: Row, scalar: &Scalar, raw: Raw) -> Row {
     row.raw = Some(raw);
     row.units = (scalar.units != "one" && !scalar.units.is_empty()).then(|| scalar.units.clone());
     match (&scalar.meaning, scalar.number, raw) {
-        (Meaning::Scaled(scale), Number::Unsigned(width), Raw::Unsigned(raw)) => {
-            row.real = Some(shortest_real(scale, width, raw));
+        (Meaning::Scaled(scale), number, raw) => {
+            row.real = Steps::of(scale, number).and_then(|steps| steps.shown(raw));
             row
         }
         (Meaning::Values(values), _, raw) => named(row, values, raw),

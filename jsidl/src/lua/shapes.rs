@@ -184,14 +184,14 @@ fn number(field: &str, scalar: &Scalar) -> String {
         units => text::quoted(units),
     };
     match (&scalar.meaning, scalar.number) {
-        (Meaning::Scaled(scale), Number::Unsigned(width)) => {
-            let (size, lower, upper) = (width.size(), scale.lower, scale.upper);
+        (Meaning::Scaled(scale), kind) => {
+            let (kind, lower, upper) = (type_of(kind), scale.lower, scale.upper);
             let rounding = match scale.rounding {
                 Rounding::Round => "",
                 Rounding::Floor => ",\"floor\"",
                 Rounding::Ceiling => ",\"ceiling\"",
             };
-            format!("{{\"scaled\",{field},{size},{lower:?},{upper:?},{units}{rounding}}}")
+            format!("{{\"scaled\",{field},\"{kind}\",{lower:?},{upper:?},{units}{rounding}}}")
         }
         (_, kind) => {
             let kind = type_of(kind);

@@ -47,9 +47,8 @@ impl Resolver<'_> {
         check::one_meaning(self.report, field)?;
         let meaning = match (scale, values) {
             (Some(scale), _) => {
-                let range = field.scale.as_ref()?.span;
                 let scale = scale?;
-                check::scale(self.report, range, scale, field.number)?;
+                check::scale(self.report, field.scale.as_ref()?, scale, field.number)?;
                 Meaning::Scaled(scale)
             }
             (None, Some(values)) => Meaning::Values(values?),

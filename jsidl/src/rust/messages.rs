@@ -226,11 +226,11 @@ fn define(out: &mut Writer, Definition { ident, kind }: &Definition<'_>) {
         Kind::Measure { item, choices } => choices::measure(out, ident, item, choices),
         Kind::Scaled {
             name,
-            unsigned,
+            number,
             scale,
             unit,
         } => {
-            newtypes::scaled(out, ident, name, *unsigned, *scale, unit);
+            newtypes::scaled(out, ident, name, *number, *scale, unit);
         }
         Kind::Enumeration {
             name,

@@ -3,6 +3,7 @@
 use super::docs;
 use super::types::{SubType, number_type, unsigned_type, width};
 use super::writer::Writer;
+use crate::dynamic::Steps;
 use crate::model::{BitField, Item, NamedValue, Number, Rounding, Scale, Unsigned, ValueSet};
 
 const DERIVES: &str = "#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]";
@@ -12,17 +13,17 @@ pub(super) fn scaled(
     out: &mut Writer,
     ident: &str,
     name: &str,
-    unsigned: Unsigned,
+    number: Number,
     scale: Scale,
     unit: &str,
 ) {
-    let ty = unsigned_type(unsigned);
+    let ty = number_type(number);
     let in_unit = if unit == "one" {
         String::new()
     } else {
         format!(" in {}", docs::prose(unit))
     };
-    let step = (scale.upper - scale.lower) / unsigned.max() as f64;
+    let step = Steps::of(&scale, number).map_or(f64::NAN, |steps| steps.step());
     out.doc([format!(
         "`{name}`{in_unit}: {} to {} in steps of {step:.3e}, carried as `{ty}`.",
         scale.lower, scale.upper

@@ -86,7 +86,7 @@ pub(super) enum Kind<'m> {
     },
     Scaled {
         name: &'m str,
-        unsigned: Unsigned,
+        number: Number,
         scale: Scale,
         unit: &'m str,
     },
@@ -314,11 +314,11 @@ impl<'m, 's> Nested<'m, 's> {
     fn scalar(&mut self, name: &str, field: &'m str, scalar: &'m Scalar) -> Type {
         let content = fingerprint::scalar(scalar);
         match (&scalar.meaning, scalar.number) {
-            (Meaning::Scaled(scale), Number::Unsigned(unsigned)) => {
+            (Meaning::Scaled(scale), number) => {
                 let unit = &scalar.units;
                 let ident = self.define(name, &content, |_| Kind::Scaled {
                     name: field,
-                    unsigned,
+                    number,
                     scale: *scale,
                     unit,
                 });

@@ -11,7 +11,7 @@ const RESERVED: &str = "_reserved";
 /// A `fixed_field`, or the value of a `variable_field`.
 pub(super) fn scalar(scalar: &Scalar) -> Json {
     let mut schema = match (&scalar.meaning, scalar.number) {
-        (Meaning::Scaled(scale), Number::Unsigned(_)) => {
+        (Meaning::Scaled(scale), _) => {
             json!({ "type": "number", "minimum": scale.lower, "maximum": scale.upper })
         }
         (Meaning::Values(values), number) => named(plain(number), values),

@@ -1,7 +1,7 @@
 //! A cursor over XML elements that knows the habits of the language: two namespaces for the same
 //! elements, attributes with runs of white space, and the wish to report everything at once.
 
-use roxmltree::Node as Xml;
+use roxmltree::{ExpandedName, Node as Xml};
 
 use super::Expr;
 use crate::diagnostic::Report;
@@ -139,7 +139,11 @@ impl Reader<'_> {
     }
 
     /// An attribute's text, white space folded.
-    pub(super) fn attribute(&self, xml: Xml<'_, '_>, name: &str) -> Option<Spanned<String>> {
+    pub(super) fn attribute<'n, 'm>(
+        &self,
+        xml: Xml<'_, '_>,
+        name: impl Into<ExpandedName<'n, 'm>>,
+    ) -> Option<Spanned<String>> {
         let attribute = xml.attribute_node(name)?;
         Some(Spanned {
             value: fold(attribute.value()),

@@ -7,6 +7,9 @@ use super::{ChoiceEnum, FormatEnum, Kind, ScalarField, ScaleRange, SubField, Val
 use super::{ValueRange, ValueSet};
 use crate::model::Rounding;
 
+/// The namespace of the attributes that JSIDL does not have.
+const EXTENSION: &str = "urn:jaus-rs:jsidl";
+
 impl Reader<'_> {
     /// Reads type, units and meaning of a `fixed_field` or `type_and_units_enum`.
     pub(super) fn scalar(&mut self, xml: Xml<'_, '_>) -> Option<ScalarField> {
@@ -53,12 +56,24 @@ impl Reader<'_> {
         let rounding = self
             .required(xml, "integer_function")
             .and_then(|text| self.word(&text, "integer_function", &ROUNDINGS));
+        let centred = self.centred(xml);
         Some(ScaleRange {
             span: self.span(xml),
             lower: lower?,
             upper: upper?,
             rounding: rounding?,
+            centred: centred?,
         })
+    }
+
+    /// Reads the attribute `bias` of our own namespace, which makes the zero of a signed integer
+    /// the centre of its range: the Reference Architecture has such numbers, JSIDL has no word for
+    /// them.
+    fn centred(&mut self, xml: Xml<'_, '_>) -> Option<bool> {
+        let Some(bias) = self.attribute(xml, (EXTENSION, "bias")) else {
+            return Some(false);
+        };
+        self.word(&bias, "bias", &[("centre", true)])
     }
 
     /// Reads a `value_set`.

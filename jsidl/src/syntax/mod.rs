@@ -306,6 +306,8 @@ pub(crate) struct ScaleRange {
     pub(crate) lower: Expr,
     pub(crate) upper: Expr,
     pub(crate) rounding: Rounding,
+    /// The centre of the range is the number's zero.
+    pub(crate) centred: bool,
 }
 
 /// `value_set`

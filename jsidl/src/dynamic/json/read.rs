@@ -7,10 +7,10 @@ use serde_json::{Map, Value as Json};
 use super::hex::from_hex;
 use super::{HEX, JsonError, JsonProblem, RESERVED, SECTIONS};
 use crate::dynamic::error::{Fault, Step};
-use crate::dynamic::scale::raw_from_real;
+use crate::dynamic::scale::Steps;
 use crate::dynamic::{Raw, Value};
 use crate::model::{
-    Array, BitField, Choice, Group, Item, Meaning, Message, Number, Scalar, Shape, Signed,
+    Array, BitField, Choice, Group, Item, Meaning, Message, Number, Scalar, Scale, Shape, Signed,
     SubField, Unsigned, ValueSet, Variant,
 };
 
@@ -146,8 +146,16 @@ fn variant(variant: &Variant, json: &Json) -> Read<Value> {
     }
 }
 
+/// The scale of a scaled integer, and its steps.
+fn scaled(scalar: &Scalar) -> Option<(&Scale, Steps)> {
+    match &scalar.meaning {
+        Meaning::Scaled(scale) => Some((scale, Steps::of(scale, scalar.number)?)),
+        _ => None,
+    }
+}
+
 fn number(scalar: &Scalar, json: &Json) -> Read<Raw> {
-    if let (Meaning::Scaled(scale), Number::Unsigned(width)) = (&scalar.meaning, scalar.number) {
+    if let Some((scale, steps)) = scaled(scalar) {
         let range = || {
             format!(
                 "a number from {} to {} {}",
@@ -155,13 +163,13 @@ fn number(scalar: &Scalar, json: &Json) -> Read<Raw> {
             )
         };
         let value = json.as_f64().ok_or_else(|| expected(range(), json))?;
-        let raw = raw_from_real(scale, width, value).ok_or_else(|| JsonProblem::OutOfRange {
+        let raw = steps.raw(value).ok_or_else(|| JsonProblem::OutOfRange {
             value,
             lower: scale.lower,
             upper: scale.upper,
             units: scalar.units.clone(),
         })?;
-        return Ok(Raw::Unsigned(raw));
+        return Ok(raw);
     }
     let values = match &scalar.meaning {
         Meaning::Values(values) => Some(values),

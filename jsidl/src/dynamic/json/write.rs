@@ -6,7 +6,7 @@ use super::hex::to_hex;
 use super::{HEX, RESERVED, SECTIONS};
 use crate::dynamic::encode::{mismatch, missing, slots, unfit};
 use crate::dynamic::error::{EncodeError, EncodeProblem, Fault, Step};
-use crate::dynamic::scale::shortest_real;
+use crate::dynamic::scale::Steps;
 use crate::dynamic::{Raw, Value};
 use crate::model::{
     Array, BitField, Group, Item, Meaning, Message, Number, Scalar, Shape, Variant,
@@ -120,10 +120,13 @@ fn variant(variant: &Variant, tag: u64, value: Option<&Value>) -> View {
 }
 
 fn number(scalar: &Scalar, raw: Raw) -> View {
+    if let Meaning::Scaled(scale) = &scalar.meaning {
+        let shown = Steps::of(scale, scalar.number).and_then(|steps| steps.shown(raw));
+        return shown
+            .map(real)
+            .ok_or_else(|| unfit(raw, scalar.number).into());
+    }
     Ok(match (&scalar.meaning, scalar.number, raw) {
-        (Meaning::Scaled(scale), Number::Unsigned(width), Raw::Unsigned(raw)) => {
-            real(shortest_real(scale, width, raw))
-        }
         (_, Number::Unsigned(_), Raw::Unsigned(raw)) => raw.into(),
         (_, Number::Signed(_), Raw::Signed(raw)) => raw.into(),
         (_, Number::F32, Raw::F32(raw)) => real(widened(raw)),

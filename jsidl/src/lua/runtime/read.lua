@@ -80,8 +80,15 @@ local to_integer = {
     ceiling = math.ceil,
 }
 
-local function unscaled(raw, size, lower, upper, rounding)
-    local step = (upper - lower) / (2 ^ (8 * size) - 1)
+local function unscaled(raw, kind, lower, upper, rounding)
+    local size = tonumber(kind:sub(2))
+    local most = 2 ^ (8 * size) - 1
+    if kind:sub(1, 1) == "i" then
+        -- 0 is the centre, and the least integer is one step below the range.
+        raw = raw + 2 ^ (8 * size - 1)
+        lower = lower - (upper - lower) / (most - 1)
+    end
+    local step = (upper - lower) / most
     local convert = to_integer[rounding or "round"]
     local function is_same(real)
         return real >= lower and real <= upper and convert((real - lower) / step) == raw
@@ -227,9 +234,8 @@ readers["number"] = function(reader, node, shape)
 end
 
 readers["scaled"] = function(reader, node, shape)
-    local size = shape[3]
-    local raw = count(reader, size)
-    node.value = unscaled(raw, size, shape[4], shape[5], shape[7])
+    local raw = number(reader, shape[3])
+    node.value = unscaled(raw, shape[3], shape[4], shape[5], shape[7])
     node.text = string.format("%s (%.0f)", unit_text(shape[6]) or "", raw)
 end
 
