@@ -34,6 +34,7 @@ pub mod node;
 pub mod ocu;
 #[cfg(feature = "parts")]
 pub mod parts;
+pub mod ra;
 pub mod service;
 #[cfg(feature = "mobility")]
 pub mod vehicle;

@@ -1,0 +1,85 @@
+//! Component types of the Reference Architecture: there the number of a component names what it
+//! does.
+
+use std::fmt;
+
+/// The type of an RA component, which is its component number.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct RaComponent(pub u8);
+
+/// The constants, and the names that people read.
+macro_rules! components {
+    ($($(#[$doc:meta])* $name:ident = $number:literal, $text:literal;)*) => {
+        impl RaComponent {
+            $($(#[$doc])* pub const $name: Self = Self($number);)*
+
+            /// What the type is called, if it is one of those of RA 3.3 that we know.
+            #[must_use]
+            pub const fn name(self) -> Option<&'static str> {
+                match self.0 {
+                    $($number => Some($text),)*
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+components! {
+    /// Speaks for a node.
+    NODE_MANAGER = 1, "Node Manager";
+    /// An operator's or planner's client of a whole subsystem.
+    SUBSYSTEM_COMMANDER = 32, "Subsystem Commander";
+    /// Drives by effort.
+    PRIMITIVE_DRIVER = 33, "Primitive Driver";
+    /// Drives by heading and speed on the globe.
+    GLOBAL_VECTOR_DRIVER = 34, "Global Vector Driver";
+    /// Speaks for a subsystem.
+    COMMUNICATOR = 35, "Communicator";
+    /// Position and attitude on the globe.
+    GLOBAL_POSE_SENSOR = 38, "Global Pose Sensor";
+    /// A client that tasks a subsystem.
+    SYSTEM_COMMANDER = 40, "System Commander";
+    /// Position and attitude in a local frame.
+    LOCAL_POSE_SENSOR = 41, "Local Pose Sensor";
+    /// Velocities.
+    VELOCITY_STATE_SENSOR = 42, "Velocity State Sensor";
+    /// Stands between drivers and avoids harm.
+    REFLEXIVE_DRIVER = 43, "Reflexive Driver";
+    /// Drives by heading and speed in a local frame.
+    LOCAL_VECTOR_DRIVER = 44, "Local Vector Driver";
+    /// Drives to places on the globe.
+    GLOBAL_WAYPOINT_DRIVER = 45, "Global Waypoint Driver";
+    /// Drives to places in a local frame.
+    LOCAL_WAYPOINT_DRIVER = 46, "Local Waypoint Driver";
+    /// Drives along paths on the globe.
+    GLOBAL_PATH_SEGMENT_DRIVER = 47, "Global Path Segment Driver";
+    /// Drives along paths in a local frame.
+    LOCAL_PATH_SEGMENT_DRIVER = 48, "Local Path Segment Driver";
+    /// Keeps objects of the world.
+    VECTOR_KNOWLEDGE_STORE = 61, "Vector Knowledge Store";
+}
+
+impl RaComponent {
+    /// Whether it stands for its node or subsystem rather than for a service: node manager and
+    /// communicator.
+    #[must_use]
+    pub const fn is_infrastructure(self) -> bool {
+        matches!(self, Self::NODE_MANAGER | Self::COMMUNICATOR)
+    }
+}
+
+impl fmt::Display for RaComponent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.name() {
+            Some(name) => f.pad(name),
+            None => write!(f, "component type {}", self.0),
+        }
+    }
+}
+
+impl fmt::Debug for RaComponent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({self})", self.0)
+    }
+}
