@@ -8,6 +8,7 @@
 )]
 
 pub mod failure;
+pub mod junit;
 mod launch;
 pub mod logging;
 pub mod network;

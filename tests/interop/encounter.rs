@@ -1,0 +1,251 @@
+//! One party acts on another: every scenario, on a network of their own.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use crate::hosts::{Host, Hosts};
+use crate::party::{Place, Values, patience};
+use crate::process::Process;
+use crate::scenario::{KEEP, LOAD, Scenario};
+use crate::settings::{Party, Side};
+use crate::verdict::{Cell, Column, Verdict};
+
+/// What who keeps asking prints for each answer.
+const ANSWERED: &str = "report";
+/// Answers in a row after which things go on as before.
+const ENOUGH: usize = 3;
+/// Between two tries of what may be tried again.
+const PAUSE: Duration = Duration::from_millis(300);
+/// Beyond this a recording ends, so that long runs do not fill the disk.
+const MEGABYTES: &str = "100";
+
+/// Two parties on their hosts.
+struct Encounter<'a> {
+    actor: Place<'a>,
+    answerer: Place<'a>,
+    hosts: &'a Hosts,
+    directory: &'a Path,
+}
+
+/// Tries all of these scenarios. What is left of the run is in the directory.
+///
+/// # Errors
+/// If there can be no network or no files.
+pub(crate) fn run(
+    (peer, actor, answerer): (&str, &Party, &Party),
+    scenarios: &[Scenario],
+    directory: &Path,
+) -> Result<Column, String> {
+    // What is left of the run before would only confuse.
+    let _ = std::fs::remove_dir_all(directory);
+    std::fs::create_dir_all(directory)
+        .map_err(|error| format!("{}: {error}", directory.display()))?;
+    let hosts = Hosts::new()?;
+    let mut encounter = Encounter {
+        actor: Place::new(actor, answerer, Host::Actor, &hosts, directory),
+        answerer: Place::new(answerer, actor, Host::Answerer, &hosts, directory),
+        hosts: &hosts,
+        directory,
+    };
+    let cells = scenarios.iter().map(|&scenario| encounter.cell(scenario));
+    Ok(Column {
+        peer: peer.to_owned(),
+        actor: actor.name.clone(),
+        answerer: answerer.name.clone(),
+        cells: cells.collect(),
+    })
+}
+
+impl Encounter<'_> {
+    /// Fills one cell of the table.
+    fn cell(&mut self, scenario: Scenario) -> Cell {
+        let start = Instant::now();
+        let mut recording = None;
+        let verdict = match self.way(scenario) {
+            Err(reason) => Verdict::NotApplicable(reason),
+            Ok((side, act)) => {
+                let file = self.directory.join(format!("{}.pcapng", scenario.key()));
+                let observer = self.observe(&file);
+                let tried = self.carry_out(scenario, side, act);
+                drop(observer);
+                match tried {
+                    Ok(()) => {
+                        // Only what went wrong is looked at.
+                        let _ = std::fs::remove_file(&file);
+                        Verdict::Passed
+                    }
+                    Err(reason) => {
+                        recording = file.exists().then_some(file);
+                        Verdict::Failed(self.answerer.trouble().unwrap_or(reason))
+                    }
+                }
+            }
+        };
+        Cell {
+            scenario,
+            verdict,
+            took: start.elapsed(),
+            recording,
+        }
+    }
+
+    /// What the other has to be and what the actor is told, or why neither can be.
+    fn way(&self, scenario: Scenario) -> Result<(Side, &'static str), String> {
+        let (actor, answerer) = (self.actor.party, self.answerer.party);
+        let excuse = actor.excuse_of_actor(scenario);
+        if let Some(reason) = excuse.or(answerer.excuse_of_answerer(scenario)) {
+            return Err(reason.to_owned());
+        }
+        let ways = match (scenario.side(), scenario.act()) {
+            (Some(side), Some(act)) => vec![(side, act)],
+            _ => KEEP.to_vec(),
+        };
+        let can_ask = |(_, act): &(Side, &str)| actor.act.contains_key(*act);
+        let can_answer = |(side, _): &(Side, &str)| answerer.side.contains_key(side);
+        if let Some(way) = ways.iter().find(|way| can_ask(way) && can_answer(way)) {
+            return Ok(*way);
+        }
+        Err(match ways.iter().find(|way| can_ask(way)) {
+            Some((side, _)) => format!("{} does not play {side}", answerer.name),
+            None => format!("{} has no command for it", actor.name),
+        })
+    }
+
+    fn observe(&self, file: &Path) -> Option<Process> {
+        let command = [
+            env!("CARGO_BIN_EXE_jaus"),
+            "record",
+            &file.display().to_string(),
+            "--overwrite",
+            "--quiet",
+            "--interface",
+            Hosts::observed(),
+            "--megabytes",
+            MEGABYTES,
+        ];
+        let log: PathBuf = self.directory.join("observer.log");
+        // The run is worth as much without.
+        Process::start(&self.hosts.switch(), &command.map(str::to_owned), &log).ok()
+    }
+
+    fn carry_out(&mut self, scenario: Scenario, side: Side, act: &str) -> Result<(), String> {
+        self.actor.be(None)?;
+        self.answerer.be(Some(side))?;
+        match scenario {
+            Scenario::AnswererRestarts => self.restart_answerer(act),
+            Scenario::ActorRestarts => self.restart_actor(act),
+            Scenario::Cable => self.pull_cable(act),
+            Scenario::Mixed => self.mix(side, act),
+            _ => self.try_until_right(scenario, act),
+        }
+    }
+
+    /// Has the actor do something, again if that is fair, until it is as it must be.
+    fn try_until_right(&self, scenario: Scenario, act: &str) -> Result<(), String> {
+        let deadline = Instant::now() + patience();
+        loop {
+            let result = self.try_once(scenario, act);
+            if result.is_ok() || !scenario.may_try_again() || Instant::now() > deadline {
+                return result;
+            }
+            std::thread::sleep(PAUSE);
+        }
+    }
+
+    fn try_once(&self, scenario: Scenario, act: &str) -> Result<(), String> {
+        let values = Values {
+            octets: scenario.octets(),
+            ..Values::default()
+        };
+        let process = self.actor.act(act, &values, &scenario.key())?;
+        // It may need a moment to say what it waited for in vain.
+        let said = process.ends(patience() + Duration::from_secs(10))?;
+        self.check(scenario, &said)
+    }
+
+    /// Whether the actor has found out what is to be found.
+    fn check(&self, scenario: Scenario, said: &str) -> Result<(), String> {
+        let answerer = self.answerer.party;
+        match scenario {
+            Scenario::Discover => {
+                let id = answerer.id.to_string();
+                let between = |character: char| !character.is_ascii_digit() && character != '.';
+                let is_found = said.split(between).any(|word| word == id);
+                is_found.then_some(()).ok_or(format!("{id} was not found"))
+            }
+            Scenario::Services => {
+                let services = answerer.side.get(&Side::Vehicle).map(|side| &side.services);
+                let mut missing = services.into_iter().flatten();
+                match missing.find(|service| !said.contains(service.as_str())) {
+                    Some(missing) => Err(format!("{missing} is missing from the list of services")),
+                    None => Ok(()),
+                }
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Has the actor keep asking, until it has been answered for a while.
+    fn keep(&self, act: &str) -> Result<Process, String> {
+        let mut keep = self.actor.act(act, &Values::default(), "keep")?;
+        goes_on(&mut keep)?;
+        Ok(keep)
+    }
+
+    fn restart_answerer(&mut self, act: &str) -> Result<(), String> {
+        let mut keep = self.keep(act)?;
+        let side = self.answerer.crash();
+        self.answerer.be(side)?;
+        keep.forget();
+        goes_on(&mut keep)
+    }
+
+    fn restart_actor(&self, act: &str) -> Result<(), String> {
+        self.keep(act)?.kill();
+        self.keep(act).map(drop)
+    }
+
+    fn pull_cable(&self, act: &str) -> Result<(), String> {
+        let mut keep = self.keep(act)?;
+        self.hosts.cable(false)?;
+        std::thread::sleep(Duration::from_secs(crate::number("JAUS_INTEROP_CABLE", 10)));
+        self.hosts.cable(true)?;
+        keep.forget();
+        goes_on(&mut keep)
+    }
+
+    /// One does not stop asking, while another does everything else in turn.
+    fn mix(&self, side: Side, act: &str) -> Result<(), String> {
+        let end = Instant::now() + Duration::from_secs(crate::number("JAUS_INTEROP_MIXED", 10));
+        let (actor, answerer) = (self.actor.party, self.answerer.party);
+        let can = |scenario: &Scenario| {
+            let excuse = actor.excuse_of_actor(*scenario);
+            let excuse = excuse.or(answerer.excuse_of_answerer(*scenario));
+            let act = scenario.act().filter(|act| actor.act.contains_key(*act));
+            scenario.side() == Some(side) && excuse.is_none() && act.is_some()
+        };
+        let others: Vec<Scenario> = Scenario::all().into_iter().filter(can).collect();
+        let mut keep = self.keep(act)?;
+        while Instant::now() < end {
+            for scenario in &others {
+                self.try_until_right(*scenario, scenario.act().unwrap_or_default())
+                    .map_err(|reason| format!("{}: {reason}", scenario.title()))?;
+                keep.forget();
+                keep.says(ANSWERED, patience())?;
+            }
+            if actor.act.contains_key(LOAD) {
+                let values = Values {
+                    octets: Scenario::Mixed.octets(),
+                    ..Values::default()
+                };
+                self.actor.act(LOAD, &values, LOAD)?.ends(patience())?;
+            }
+        }
+        goes_on(&mut keep)
+    }
+}
+
+/// Waits until enough answers have come.
+fn goes_on(keep: &mut Process) -> Result<(), String> {
+    (0..ENOUGH).try_for_each(|_| keep.says(ANSWERED, patience()))
+}

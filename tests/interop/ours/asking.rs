@@ -1,0 +1,56 @@
+//! Subscriptions that only listen.
+
+use jaus::component::When;
+use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState};
+
+use super::{Outcome, Told};
+
+/// The query for the forward velocity alone, which whoever moves can tell.
+pub(super) const FORWARD: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
+/// Reports in a row that make a subscription.
+const ENOUGH: usize = 10;
+/// Reports in a second.
+const HZ: f64 = 10.0;
+
+/// Subscribes to the velocity, and hears enough of it.
+pub(super) async fn periodic(told: &Told) -> Outcome {
+    let (_node, component) = told.component()?;
+    let mut reports = component
+        .subscribe::<ReportVelocityState, _>(told.other, &FORWARD, When::hz(HZ))
+        .await
+        .map_err(|error| error.to_string())?;
+    for _ in 0..ENOUGH {
+        let report = reports.report().await.ok_or("the subscription has ended")?;
+        report
+            .velocity_x_m_per_s()
+            .ok_or("a report without the velocity that was asked for")?;
+    }
+    println!(
+        "{ENOUGH} reports at {:?} Hz, {} lost",
+        reports.hz(),
+        reports.lost()
+    );
+    Ok(())
+}
+
+/// Tells each report of the velocity, for ever.
+pub(super) async fn keep(told: &Told) -> Outcome {
+    let (_node, component) = told.component()?;
+    loop {
+        // One that is not there yet is asked again.
+        let subscribed = component
+            .subscribe::<ReportVelocityState, _>(told.other, &FORWARD, When::hz(HZ))
+            .await;
+        let mut reports = match subscribed {
+            Ok(reports) => reports,
+            Err(error) => {
+                println!("not yet: {error}");
+                continue;
+            }
+        };
+        while let Some(report) = reports.report().await {
+            println!("report: {:?} m/s", report.velocity_x_m_per_s());
+        }
+        println!("the subscription has ended: {:?}", reports.end());
+    }
+}

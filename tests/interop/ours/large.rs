@@ -1,0 +1,147 @@
+//! Messages of any size, there and back.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::endpoint::Outgoing;
+use jaus::node::{Node, Port};
+use tokio::time::{sleep, timeout};
+
+use super::{Outcome, Told};
+
+/// The code of a test message: user-defined (AS5710 leaves D000h and above to users), so that no
+/// service acts on it.
+const TEST: u16 = 0xD7F0;
+/// Octets of the message that makes each side known to the other.
+const GREETING: usize = 16;
+/// After this long without an answer, what may have been lost is sent again.
+const AGAIN: Duration = Duration::from_secs(3);
+/// Between two messages of [`keep`].
+const BEAT: Duration = Duration::from_millis(200);
+
+/// A test message: its code, and octets that are never the same in two packets.
+fn test(size: usize) -> Bytes {
+    let octet = |index: usize| (index.wrapping_mul(7) + index / 251) as u8;
+    let mut message: Vec<u8> = (0..size).map(octet).collect();
+    message[..2].copy_from_slice(&TEST.to_le_bytes());
+    message.into()
+}
+
+/// Sends a message, and gets it back as it was.
+pub(super) async fn send(told: &Told) -> Outcome {
+    let is_acknowledged = told.by != "unacknowledged";
+    let mut port = open(told)?;
+    greet(&mut port, told).await?;
+    let message = test(told.size);
+    loop {
+        let wait = if is_acknowledged {
+            deliver(&port, told, message.clone()).await?;
+            told.within
+        } else {
+            let outgoing = Outgoing::new(port.id(), told.other, message.clone());
+            port.send(outgoing).map_err(|error| error.to_string())?;
+            AGAIN
+        };
+        if let Ok(outcome) = timeout(wait, returns(&mut port, told, &message)).await {
+            outcome?;
+            println!("{} octets there and back", message.len());
+            return Ok(());
+        }
+        println!("nothing came back yet");
+    }
+}
+
+/// Has messages come back again and again, and tells of each.
+pub(super) async fn keep(told: &Told) -> Outcome {
+    let mut port = open(told)?;
+    let message = test(GREETING);
+    loop {
+        let outgoing = Outgoing::new(port.id(), told.other, message.clone());
+        port.send(outgoing).map_err(|error| error.to_string())?;
+        if let Ok(outcome) = timeout(AGAIN, returns(&mut port, told, &message)).await {
+            outcome?;
+            println!("report: it came back");
+        } else {
+            println!("nothing came back");
+        }
+        sleep(BEAT).await;
+    }
+}
+
+/// Sends every test message back, acknowledged.
+pub(super) async fn echo(told: &Told) -> Outcome {
+    let everywhere = "0.0.0.0".parse().map_err(|error| format!("{error}"))?;
+    let node =
+        Node::start(told.config().tcp_listen(everywhere)).map_err(|error| error.to_string())?;
+    let mut port = node
+        .attach(told.id.component())
+        .map_err(|error| error.to_string())?;
+    println!("listening");
+    while let Some(message) = port.recv().await {
+        if !message.payload.starts_with(&TEST.to_le_bytes()) {
+            continue;
+        }
+        let is_right = message.payload == test(message.payload.len());
+        println!(
+            "{} octets from {}, right: {is_right}",
+            message.payload.len(),
+            message.source
+        );
+        let back = Outgoing {
+            acknowledge: told.by != "unacknowledged",
+            ..Outgoing::new(port.id(), message.source, message.payload)
+        };
+        // An answer that nobody waits for is not missed.
+        let _ = port.send(back);
+    }
+    Ok(())
+}
+
+fn open(told: &Told) -> Result<Port, String> {
+    let config = if told.by == "tcp" {
+        let peer = format!("{}@{}:3794", told.other, told.address);
+        let peer = peer.parse().map_err(|error| format!("{peer}: {error}"))?;
+        told.config().without_udp().tcp_connect(peer)
+    } else {
+        told.config()
+    };
+    let node = Node::start(config).map_err(|error| error.to_string())?;
+    node.attach(told.id.component())
+        .map_err(|error| error.to_string())
+}
+
+/// Makes both known to each other, so that what is large does not go to everybody.
+async fn greet(port: &mut Port, told: &Told) -> Outcome {
+    let greeting = test(GREETING);
+    loop {
+        let outgoing = Outgoing::new(port.id(), told.other, greeting.clone());
+        port.send(outgoing).map_err(|error| error.to_string())?;
+        if let Ok(outcome) = timeout(AGAIN, returns(port, told, &greeting)).await {
+            return outcome;
+        }
+    }
+}
+
+async fn deliver(port: &Port, told: &Told, message: Bytes) -> Outcome {
+    let outgoing = Outgoing::new(port.id(), told.other, message);
+    port.deliver(outgoing)
+        .await
+        .map_err(|error| error.to_string())
+}
+
+/// Waits until the message has come back, and nothing else of its size.
+async fn returns(port: &mut Port, told: &Told, message: &Bytes) -> Outcome {
+    while let Some(received) = port.recv().await {
+        if received.source != told.other || received.payload.len() != message.len() {
+            continue;
+        }
+        if received.payload == *message {
+            return Ok(());
+        }
+        return Err(format!(
+            "{} octets came back, and not the same",
+            message.len()
+        ));
+    }
+    Err("the node has stopped".to_owned())
+}

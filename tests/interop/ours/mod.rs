@@ -1,0 +1,126 @@
+//! What this project's side does that the tool `jaus` has no command for: roles in which this
+//! binary is started again, over the library's public interface. `ours.toml` names them.
+
+mod asking;
+mod driving;
+mod large;
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use jaus::address::JausId;
+use jaus::component::{Component, Kind};
+use jaus::node::{Config, Node};
+
+/// Says what went wrong, in a line.
+pub(crate) type Outcome = Result<(), String>;
+
+/// What a role is told on the command line: `KEY=VALUE` each.
+#[derive(Debug, Clone)]
+pub(crate) struct Told {
+    /// Who we are.
+    id: JausId,
+    /// Whom to speak to.
+    other: JausId,
+    /// Where that is.
+    address: String,
+    /// The octets of a message.
+    size: usize,
+    /// How long it may take.
+    within: Duration,
+    /// How messages go: `udp`, `unacknowledged` or `tcp`.
+    by: String,
+}
+
+/// Plays the role that the arguments name.
+pub(crate) fn play(arguments: &[String]) -> ExitCode {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    let outcome = runtime
+        .map_err(|error| error.to_string())
+        .and_then(|runtime| runtime.block_on(play_within(arguments)));
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+async fn play_within(arguments: &[String]) -> Outcome {
+    let (role, rest) = arguments.split_first().ok_or("which role?")?;
+    let told = Told::read(rest)?;
+    let limit = told.within;
+    let work = async {
+        match role.as_str() {
+            "subscribe-periodic" => asking::periodic(&told).await,
+            "subscribe-on-change" => driving::on_change(&told).await,
+            "control" => driving::control(&told).await,
+            "drive" => driving::drive(&told).await,
+            "large" => large::send(&told).await,
+            // These go on until they are killed.
+            "keep" => return Some(asking::keep(&told).await),
+            "keep-echo" => return Some(large::keep(&told).await),
+            "echo" => return Some(large::echo(&told).await),
+            other => Err(format!("no role {other}")),
+        }
+        .into()
+    };
+    let is_endless = matches!(role.as_str(), "keep" | "keep-echo" | "echo");
+    let outcome: Option<Outcome> = if is_endless {
+        work.await
+    } else {
+        tokio::time::timeout(limit, work).await.unwrap_or(None)
+    };
+    outcome.unwrap_or_else(|| Err(format!("not done within {} s", limit.as_secs())))
+}
+
+impl Told {
+    fn read(arguments: &[String]) -> Result<Self, String> {
+        let mut told = Self {
+            id: JausId::new(42, 1, 1),
+            other: JausId::new(101, 1, 1),
+            address: String::new(),
+            size: 16,
+            within: Duration::from_secs(30),
+            by: "udp".to_owned(),
+        };
+        for argument in arguments {
+            let wrong = || format!("`{argument}` cannot be");
+            let (key, value) = argument.split_once('=').ok_or_else(wrong)?;
+            match key {
+                "id" => told.id = value.parse().map_err(|_| wrong())?,
+                "other" => told.other = value.parse().map_err(|_| wrong())?,
+                "address" => value.clone_into(&mut told.address),
+                "size" => told.size = value.parse().map_err(|_| wrong())?,
+                "seconds" => {
+                    told.within = Duration::from_secs(value.parse().map_err(|_| wrong())?);
+                }
+                "by" => value.clone_into(&mut told.by),
+                _ => return Err(wrong()),
+            }
+        }
+        Ok(told)
+    }
+
+    /// A node as it is by default.
+    fn config(&self) -> Config {
+        Config::new(self.id.subsystem(), self.id.node()).or_any_free_port()
+    }
+
+    /// A component that offers nothing of its own.
+    fn component(&self) -> Result<(Node, Component), String> {
+        self.component_numbered(self.id.component(), self.config())
+    }
+
+    /// The same with another number.
+    fn component_numbered(&self, number: u8, config: Config) -> Result<(Node, Component), String> {
+        let node = Node::start(config).map_err(|error| error.to_string())?;
+        let component = Component::builder(Kind::OperatorControlUnit, "Interoperability")
+            .attach(&node, number)
+            .map_err(|error| error.to_string())?;
+        Ok((node, component))
+    }
+}

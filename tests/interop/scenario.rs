@@ -1,0 +1,205 @@
+//! What is tried with every peer, in the order in which it is tried.
+
+use crate::settings::Side;
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Scenario {
+    /// Find the other by discovery.
+    Discover,
+    /// List its services.
+    Services,
+    /// Ask for its velocity.
+    Query,
+    /// Have its velocity reported again and again.
+    Periodic,
+    /// Have its velocity reported whenever it changes.
+    OnChange,
+    /// Take control, and lose it to somebody of more authority.
+    Control,
+    /// Take control, and have it move by wrench effort.
+    Drive,
+    /// Send a message, and get it back as it was.
+    Large(Size, Transport),
+    /// The other is killed and started again, and its reports come again.
+    AnswererRestarts,
+    /// Who asks is killed and started again, and gets its reports again.
+    ActorRestarts,
+    /// The cable is pulled and put back, and the reports come again.
+    Cable,
+    /// All of this for a while.
+    Mixed,
+}
+
+/// How long a message is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Size {
+    name: &'static str,
+    /// Octets, the message code included.
+    pub(crate) octets: usize,
+}
+
+const SIZES: [Size; 4] = [
+    Size {
+        name: "1-KiB",
+        octets: 1 << 10,
+    },
+    Size {
+        name: "10-KiB",
+        octets: 10 << 10,
+    },
+    Size {
+        name: "100-KiB",
+        octets: 100 << 10,
+    },
+    Size {
+        name: "1-MiB",
+        octets: 1 << 20,
+    },
+];
+
+/// How a message goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Transport {
+    /// By UDP, acknowledged.
+    Acknowledged,
+    /// By UDP, not acknowledged: what is lost is sent again by whoever sends, a few times.
+    Unacknowledged,
+    /// By TCP.
+    Tcp,
+}
+
+impl Transport {
+    const ALL: [Self; 3] = [Self::Acknowledged, Self::Unacknowledged, Self::Tcp];
+
+    const fn key(self) -> &'static str {
+        match self {
+            Self::Acknowledged => "large",
+            Self::Unacknowledged => "large-unacknowledged",
+            Self::Tcp => "large-tcp",
+        }
+    }
+
+    const fn title(self) -> &'static str {
+        match self {
+            Self::Acknowledged => "acknowledged",
+            Self::Unacknowledged => "not acknowledged",
+            Self::Tcp => "by TCP",
+        }
+    }
+}
+
+/// What keeps asking while things happen: of a vehicle, and of an echo.
+pub(crate) const KEEP: [(Side, &str); 2] = [(Side::Vehicle, "keep"), (Side::Echo, "keep-echo")];
+
+/// What sends large messages to whatever side there is, amid mixed traffic.
+pub(crate) const LOAD: &str = "load";
+
+impl Scenario {
+    /// All of them, in order.
+    pub(crate) fn all() -> Vec<Self> {
+        let large = Transport::ALL
+            .into_iter()
+            .flat_map(|transport| SIZES.map(|size| Self::Large(size, transport)));
+        let mut all = vec![
+            Self::Discover,
+            Self::Services,
+            Self::Query,
+            Self::Periodic,
+            Self::OnChange,
+            Self::Control,
+            Self::Drive,
+        ];
+        all.extend(large);
+        all.extend([
+            Self::AnswererRestarts,
+            Self::ActorRestarts,
+            Self::Cable,
+            Self::Mixed,
+        ]);
+        all
+    }
+
+    /// Everything that a party may be told to do.
+    pub(crate) fn acts() -> Vec<&'static str> {
+        let mut acts: Vec<&str> = Self::all().into_iter().filter_map(Self::act).collect();
+        acts.dedup();
+        acts.extend(KEEP.map(|(_, act)| act));
+        acts.push(LOAD);
+        acts
+    }
+
+    /// What it is called in settings and files.
+    pub(crate) fn key(self) -> String {
+        match self {
+            Self::Large(size, transport) => format!("{}-{}", transport.key(), size.name),
+            Self::AnswererRestarts => "restart-of-answerer".to_owned(),
+            Self::ActorRestarts => "restart-of-actor".to_owned(),
+            Self::Cable => "cable".to_owned(),
+            Self::Mixed => "mixed".to_owned(),
+            _ => self.act().unwrap_or_default().to_owned(),
+        }
+    }
+
+    /// What it is called in the table.
+    pub(crate) fn title(self) -> String {
+        match self {
+            Self::Discover => "discover".to_owned(),
+            Self::Services => "list services".to_owned(),
+            Self::Query => "query".to_owned(),
+            Self::Periodic => "subscribe, periodic".to_owned(),
+            Self::OnChange => "subscribe, on change".to_owned(),
+            Self::Control => "take and lose control".to_owned(),
+            Self::Drive => "drive".to_owned(),
+            Self::Large(size, transport) => {
+                format!("{}, {}", size.name.replace('-', " "), transport.title())
+            }
+            Self::AnswererRestarts => "restart of who answers".to_owned(),
+            Self::ActorRestarts => "restart of who asks".to_owned(),
+            Self::Cable => "cable pulled".to_owned(),
+            Self::Mixed => "mixed traffic".to_owned(),
+        }
+    }
+
+    /// What the acting party is told to do; `None` if it is told to keep asking.
+    pub(crate) const fn act(self) -> Option<&'static str> {
+        match self {
+            Self::Discover => Some("discover"),
+            Self::Services => Some("services"),
+            Self::Query => Some("query"),
+            Self::Periodic => Some("subscribe-periodic"),
+            Self::OnChange => Some("subscribe-on-change"),
+            Self::Control => Some("control"),
+            Self::Drive => Some("drive"),
+            Self::Large(_, transport) => Some(transport.key()),
+            _ => None,
+        }
+    }
+
+    /// What the other party has to be for it, if that is certain.
+    pub(crate) const fn side(self) -> Option<Side> {
+        match self {
+            Self::Large(..) => Some(Side::Echo),
+            Self::AnswererRestarts | Self::ActorRestarts | Self::Cable | Self::Mixed => None,
+            _ => Some(Side::Vehicle),
+        }
+    }
+
+    /// Whether a try that failed says nothing yet: finding somebody takes as long as it takes, and
+    /// what is not acknowledged may be lost.
+    pub(crate) const fn may_try_again(self) -> bool {
+        matches!(
+            self,
+            Self::Discover | Self::Services | Self::Large(_, Transport::Unacknowledged)
+        )
+    }
+
+    /// The size of the message that is sent, in octets.
+    pub(crate) const fn octets(self) -> usize {
+        match self {
+            Self::Large(size, _) => size.octets,
+            // What mixed traffic has beside questions.
+            _ => 10 << 10,
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! What a run finds: one cell of the table for each scenario and direction.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use crate::scenario::Scenario;
+
+/// What became of a scenario.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    Passed,
+    /// With the reason in words.
+    Failed(String),
+    /// With the reason in words: one of the two does not do such things.
+    NotApplicable(String),
+}
+
+/// A cell of the table.
+#[derive(Debug, Clone)]
+pub(crate) struct Cell {
+    pub(crate) scenario: Scenario,
+    pub(crate) verdict: Verdict,
+    pub(crate) took: Duration,
+    /// What was recorded, if it failed.
+    pub(crate) recording: Option<PathBuf>,
+}
+
+/// A column of the table: one acts, the other answers.
+#[derive(Debug, Clone)]
+pub(crate) struct Column {
+    pub(crate) peer: String,
+    pub(crate) actor: String,
+    pub(crate) answerer: String,
+    pub(crate) cells: Vec<Cell>,
+}
