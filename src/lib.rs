@@ -35,6 +35,7 @@ pub mod ocu;
 #[cfg(feature = "parts")]
 pub mod parts;
 pub mod ra;
+pub mod peer;
 pub mod service;
 #[cfg(feature = "mobility")]
 pub mod vehicle;

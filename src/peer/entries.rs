@@ -1,0 +1,347 @@
+//! The departures, one by one.
+
+use super::Peer::{Fkie, Iop, JausPlusPlus, Jts, Junior, OpenJausSdk};
+use super::{Entry, Sign, Source, Told};
+
+macro_rules! departures {
+    ($($(#[doc = $doc:literal])+ $variant:ident = $entry:expr;)+) => {
+        /// A way in which some peer departs from the standard, or from what others do.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[non_exhaustive]
+        pub enum Departure {
+            $($(#[doc = $doc])+ $variant,)+
+        }
+
+        impl Departure {
+            /// All of them, in the order of the table.
+            pub const ALL: &[Self] = &[$(Self::$variant,)+];
+
+            /// What there is to know of it.
+            #[must_use]
+            pub const fn entry(self) -> &'static Entry {
+                match self {
+                    $(Self::$variant => &$entry,)+
+                }
+            }
+        }
+    };
+}
+
+departures! {
+    /// The end of an older datagram behind a message.
+    StaleOctets = Entry {
+        name: "stale octets",
+        peers: &[JausPlusPlus],
+        does: "leaves the end of an older, longer datagram behind a message",
+        source: Source::Recorded,
+        told: Told::By(&[Sign::StaleOctets]),
+        ours: "reading stops at the first implausible header; what is left is counted, and neither \
+               delivered nor learned from",
+        place: "src/wire/judp.rs",
+        test: "stale_octets_behind_a_message_are_counted_and_nothing_else",
+    };
+    /// The message code in each fragment.
+    RepeatedCode = Entry {
+        name: "code in each fragment",
+        peers: &[JausPlusPlus],
+        does: "begins each fragment of a large message with the message code, 1573 octets in all \
+               but the last, and reads nothing else",
+        source: Source::Provoked,
+        told: Told::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
+        ours: "its large messages are put together without the repeated codes, and ours to it are \
+               cut as it cuts",
+        place: "src/endpoint/large/style.rs",
+        test: "the_code_that_jauspp_repeats_is_left_out_and_repeated_to_it_from_then_on",
+    };
+    /// No last fragment where a message fills its fragments.
+    NoLastFragment = Entry {
+        name: "no last fragment",
+        peers: &[JausPlusPlus],
+        does: "does not mark the last fragment of a message that fills all its fragments",
+        source: Source::Read,
+        told: Told::By(&[Sign::RepeatedCode]),
+        ours: "the message is whole when its sender's next message has the number of the last \
+               fragment, which JAUS++ gives twice",
+        place: "src/endpoint/large/reassembly.rs",
+        test: "a_message_of_jauspp_that_fills_its_fragments_is_whole_with_the_next_message",
+    };
+    /// What JAUS++ can receive of large messages.
+    NarrowReassembly = Entry {
+        name: "narrow reassembly",
+        peers: &[JausPlusPlus],
+        does: "takes at most 1425 octets in one packet, refuses the number 0 in fragments, loses a \
+               message whose numbers go round, and puts one message of a code together at a time",
+        source: Source::Read,
+        told: Told::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
+        ours: "no packet to it is longer; numbers leave out 0 and do not go round within a message \
+               to anybody",
+        place: "src/endpoint/large/split.rs",
+        test: "to_jauspp_no_packet_is_longer_than_it_takes_and_numbers_do_not_go_round",
+    };
+    /// Event numbers that are given twice.
+    SharedEventNumbers = Entry {
+        name: "event numbers given twice",
+        peers: &[JausPlusPlus],
+        does: "counts events for each query by itself, so that several have one number, and Cancel \
+               Event ends the first of them",
+        source: Source::Provoked,
+        told: Told::NeedNotBe,
+        ours: "events are told apart by their reports; a subscription that a cancellation may have \
+               hit is asked for again",
+        place: "src/service/client/subscriptions.rs",
+        test: "a_cancellation_that_may_have_hit_another_event_has_that_one_renewed",
+    };
+    /// Update Event ends the program.
+    UpdateEventCrash = Entry {
+        name: "Update Event ends it",
+        peers: &[JausPlusPlus],
+        does: "crashes when it gets Update Event (01F1h)",
+        source: Source::Provoked,
+        told: Told::NeedNotBe,
+        ours: "nobody is ever sent one: what is wanted otherwise is cancelled and created",
+        place: "src/service/client/subscription.rs",
+        test: "no_update_event_is_sent_in_the_whole_life_of_a_subscription",
+    };
+    /// Several copies of the first event.
+    FirstEventCopies = Entry {
+        name: "first event several times",
+        peers: &[JausPlusPlus],
+        does: "sends the first report of an event up to four times at once, with numbers of their \
+               own",
+        source: Source::Recorded,
+        told: Told::NeedNotBe,
+        ours: "each is a report like any other; none is taken for lost or for a stream of another",
+        place: "src/service/client/subscription.rs",
+        test: "a_first_report_that_comes_four_times_loses_nothing_and_cancels_nothing",
+    };
+    /// A query after each event every five seconds.
+    LateQueryEvents = Entry {
+        name: "looks after each event",
+        peers: &[JausPlusPlus],
+        does: "asks Query Events for one number every 5 s, and creates anew at 1 Hz whatever else \
+               the answer does not list",
+        source: Source::Recorded,
+        told: Told::NeedNotBe,
+        ours: "Report Events lists the event that was asked for, and then all others of the client",
+        place: "src/service/events/mod.rs",
+        test: "a_client_is_told_of_its_own_events_by_each_question",
+    };
+    /// The same Create Event again.
+    RepeatedCreation = Entry {
+        name: "creates events again",
+        peers: &[JausPlusPlus],
+        does: "sends Create Event for what it has already",
+        source: Source::Recorded,
+        told: Told::NeedNotBe,
+        ours: "same client, type and query are one event: its number is confirmed again, and no \
+               second stream begins",
+        place: "src/service/events/mod.rs",
+        test: "creating_the_same_again_changes_the_rate_and_not_the_number_of_streams",
+    };
+    /// Response codes of Reject Event Request one too low.
+    LowRejectCodes = Entry {
+        name: "reject codes one too low",
+        peers: &[JausPlusPlus],
+        does: "writes the response code of Reject Event Request one too low, and always, whatever \
+               the presence vector says",
+        source: Source::Provoked,
+        told: Told::NeedNotBe,
+        ours: "a code that the presence vector does not tell of is read, and one added",
+        place: "src/service/client/rejection.rs",
+        test: "a_code_that_the_presence_vector_does_not_tell_of_is_one_too_low",
+    };
+    /// Reject Event Request that JAUS++ cannot read.
+    UnreadRejections = Entry {
+        name: "cannot read a rejection",
+        peers: &[JausPlusPlus],
+        does: "drops a Reject Event Request whose presence vector says that there is a code, and \
+               waits 250 ms in vain",
+        source: Source::Provoked,
+        told: Told::By(&[Sign::JausPlusPlusService, Sign::RegistersAcrossSubsystems]),
+        ours: "a component that has been told the profile writes it as JAUS++ does",
+        place: "src/service/events/rejecting.rs",
+        test: "a_rejection_to_jauspp_is_one_that_it_reads",
+    };
+    /// Query Services without wildcards.
+    NoServiceWildcards = Entry {
+        name: "no wildcard in Query Services",
+        peers: &[JausPlusPlus],
+        does: "answers Query Services for node 255, component 255 with an empty list",
+        source: Source::Provoked,
+        told: Told::NeedNotBe,
+        ours: "each component is asked for by its numbers",
+        place: "src/service/discovery/search.rs",
+        test: "services_are_asked_for_by_number_and_never_by_wildcard",
+    };
+    /// Register Services to other subsystems.
+    RegistersEverywhere = Entry {
+        name: "registers everywhere",
+        peers: &[JausPlusPlus],
+        does: "sends Register Services to components of other subsystems, every 5 s",
+        source: Source::Recorded,
+        told: Told::By(&[Sign::RegistersAcrossSubsystems]),
+        ours: "the services are taken note of like those of a report, and nothing is answered",
+        place: "src/service/discovery/learn.rs",
+        test: "a_registration_from_another_subsystem_is_learned_and_not_answered",
+    };
+    /// Clear Emergency with the wrong code.
+    ClearEmergencyFault = Entry {
+        name: "Clear Emergency is Set Emergency",
+        peers: &[JausPlusPlus],
+        does: "sends Set Emergency (0006h) for Clear Emergency, and does not know 0007h",
+        source: Source::Provoked,
+        told: Told::NeedNotBe,
+        ours: "it is taken at its word: the emergency stays, and no client loses what it may do; \
+               another client must clear it",
+        place: "src/service/control/management.rs",
+        test: "an_emergency_that_is_set_again_stays_and_another_client_clears_it",
+    };
+    /// No heartbeats.
+    NoHeartbeats = Entry {
+        name: "no heartbeats",
+        peers: &[JausPlusPlus],
+        does: "never sends Report Heartbeat Pulse by itself",
+        source: Source::Provoked,
+        told: Told::NeedNotBe,
+        ours: "anything that comes is a sign of life, and who is silent is asked who it is",
+        place: "src/service/discovery/search.rs",
+        test: "a_peer_that_only_answers_is_not_lost",
+    };
+    /// The version octet before each message over TCP.
+    RepeatedVersion = Entry {
+        name: "version octet before each message",
+        peers: &[JausPlusPlus],
+        does: "writes the version octet before each message of a TCP stream, as a segment of its \
+               own",
+        source: Source::Recorded,
+        told: Told::NeedNotBe,
+        ours: "both ways of writing are read. It hangs when a message of ours comes in two \
+               segments: use UDP with it",
+        place: "src/wire/jtcp/decoder.rs",
+        test: "jauspps_version_octet_before_each_message_is_read",
+    };
+    /// A unicast message as a broadcast.
+    CallsUnknownIds = Entry {
+        name: "calls unknown ids",
+        peers: &[Junior, Jts, Fkie],
+        does: "sends a message for one id whose address it does not know to the group, as a global \
+               broadcast that wants an acknowledgement, until one comes",
+        source: Source::Recorded,
+        told: Told::By(&[Sign::CallsUnknownIds]),
+        ours: "it is acknowledged from where we want to be reached, and delivered to the one",
+        place: "src/endpoint/receive.rs",
+        test: "a_call_of_junior_is_acknowledged_by_the_one_alone_from_its_own_address",
+    };
+    /// All flags set for priority 0.
+    PriorityFault = Entry {
+        name: "priority 0 sets all flags",
+        peers: &[Junior, Jts],
+        does: "writes flags FFh for priority 0, which reads as an acknowledgement of a last \
+               fragment",
+        source: Source::Recorded,
+        told: Told::By(&[Sign::PriorityFault]),
+        ours: "dropped and counted by its name: whether it is a whole message is lost with the \
+               flags. The application must use priorities 1 to 15",
+        place: "src/endpoint/receive.rs",
+        test: "juniors_priority_zero_fault_is_dropped_and_counted_by_its_name",
+    };
+    /// Numbers that begin with 1 again.
+    BeginsWithOne = Entry {
+        name: "begins with 1 again",
+        peers: &[Junior, Jts, Fkie],
+        does: "begins with number 1 in each process, and takes a restarted peer's first messages \
+               for duplicates of earlier ones",
+        source: Source::Provoked,
+        told: Told::NeedNotBe,
+        ours: "content counts, not the number alone, and only for a short time; we begin at a \
+               number by chance",
+        place: "src/endpoint/receive.rs",
+        test: "a_restarted_peer_does_not_lose_its_first_messages",
+    };
+    /// One id for each TCP connection.
+    OneIdPerConnection = Entry {
+        name: "one id for each connection",
+        peers: &[Junior, Jts, Fkie],
+        does: "takes a TCP connection for the first id that is heard on it, and opens one for each \
+               id",
+        source: Source::Recorded,
+        told: Told::NeedNotBe,
+        ours: "an id is answered on the connection on which it was heard last, however many there \
+               are. Only one of our components reaches it by a connection of ours: let it connect, \
+               or use UDP",
+        place: "src/link/tcp/mod.rs",
+        test: "each_id_is_answered_on_the_connection_that_it_was_heard_on",
+    };
+    /// Header compression flags from the wrong end.
+    CompressionBits = Entry {
+        name: "compression flags from the wrong end",
+        peers: &[Junior, Jts, Fkie],
+        does: "reads the header compression flags from bits 0-1 of the first octet, where the \
+               message type is",
+        source: Source::Provoked,
+        told: Told::NeedNotBe,
+        ours: "the first octet of what we send is always 0, also in answer to one that is not",
+        place: "src/wire/as5669a.rs",
+        test: "the_first_octet_of_all_that_is_sent_is_zero",
+    };
+    /// Few fragments are kept.
+    ForgetsFragments = Entry {
+        name: "forgets fragments",
+        peers: &[Junior, Jts, Fkie],
+        does: "takes ten datagrams in a turn and keeps the latest 50 or 100 fragments of all \
+               senders",
+        source: Source::Recorded,
+        told: Told::NeedNotBe,
+        ours: "an acknowledged message goes no faster than its receiver takes it; messages above \
+               200 kB need a larger `MaxMsgHistory` there",
+        place: "src/endpoint/delivery/window.rs",
+        test: "the_window_finds_out_what_the_receiver_can_take",
+    };
+    /// Zero octets that stand for all.
+    AliasedIds = Entry {
+        name: "aliased ids",
+        peers: &[Jts],
+        does: "takes a 0 in any octet of an id for \"all\", so that it delivers what is for 1.1.1 \
+               also to 513.1.1",
+        source: Source::Recorded,
+        told: Told::Configured,
+        ours: "`Peer::confuses` tells which ids it cannot keep apart; choose subsystems below 256 \
+               only, or none",
+        place: "src/peer/habits.rs",
+        test: "junior_of_the_tool_set_confuses_ids_with_zero_octets",
+    };
+    /// 0 for "all" in destinations.
+    ZeroWildcards = Entry {
+        name: "0 for \"all\"",
+        peers: &[Iop, Jts],
+        does: "writes 0 for \"all subsystems\", \"all nodes\", \"all components\" into destinations",
+        source: Source::Read,
+        told: Told::By(&[Sign::IopService]),
+        ours: "from such a peer a 0 is read as the wildcard of its field; from all others it names \
+               nobody",
+        place: "src/endpoint/receive.rs",
+        test: "a_zero_stands_for_all_from_those_who_mean_it_so_and_from_nobody_else",
+    };
+    /// A counter of sequence numbers for each destination.
+    NumbersByDestination = Entry {
+        name: "numbers for each destination",
+        peers: &[OpenJausSdk],
+        does: "counts sequence numbers for each destination by itself, so that numbers come again",
+        source: Source::Recorded,
+        told: Told::By(&[Sign::NumbersByDestination]),
+        ours: "the destination counts with the number, and the content with both",
+        place: "src/endpoint/recent.rs",
+        test: "numbers_that_count_for_each_destination_are_no_duplicates",
+    };
+    /// Questions to whole nodes.
+    AsksWholeNodes = Entry {
+        name: "asks whole nodes",
+        peers: &[OpenJausSdk],
+        does: "sends what is for one component to all of its node, as global broadcasts",
+        source: Source::Recorded,
+        told: Told::By(&[Sign::AsksWholeNodes]),
+        ours: "each component that it is for answers to the asker alone, for itself",
+        place: "src/endpoint/receive.rs",
+        test: "a_question_to_a_whole_node_is_answered_by_unicast",
+    };
+}

@@ -1,0 +1,166 @@
+//! Known peers: where each departs from the standard, how that is seen on the wire, and what this
+//! implementation does about it.
+//!
+//! Every departure that anything here cares about has one name, a [`Departure`]. Its
+//! [entry](Departure::entry) tells whose it is, where we know it from, how it is recognised or that
+//! it must be [configured](Assignment), what we do, where in the code, and which test holds it.
+//! The table of all of them is [below](#the-table), and as text from [`table`].
+//!
+//! Most of what we do suits everybody and is done for everybody: what strict peers get is never
+//! less for a peer that is not strict. What would not suit everybody hangs on the [`Peer`] that
+//! somebody is known to be, and is a method of it: [`Peer::large_style`],
+//! [`Peer::payload_limit`], [`Peer::reads_zero_as_wildcard`],
+//! [`Peer::misreads_event_rejections`].
+//!
+//! A [`Recogniser`] is fed with what one peer sends and says who that is, how sure that is, and
+//! why. It does no I/O and keeps a few octets.
+//!
+//! ```
+//! use bytes::Bytes;
+//! use jaus::peer::{Certainty, Peer, Recogniser};
+//! use jaus::wire::judp;
+//!
+//! // Recorded from JAUS++: it tells its services, then asks from the same buffer.
+//! let query = b"\x02\x00\x11\x00\x01\x01\x01\x4D\x00\x07\x01\xE8\x03\x01\x2B\x02\x02\x00urn:jaus";
+//! let mut recogniser = Recogniser::new();
+//! let mut frames = judp::frames(Bytes::from_static(query))?;
+//! let frame = frames.next().expect("a first message or an error")?;
+//! recogniser.handle_frame(&frame, frames.remaining());
+//! let verdict = recogniser.verdict();
+//! assert_eq!((verdict.peer, verdict.certainty), (Peer::JausPlusPlus, Certainty::Likely));
+//! assert!(verdict.reasons[0].to_string().contains("behind its messages"));
+//! # Ok::<(), jaus::wire::Error>(())
+//! ```
+//!
+//! # The table
+//!
+#![doc = include_str!("departures.md")]
+
+mod assignment;
+mod departure;
+mod entries;
+mod habits;
+mod numbers;
+mod recogniser;
+mod sign;
+#[cfg(test)]
+mod tests;
+
+use std::fmt;
+use std::str::FromStr;
+
+pub use assignment::Assignment;
+pub use departure::{Entry, Source, Told, table};
+pub use entries::Departure;
+pub use habits::LargeStyle;
+pub use recogniser::{Certainty, Reason, Recogniser, Verdict};
+pub use sign::Sign;
+
+/// A JAUS implementation whose departures are known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Peer {
+    /// Somebody of whom nothing else is known: taken at the standard's word.
+    #[default]
+    Standard,
+    /// JAUS++ (ACTIVE laboratory).
+    JausPlusPlus,
+    /// Junior, the middleware of its own repository ("JR").
+    Junior,
+    /// Junior as copied into the JAUS Tool Set, and what is generated with it.
+    Jts,
+    /// Junior as copied into fkie's IOP packages for ROS.
+    Fkie,
+    /// A commercial OpenJAUS SDK that speaks AS5669A; the competitions' judging tool is built on
+    /// one.
+    OpenJausSdk,
+    /// A system of the interoperability profiles (IOP, AEODRS), where an id's 0 stands for "all".
+    Iop,
+}
+
+impl Peer {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Standard,
+        Self::JausPlusPlus,
+        Self::Junior,
+        Self::Jts,
+        Self::Fkie,
+        Self::OpenJausSdk,
+        Self::Iop,
+    ];
+
+    /// Its name in settings: `standard`, `jaus++`, `junior`, `jts`, `fkie`, `openjaus-sdk`, `iop`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Standard => "standard",
+            Self::JausPlusPlus => "jaus++",
+            Self::Junior => "junior",
+            Self::Jts => "jts",
+            Self::Fkie => "fkie",
+            Self::OpenJausSdk => "openjaus-sdk",
+            Self::Iop => "iop",
+        }
+    }
+
+    /// Its name for people.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Standard => "a peer that keeps to the standard",
+            Self::JausPlusPlus => "JAUS++",
+            Self::Junior => "Junior",
+            Self::Jts => "Junior of the JAUS Tool Set",
+            Self::Fkie => "Junior of fkie's IOP packages",
+            Self::OpenJausSdk => "OpenJAUS SDK (AS5669A)",
+            Self::Iop => "IOP or AEODRS",
+        }
+    }
+
+    /// Where it departs from the standard.
+    pub fn departures(self) -> impl Iterator<Item = Departure> {
+        let all = Departure::ALL.iter().copied();
+        all.filter(move |departure| departure.entry().peers.contains(&self))
+    }
+}
+
+impl fmt::Display for Peer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that is no peer's.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "there is no profile `{0}`: choose \"standard\", \"jaus++\", \"junior\", \"jts\", \"fkie\", \
+     \"openjaus-sdk\" or \"iop\""
+)]
+pub struct UnknownPeer(pub String);
+
+impl FromStr for Peer {
+    type Err = UnknownPeer;
+
+    fn from_str(text: &str) -> Result<Self, UnknownPeer> {
+        let named = Self::ALL.into_iter().find(|peer| peer.name() == text);
+        named.ok_or_else(|| UnknownPeer(text.to_owned()))
+    }
+}
+
+/// As its name.
+#[cfg(feature = "serde")]
+impl serde::Serialize for Peer {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// From its name.
+#[cfg(feature = "serde")]
+impl<'de> serde::Deserialize<'de> for Peer {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        text.parse().map_err(serde::de::Error::custom)
+    }
+}

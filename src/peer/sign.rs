@@ -1,0 +1,158 @@
+//! What gives a peer away.
+
+use std::fmt;
+
+use super::Peer;
+
+/// Something that was seen of a peer and tells who it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Sign {
+    /// A fragment that begins with the code of its message, and has JAUS++'s length.
+    RepeatedCode,
+    /// Octets behind the messages of a datagram.
+    StaleOctets,
+    /// Register Services sent to another subsystem.
+    RegistersAcrossSubsystems,
+    /// A private service of JAUS++.
+    JausPlusPlusService,
+    /// All services of the core set are of version 1.0.
+    OnlyFirstVersions,
+    /// The version octet before each message of a TCP stream.
+    RepeatedVersion,
+    /// A sequence number 0, which those do not have that begin with 1.
+    NumberZero,
+    /// All flags set, on a message that is no acknowledgement.
+    PriorityFault,
+    /// A fragment of the length that Junior makes them.
+    LongFragments,
+    /// A message for one component that went to everybody and wants an acknowledgement.
+    CallsUnknownIds,
+    /// The first message that was heard has the number 1.
+    BeginsWithOne,
+    /// Sequence numbers that count on for each destination by itself.
+    NumbersByDestination,
+    /// Questions to all components of one node, as global broadcasts.
+    AsksWholeNodes,
+    /// A destination with a 0.
+    ZeroInDestination,
+    /// A service of the interoperability profiles.
+    IopService,
+}
+
+impl Sign {
+    /// All of them.
+    pub const ALL: [Self; 15] = [
+        Self::RepeatedCode,
+        Self::StaleOctets,
+        Self::RegistersAcrossSubsystems,
+        Self::JausPlusPlusService,
+        Self::OnlyFirstVersions,
+        Self::RepeatedVersion,
+        Self::NumberZero,
+        Self::PriorityFault,
+        Self::LongFragments,
+        Self::CallsUnknownIds,
+        Self::BeginsWithOne,
+        Self::NumbersByDestination,
+        Self::AsksWholeNodes,
+        Self::ZeroInDestination,
+        Self::IopService,
+    ];
+
+    /// Whom it speaks for.
+    #[must_use]
+    pub const fn peer(self) -> Peer {
+        match self {
+            Self::RepeatedCode
+            | Self::StaleOctets
+            | Self::RegistersAcrossSubsystems
+            | Self::JausPlusPlusService
+            | Self::OnlyFirstVersions
+            | Self::RepeatedVersion
+            | Self::NumberZero => Peer::JausPlusPlus,
+            Self::PriorityFault
+            | Self::LongFragments
+            | Self::CallsUnknownIds
+            | Self::BeginsWithOne => Peer::Junior,
+            Self::NumbersByDestination | Self::AsksWholeNodes => Peer::OpenJausSdk,
+            Self::ZeroInDestination | Self::IopService => Peer::Iop,
+        }
+    }
+
+    /// How much it says: 4 is enough by itself, of 2 two are needed, and 1 alone is a guess.
+    pub(super) const fn weight(self) -> u8 {
+        match self {
+            Self::RepeatedCode
+            | Self::JausPlusPlusService
+            | Self::PriorityFault
+            | Self::IopService => 4,
+            Self::StaleOctets
+            | Self::RegistersAcrossSubsystems
+            | Self::RepeatedVersion
+            | Self::LongFragments
+            | Self::NumbersByDestination
+            | Self::AsksWholeNodes
+            | Self::ZeroInDestination => 2,
+            Self::OnlyFirstVersions
+            | Self::NumberZero
+            | Self::CallsUnknownIds
+            | Self::BeginsWithOne => 1,
+        }
+    }
+
+    const fn bit(self) -> u16 {
+        1 << self as u16
+    }
+}
+
+impl fmt::Display for Sign {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::RepeatedCode => {
+                "the fragments of its large messages each begin with the message code, and have \
+                 1573 octets"
+            }
+            Self::StaleOctets => "octets of older datagrams stand behind its messages",
+            Self::RegistersAcrossSubsystems => "it sends Register Services to other subsystems",
+            Self::JausPlusPlusService => "it offers a service of urn:jaus:jss:jpp:extras",
+            Self::OnlyFirstVersions => "all its core services have version 1.0",
+            Self::RepeatedVersion => "it writes the version octet before each message over TCP",
+            Self::NumberZero => "a message of it has the sequence number 0",
+            Self::PriorityFault => "a message of it has all flags set, as with priority 0",
+            Self::LongFragments => "the fragments of its large messages have 4079 octets",
+            Self::CallsUnknownIds => {
+                "a message for one component went to everybody and wants an acknowledgement"
+            }
+            Self::BeginsWithOne => "the first message that was heard of it has the number 1",
+            Self::NumbersByDestination => "its sequence numbers count for each destination",
+            Self::AsksWholeNodes => {
+                "it asks all components of a node, in global broadcasts, what others ask one"
+            }
+            Self::ZeroInDestination => "it writes 0 into destinations, for \"all\"",
+            Self::IopService => "it offers a service of the interoperability profiles",
+        })
+    }
+}
+
+/// A set of signs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Signs(u16);
+
+impl Signs {
+    pub(super) fn insert(&mut self, sign: Sign) {
+        self.0 |= sign.bit();
+    }
+
+    pub(super) fn iter(self) -> impl Iterator<Item = Sign> {
+        Sign::ALL
+            .into_iter()
+            .filter(move |sign| self.0 & sign.bit() != 0)
+    }
+
+    /// How much they say for a peer.
+    pub(super) fn weight(self, peer: Peer) -> u8 {
+        let of_it = self.iter().filter(|sign| sign.peer() == peer);
+        of_it.map(Sign::weight).sum()
+    }
+}

@@ -1,0 +1,215 @@
+use bytes::Bytes;
+
+use super::super::*;
+use crate::address::JausId;
+use crate::codec::{Message, Text};
+use crate::messages::core::{RegisterServices, register_services};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame};
+
+const US: JausId = JausId::new(101, 1, 1);
+const PEER: JausId = JausId::new(42, 1, 1);
+const QUERY: &[u8] = b"\x02\x22";
+
+fn frame(sequence: u16, payload: &'static [u8]) -> Frame {
+    Frame {
+        sequence,
+        ..Frame::new(PEER, US, Bytes::from_static(payload))
+    }
+}
+
+fn to(destination: JausId, sequence: u16) -> Frame {
+    Frame {
+        destination,
+        ..frame(sequence, QUERY)
+    }
+}
+
+fn after<'a>(frames: impl IntoIterator<Item = &'a Frame>) -> Verdict {
+    let mut recogniser = Recogniser::new();
+    for frame in frames {
+        recogniser.handle_frame(frame, 0);
+    }
+    recogniser.verdict()
+}
+
+fn signs(verdict: &Verdict) -> Vec<Sign> {
+    verdict.reasons.iter().map(|reason| reason.sign).collect()
+}
+
+/// The fragments of a message of `octets`, each with the code and this payload.
+fn with_code_in_each(octets: usize, payload: usize) -> Vec<Frame> {
+    let count = octets.div_ceil(payload - 2);
+    let fragment = |index: usize| {
+        let data = match index {
+            0 => DataControl::First,
+            _ if index + 1 == count => DataControl::Last,
+            _ => DataControl::Middle,
+        };
+        let length = (octets - index * (payload - 2)).min(payload - 2);
+        let mut body = vec![0x01, 0x4B];
+        body.extend(std::iter::repeat_n(b'x', length));
+        Frame {
+            flags: Flags::default().with_data(data),
+            payload: body.into(),
+            ..frame(7 + index as u16, b"")
+        }
+    };
+    (0..count).map(fragment).collect()
+}
+
+#[test]
+fn nothing_is_known_of_who_keeps_to_the_standard() {
+    let frames: Vec<_> = (500..520).map(|number| frame(number, QUERY)).collect();
+    assert_eq!(after(&frames), Verdict::default());
+    assert_eq!(Recogniser::new().certain(), Peer::Standard);
+}
+
+#[test]
+fn jauspp_is_certain_by_its_fragments_and_nobody_by_others() {
+    let verdict = after(&with_code_in_each(5000, 1573));
+    assert_eq!(
+        (verdict.peer, verdict.certainty),
+        (Peer::JausPlusPlus, Certainty::Certain)
+    );
+    assert_eq!(signs(&verdict), [Sign::RepeatedCode]);
+    let other_length = after(&with_code_in_each(5000, 1425));
+    assert_eq!(other_length.certainty, Certainty::Unknown);
+    let mut without = with_code_in_each(5000, 1573);
+    let last = without.len() - 1;
+    without[last].payload = Bytes::from_static(b"xxxx");
+    assert_eq!(after(&without).certainty, Certainty::Unknown);
+    let mut gap = with_code_in_each(5000, 1573);
+    gap.remove(1);
+    assert_eq!(after(&gap).certainty, Certainty::Unknown, "one is missing");
+}
+
+#[test]
+fn stale_octets_make_jauspp_likely_and_a_registration_from_elsewhere_makes_it_certain() {
+    let mut recogniser = Recogniser::new();
+    recogniser.handle_frame(&frame(3, QUERY), 206);
+    let verdict = recogniser.verdict();
+    assert_eq!(
+        (verdict.peer, verdict.certainty),
+        (Peer::JausPlusPlus, Certainty::Likely)
+    );
+    assert_eq!(recogniser.certain(), Peer::Standard, "likely is not enough");
+    let registration = RegisterServices {
+        service_list: vec![register_services::ServiceRec {
+            uri: Text::from("urn:jaus:jss:core:Events"),
+            major_version_number: 1,
+            minor_version_number: 0,
+        }],
+    };
+    let payload = registration.encode().unwrap();
+    recogniser.handle_frame(
+        &Frame {
+            payload,
+            ..frame(4, b"")
+        },
+        0,
+    );
+    assert_eq!(recogniser.certain(), Peer::JausPlusPlus);
+    let reasons = signs(&recogniser.verdict());
+    assert_eq!(
+        reasons,
+        [
+            Sign::StaleOctets,
+            Sign::RegistersAcrossSubsystems,
+            Sign::OnlyFirstVersions
+        ]
+    );
+}
+
+#[test]
+fn services_tell_jauspp_and_the_profiles() {
+    let verdict = |services: &[(&str, u8, u8)]| {
+        let mut recogniser = Recogniser::new();
+        recogniser.handle_services(services.iter().copied());
+        recogniser.certain()
+    };
+    assert_eq!(
+        verdict(&[("urn:jaus:jss:jpp:extras:Video", 1, 0)]),
+        Peer::JausPlusPlus
+    );
+    assert_eq!(verdict(&[("urn:jaus:jss:iop:CostMap2D", 1, 1)]), Peer::Iop);
+    assert_eq!(
+        verdict(&[("urn:jaus:jss:core:Events", 1, 0)]),
+        Peer::Standard
+    );
+}
+
+#[test]
+fn junior_is_likely_by_its_first_call_and_certain_by_its_fault() {
+    let call = Frame {
+        flags: Flags::default()
+            .with_broadcast(Broadcast::Global)
+            .with_acknowledgement(Acknowledgement::Request),
+        ..frame(1, QUERY)
+    };
+    let verdict = after([&call]);
+    assert_eq!(
+        (verdict.peer, verdict.certainty),
+        (Peer::Junior, Certainty::Likely)
+    );
+    let ours = Frame {
+        sequence: 4711,
+        ..call
+    };
+    assert_eq!(
+        after([&ours]).certainty,
+        Certainty::Guess,
+        "we call like that too"
+    );
+    let fault = Frame {
+        flags: Flags(0xFF),
+        ..frame(2, QUERY)
+    };
+    assert_eq!(after([&fault]).certainty, Certainty::Certain);
+    let acknowledgement = Frame {
+        flags: Flags(0xFF),
+        ..frame(2, b"")
+    };
+    assert_eq!(after([&acknowledgement]).certainty, Certainty::Unknown);
+}
+
+#[test]
+fn the_judging_tool_is_told_by_how_it_counts_and_whom_it_asks() {
+    let node = US.whole_node();
+    let mut frames = Vec::new();
+    for (destination, number) in [
+        (node, 1),
+        (JausId::EVERYONE, 1),
+        (node, 2),
+        (JausId::EVERYONE, 2),
+        (node, 3),
+    ] {
+        frames.push(Frame {
+            flags: Flags::default().with_broadcast(Broadcast::Global),
+            ..to(destination, number)
+        });
+    }
+    let verdict = after(&frames);
+    assert_eq!(
+        (verdict.peer, verdict.certainty),
+        (Peer::OpenJausSdk, Certainty::Certain)
+    );
+    let once: Vec<_> = [(node, 7), (US, 8), (node, 9), (US, 10), (node, 11)]
+        .map(|(destination, number)| to(destination, number))
+        .into();
+    assert_eq!(
+        after(&once).certainty,
+        Certainty::Unknown,
+        "one counter for all"
+    );
+}
+
+#[test]
+fn what_speaks_for_somebody_else_is_told_too() {
+    let mut recogniser = Recogniser::new();
+    recogniser.handle_frame(&frame(1, QUERY), 12);
+    let verdict = recogniser.verdict();
+    assert_eq!(verdict.peer, Peer::JausPlusPlus);
+    let reasons: Vec<_> = verdict.reasons.iter().map(Reason::to_string).collect();
+    assert!(reasons[0].ends_with("as JAUS++ does"), "{reasons:?}");
+    assert!(reasons[1].ends_with("as Junior does"), "{reasons:?}");
+}
