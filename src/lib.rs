@@ -34,8 +34,9 @@ pub mod node;
 pub mod ocu;
 #[cfg(feature = "parts")]
 pub mod parts;
-pub mod ra;
 pub mod peer;
+#[cfg(feature = "ra33")]
+pub mod ra;
 pub mod service;
 #[cfg(feature = "mobility")]
 pub mod vehicle;

@@ -1,0 +1,1 @@
+//! Service connections: the Reference Architecture's way to be told something regularly.
