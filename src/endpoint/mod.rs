@@ -69,6 +69,8 @@ pub use occupancy::Occupancy;
 pub use pacing::Pacing;
 pub use packing::Packing;
 pub use peers::{Peer, Traffic};
+#[cfg(feature = "ra33")]
+pub(crate) use rate::Buckets;
 pub use rate::{Rate, Rates};
 pub use send::SendError;
 

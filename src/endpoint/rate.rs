@@ -84,7 +84,7 @@ impl Bucket {
 
 /// A bucket for each source, as far as there is room.
 #[derive(Debug)]
-struct Buckets<K> {
+pub(crate) struct Buckets<K> {
     rate: Rate,
     limit: usize,
     own: HashMap<K, Bucket>,
@@ -96,7 +96,8 @@ impl<K: Eq + Hash> Buckets<K> {
     /// The shortest time between two looks for buckets that can be given up.
     const SWEEP: Duration = Duration::from_secs(1);
 
-    fn new(rate: Rate, limit: usize) -> Self {
+    /// Buckets of that rate for at most `limit` sources.
+    pub(crate) fn new(rate: Rate, limit: usize) -> Self {
         Self {
             rate,
             limit: limit.max(1),
@@ -106,7 +107,8 @@ impl<K: Eq + Hash> Buckets<K> {
         }
     }
 
-    fn take(&mut self, now: Instant, source: K) -> bool {
+    /// Takes a token of a source, if there is one.
+    pub(crate) fn take(&mut self, now: Instant, source: K) -> bool {
         if self.own.len() >= self.limit && !self.own.contains_key(&source) {
             self.sweep(now);
             if self.own.len() >= self.limit {

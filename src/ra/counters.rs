@@ -39,8 +39,6 @@ counters! {
     AcknowledgementsSent = "acknowledgements sent",
     /// Acknowledgements received; nobody waits for them.
     AcknowledgementsReceived = "acknowledgements received",
-    /// Octets behind a message of "JAUS01.0" that do not belong to it.
-    TrailingOctets = "octets behind messages",
     /// A subsystem is heard from another address than before.
     AddressMoved = "subsystems that moved to another address",
     /// Dropped: a datagram that begins like no JAUS transport.

@@ -25,7 +25,8 @@ pub struct Message {
     pub connection: bool,
     /// Whether its code is one of those that systems agree upon among themselves.
     pub experimental: bool,
-    /// The number that its sender gave it; what is sent gets its number from the carrier.
+    /// The number that its sender gave it: of a large message that of the last part to come. Most
+    /// systems leave it at 0 but in service connections.
     pub sequence: u16,
 }
 

@@ -15,7 +15,8 @@ use bytes::{BufMut, Bytes, BytesMut};
 use deku::prelude::*;
 
 use super::{
-    Broadcast, DataControl, EncodeError, Error, Flags, Frame, Kind, Priority, Problem, Version,
+    Acknowledgement, Broadcast, DataControl, EncodeError, Error, Flags, Frame, Kind, Priority,
+    Problem, Version,
 };
 use crate::address::JausId;
 
@@ -26,11 +27,38 @@ pub const HEADER_LEN: usize = 16;
 /// Octets of the message code, which is a header field here and the beginning of the payload in a
 /// [`Frame`].
 pub const CODE_LEN: usize = 2;
+/// The version bits of what is sent: RA 3.2 and 3.3.
+const VERSION_3_3: u16 = 2 << 8;
 /// The longest data that a header of this kind may state (RA 3.3; the field would hold 4095).
 pub const MAX_DATA: usize = 4080;
 
+/// What a header of version 2 (RA 3.2 and 3.3) says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fields {
+    /// 0 ..= 15; a higher number is taken for 15.
+    pub priority: u8,
+    /// Whether one is wanted, or this is one.
+    pub acknowledgement: Acknowledgement,
+    /// Whether the message belongs to a service connection.
+    pub service_connection: bool,
+    /// Whether its code is experimental.
+    pub experimental: bool,
+    /// The message (command) code.
+    pub code: u16,
+    /// For whom.
+    pub destination: RaId,
+    /// From whom.
+    pub source: RaId,
+    /// As [`Header::data_flag`].
+    pub data_flag: u8,
+    /// Octets of data, at most [`MAX_DATA`]; a higher number is taken for that.
+    pub data_size: usize,
+    /// The sequence number.
+    pub sequence: u16,
+}
+
 /// The header as it is on the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, DekuRead, DekuWrite)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, DekuRead)]
 #[deku(endian = "little")]
 pub struct Header {
     properties: u16,
@@ -66,6 +94,19 @@ impl Header {
     #[must_use]
     pub const fn header_version(&self) -> u8 {
         (self.properties >> 8 & 0x3F) as u8
+    }
+
+    /// The acknowledgement field.
+    #[must_use]
+    pub const fn acknowledgement(&self) -> Acknowledgement {
+        Flags((self.properties & 0b11_0000) as u8).acknowledgement()
+    }
+
+    /// The data flag: 0 is a single message, 1 the first part of a large one, 2 a later part, 4 one
+    /// that is sent again, 8 the last; others mean nothing.
+    #[must_use]
+    pub const fn data_flag(&self) -> u8 {
+        (self.data_control >> 12) as u8
     }
 
     /// Octets of data behind the header.
@@ -111,9 +152,8 @@ impl Header {
             8 => DataControl::Last,
             other => return Err(Problem::UnknownDataControl(other as u8)),
         };
-        let acknowledgement = Flags((self.properties & 0b11_0000) as u8).acknowledgement();
         Ok(Flags::new(priority_from_ra(self.priority()))
-            .with_acknowledgement(acknowledgement)
+            .with_acknowledgement(self.acknowledgement())
             .with_broadcast(if self.destination().has_wildcard() {
                 Broadcast::Global
             } else {
@@ -122,9 +162,40 @@ impl Header {
             .with_data(data))
     }
 
+    /// A header that says these.
+    #[must_use]
+    pub fn new(fields: &Fields) -> Self {
+        let flag = |set: bool, bit: u16| u16::from(set) << bit;
+        let size = fields.data_size.min(MAX_DATA) as u16;
+        Self {
+            properties: VERSION_3_3
+                | u16::from(fields.priority.min(15))
+                | (fields.acknowledgement as u16) << 4
+                | flag(fields.service_connection, 6)
+                | flag(fields.experimental, 7),
+            code: fields.code,
+            destination: JausId::from(fields.destination).to_u32(),
+            source: JausId::from(fields.source).to_u32(),
+            data_control: u16::from(fields.data_flag & 0xF) << 12 | size,
+            sequence: fields.sequence,
+        }
+    }
+
+    /// Its octets.
+    #[must_use]
+    pub fn octets(&self) -> [u8; HEADER_LEN] {
+        let mut octets = [0; HEADER_LEN];
+        octets[..2].copy_from_slice(&self.properties.to_le_bytes());
+        octets[2..4].copy_from_slice(&self.code.to_le_bytes());
+        octets[4..8].copy_from_slice(&self.destination.to_le_bytes());
+        octets[8..12].copy_from_slice(&self.source.to_le_bytes());
+        octets[12..14].copy_from_slice(&self.data_control.to_le_bytes());
+        octets[14..].copy_from_slice(&self.sequence.to_le_bytes());
+        octets
+    }
+
     /// The header of a frame whose data, without the message code, has `data_size` octets.
     fn from_frame(frame: &Frame, code: u16, data_size: u16) -> Self {
-        const VERSION_3_3: u16 = 2 << 8;
         let flags = frame.flags;
         let data_flag = match flags.data() {
             DataControl::Single => 0,
@@ -255,11 +326,8 @@ pub fn emit(frame: &Frame, out: &mut BytesMut) -> Result<(), EncodeError> {
             limit: CODE_LEN + MAX_DATA,
         });
     }
-    let mut octets = [0; HEADER_LEN];
-    Header::from_frame(frame, u16::from_le_bytes(*code), data.len() as u16)
-        .to_slice(&mut octets)
-        .map_err(|_| EncodeError::NotPlain)?;
-    out.put_slice(&octets);
+    let header = Header::from_frame(frame, u16::from_le_bytes(*code), data.len() as u16);
+    out.put_slice(&header.octets());
     out.put_slice(data);
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! The settings of a carrier: bounds and times, with defaults that suit a gateway on a small board.
 
+use std::net::IpAddr;
 use std::time::Duration;
 
 use crate::endpoint::Rate;
@@ -22,7 +23,8 @@ pub struct Settings {
     /// OpenJAUS does the same.
     pub port: u16,
     /// The framings in which is sent to the group, and to whom has not been heard yet. With both,
-    /// each such message is sent twice. Answers go in the framing of what was heard last.
+    /// each such message is sent twice; a
+    /// framing that somebody is heard to use is added by itself. Answers go in the framing of what was heard last.
     pub group_dialects: Vec<Dialect>,
     /// The header versions that are accepted, of 0 (RA 2.x), 1 (3.0 and 3.1) and 2 (3.2 and 3.3).
     pub versions: Vec<u8>,
@@ -37,8 +39,12 @@ pub struct Settings {
     pub max_parts: usize,
     /// How long the next part of an unfinished message may take.
     pub part_timeout: Duration,
-    /// Messages from one address.
-    pub messages: Rate,
+    /// Our own network addresses: what comes from them is our own multicast, come back.
+    pub own_addresses: Vec<IpAddr>,
+    /// Messages from one address. By default not limited.
+    pub messages: Option<Rate>,
+    /// The most addresses whose rates are told apart.
+    pub max_addresses: usize,
     /// Subsystems from one address that were not heard before.
     pub new_subsystems: Rate,
     /// How long a subsystem must have been silent before it is believed from another address.
@@ -58,7 +64,9 @@ impl Default for Settings {
             max_parts_per_subsystem: 2 << 20,
             max_parts: 16 << 20,
             part_timeout: Duration::from_secs(3),
-            messages: Rate::new(20_000, 40_000),
+            own_addresses: Vec::new(),
+            messages: None,
+            max_addresses: 1024,
             new_subsystems: Rate::new(8, 64),
             address_patience: Duration::from_secs(5),
             queue_limit: 4096,
