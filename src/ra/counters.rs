@@ -89,6 +89,10 @@ counters! {
     QuestionRate = "not asked yet: too many questions to one subsystem",
     /// Refused: an event that we do not offer, or one more than there is room for.
     EventRefused = "events refused",
+    /// Refused: a service connection.
+    ConnectionRefused = "service connections refused",
+    /// Dropped: a report of a service connection that nobody here wants.
+    UnwantedReport = "dropped: report of an unknown service connection",
     /// Left out: components, services or names of a subsystem above the limits.
     ConfigurationTooLong = "left out: configuration above the limits",
     /// Dropped: a datagram to send, because too many wait to be sent.

@@ -5,6 +5,8 @@ use std::fmt;
 use bytes::Bytes;
 
 use super::RaId;
+use crate::codec;
+use crate::wire::ra::CODE_LEN;
 
 /// One whole message, put together if it came in parts.
 #[derive(Clone, PartialEq, Eq)]
@@ -48,6 +50,36 @@ impl Message {
             experimental: false,
             sequence: 0,
         }
+    }
+
+    /// An ordinary message with this body.
+    ///
+    /// # Errors
+    /// A body outside the limits of its definition.
+    pub fn with_body<M: codec::Message>(
+        source: RaId,
+        destination: RaId,
+        body: &M,
+    ) -> Result<Self, codec::EncodeError> {
+        let data = body.encode()?.slice(CODE_LEN..);
+        Ok(Self::new(source, destination, M::CODE, data))
+    }
+
+    /// The body, if it is one of that type.
+    ///
+    /// # Errors
+    /// Another code, or data that is none of its type.
+    pub fn body<M: codec::Message>(&self) -> Result<M, codec::DecodeError> {
+        M::decode(&self.payload())
+    }
+
+    /// Code and data in one, as all our codecs have it.
+    #[must_use]
+    pub fn payload(&self) -> Bytes {
+        let mut payload = Vec::with_capacity(CODE_LEN + self.data.len());
+        payload.extend_from_slice(&self.code.to_le_bytes());
+        payload.extend_from_slice(&self.data);
+        payload.into()
     }
 
     /// An answer to this message: from the id that was addressed, to the one that asked.

@@ -1,28 +1,63 @@
 //! Our presence among RA systems: what we show to them, and what they show to us.
+//!
+//! Each subsystem that is [announced](RaNode::announce) sends a heartbeat to the group, each second
+//! and from its communicator; names, configuration and services are answered for all of its
+//! components; who asked for it is told of changes. The other way round, a subsystem whose
+//! heartbeat is heard is asked what it is, in the order in which OpenJAUS asks: its name at the
+//! communicator, then nodes and components and to be told of their changes, then each name and the
+//! services. What was asked is asked again until it is answered or was asked often enough. When all
+//! is answered, the owner is told that the subsystem [appeared](Event::Appeared).
+//!
+//! All questions come from the node manager of our first subsystem. While we show nothing, nobody is
+//! asked.
+//!
+//! Everything else that is for a component of ours comes out as [`Event::Message`].
 
+mod answer;
+mod learn;
+mod own;
+mod peer;
 mod settings;
+mod subscriptions;
 mod subsystem;
+#[cfg(test)]
+mod tests;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::SocketAddr;
 use std::time::Instant;
 
 use bytes::Bytes;
 
 pub use settings::Settings;
-pub use subsystem::{BadSubsystem, Command, Component, Node, Service, Subsystem};
+pub use subsystem::{BadSubsystem, Command, Component, Node, Service, Subsystem, Where};
 
-use super::carrier::{SendError, Transmit};
-use super::{Counters, Message};
+use super::carrier::{Carrier, SendError, Transmit};
+use super::{Counter, Counters, Message, RaId};
+use crate::codec::Message as _;
+use crate::endpoint::Buckets;
+use crate::messages::ra33::{
+    CancelEvent, CreateEvent, QueryConfiguration, QueryHeartbeatPulse, QueryIdentification,
+    QueryServices, ReportConfiguration, ReportHeartbeatPulse,
+};
+use own::Own;
+use peer::Peer;
 
 /// Our presence among RA systems. See the [module](self).
 #[derive(Debug)]
 pub struct RaNode {
     settings: Settings,
-    own: BTreeMap<u8, Subsystem>,
-    events: VecDeque<Event>,
-    transmits: VecDeque<Transmit>,
-    counters: Counters,
+    carrier: Carrier,
+    /// By number, like the peers.
+    own: BTreeMap<u8, Own>,
+    peers: BTreeMap<u8, Peer>,
+    answers: Buckets<u8>,
+    questions: Buckets<u8>,
+    /// Subsystems about which there is news.
+    news: BTreeSet<u8>,
+    /// Those that the owner was told of.
+    shown: BTreeSet<u8>,
+    messages: VecDeque<Message>,
 }
 
 /// What the owner of a node is to know.
@@ -44,20 +79,96 @@ impl RaNode {
     /// A node that shows nothing yet.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
+        const ALL: usize = 256;
         Self {
-            settings,
+            carrier: Carrier::new(settings.carrier.clone()),
             own: BTreeMap::new(),
-            events: VecDeque::new(),
-            transmits: VecDeque::new(),
-            counters: Counters::default(),
+            peers: BTreeMap::new(),
+            answers: Buckets::new(settings.answers, ALL),
+            questions: Buckets::new(settings.questions, ALL),
+            news: BTreeSet::new(),
+            shown: BTreeSet::new(),
+            messages: VecDeque::new(),
+            settings,
         }
     }
 
     /// A datagram has come.
-    pub fn handle_datagram(&mut self, _now: Instant, _from: SocketAddr, _datagram: Bytes) {}
+    pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: Bytes) {
+        for message in self.carrier.handle_datagram(now, from, &datagram) {
+            self.handle_message(now, message);
+        }
+    }
+
+    fn handle_message(&mut self, now: Instant, message: Message) {
+        if let Some(peer) = self.peers.get_mut(&message.source.subsystem) {
+            peer.heard = now;
+        }
+        let handled = match message.code {
+            ReportHeartbeatPulse::CODE => {
+                self.handle_heartbeat(now, message.source);
+                true
+            }
+            QueryIdentification::CODE
+            | QueryConfiguration::CODE
+            | QueryServices::CODE
+            | QueryHeartbeatPulse::CODE => {
+                self.answer(now, &message);
+                true
+            }
+            CreateEvent::CODE => self.handle_create_event(now, &message),
+            CancelEvent::CODE => self.handle_cancel_event(&message),
+            _ => self.handle_report(now, &message),
+        };
+        if handled {
+            return;
+        }
+        if self.messages.len() >= self.settings.queue_limit {
+            self.carrier.count(Counter::EventQueueFull);
+            return;
+        }
+        self.messages.push_back(message);
+    }
 
     /// Time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached.
-    pub fn handle_timeout(&mut self, _now: Instant) {}
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.carrier.handle_timeout(now);
+        let due = self.peers.iter().filter(|(_, peer)| peer.next <= now);
+        let due: Vec<_> = due.map(|(&subsystem, _)| subsystem).collect();
+        for subsystem in due {
+            self.serve(now, subsystem);
+        }
+        let own: Vec<_> = self.own.keys().copied().collect();
+        for subsystem in own {
+            self.heartbeat(now, subsystem);
+            self.tell_changes(now, subsystem);
+        }
+    }
+
+    /// Tells everybody that a subsystem of ours is there, if it is time to.
+    fn heartbeat(&mut self, now: Instant, subsystem: u8) {
+        let Some(own) = self.own.get_mut(&subsystem) else {
+            return;
+        };
+        if own.next_heartbeat > now {
+            return;
+        }
+        own.next_heartbeat = now + self.settings.heartbeat;
+        let everybody = RaId::new(RaId::ALL, RaId::ALL, RaId::NODE_MANAGER, 1);
+        let code = ReportHeartbeatPulse::CODE;
+        let heartbeat = Message::new(own.communicator(), everybody, code, Bytes::new());
+        self.transmit(&heartbeat);
+    }
+
+    /// Tells what has changed in a subsystem of ours, if it is time to.
+    fn tell_changes(&mut self, now: Instant, subsystem: u8) {
+        if let Some(own) = self.own.get_mut(&subsystem)
+            && own.tell.is_some_and(|tell| tell <= now)
+        {
+            own.tell = None;
+            self.tell_subscribers(subsystem, false);
+        }
+    }
 
     /// Shows a subsystem, or tells that something about it has changed. Node managers (1.1 in each
     /// node) and the communicator (35.1 in the first) are added where they are missing, and
@@ -66,45 +177,121 @@ impl RaNode {
     /// # Errors
     /// Ids that are none or twice there, more than fits the messages, or a subsystem that others
     /// speak for.
-    pub fn announce(&mut self, _now: Instant, subsystem: Subsystem) -> Result<(), BadSubsystem> {
-        self.own.insert(subsystem.id, subsystem);
+    pub fn announce(&mut self, now: Instant, subsystem: Subsystem) -> Result<(), BadSubsystem> {
+        let subsystem = own::complete(subsystem)?;
+        let id = subsystem.id;
+        if self.peers.contains_key(&id) {
+            let at = self.carrier.address(id).map(|address| address.ip());
+            return Err(BadSubsystem::Taken(id, Where(at)));
+        }
+        match self.own.get_mut(&id) {
+            Some(own) if own.subsystem == subsystem => return Ok(()),
+            Some(own) => {
+                own.subsystem = subsystem;
+                own.tell.get_or_insert(now + self.settings.gather);
+            }
+            None => {
+                self.own.insert(id, Own::new(now, subsystem));
+            }
+        }
+        if let Some(own) = self.own.get(&id) {
+            self.carrier.set_components(id, own.ids());
+        }
+        self.heartbeat(now, id);
+        for peer in self.peers.values_mut() {
+            peer.next = now;
+        }
         Ok(())
     }
 
     /// Shows a subsystem no more, and says so.
-    pub fn withdraw(&mut self, _now: Instant, subsystem: u8) {
+    pub fn withdraw(&mut self, now: Instant, subsystem: u8) {
+        let asker = self.asker();
+        self.tell_subscribers(subsystem, true);
+        let Some(own) = self.own.get(&subsystem) else {
+            return;
+        };
+        let told: BTreeSet<_> = own
+            .subscriptions
+            .values()
+            .map(|s| s.client().subsystem)
+            .collect();
+        let from = own.communicator();
+        let others = self.peers.iter().filter(|(id, _)| !told.contains(id));
+        let managers = others.map(|(_, peer)| RaId {
+            component: RaId::NODE_MANAGER,
+            ..peer.communicator
+        });
+        let managers: Vec<_> = managers.collect();
+        for manager in managers {
+            let nothing = ReportConfiguration::default();
+            if let Ok(goodbye) = Message::with_body(from, manager, &nothing) {
+                self.transmit(&goodbye);
+            }
+        }
         self.own.remove(&subsystem);
+        self.carrier.set_components(subsystem, []);
+        if asker != self.asker() {
+            for peer in self.peers.values_mut() {
+                peer.subscribed = false;
+                peer.wonder(now, peer::Question::Subscription);
+            }
+        }
     }
 
-    /// Sends a message of a component that we show. Its number is given by the node.
+    /// Sends a message of a component that we show. Its number is kept, but for large messages.
     ///
     /// # Errors
     /// A source that is not ours, a destination whose address is not known, too much data, or too
     /// much to send at once.
-    pub fn send(&mut self, _now: Instant, message: Message) -> Result<(), SendError> {
-        Err(SendError::Unknown(message.destination.subsystem))
+    pub fn send(&mut self, _now: Instant, message: &Message) -> Result<(), SendError> {
+        self.carrier.send(message)
     }
 
     /// The next datagram to be sent.
     pub fn poll_transmit(&mut self) -> Option<Transmit> {
-        self.transmits.pop_front()
+        self.carrier.poll_transmit()
     }
 
-    /// The next thing to know.
+    /// The next thing to know: who came and went before what was said.
     pub fn poll_event(&mut self) -> Option<Event> {
-        self.events.pop_front()
+        while let Some(id) = self.news.pop_first() {
+            let was_shown = self.shown.contains(&id);
+            let peer = self.peers.get(&id).filter(|peer| peer.configured);
+            let settled = peer.filter(|peer| was_shown || peer.is_settled());
+            match settled {
+                Some(peer) if was_shown => return Some(Event::Changed(peer.subsystem.clone())),
+                Some(peer) => {
+                    self.shown.insert(id);
+                    return Some(Event::Appeared(peer.subsystem.clone()));
+                }
+                None if self.shown.remove(&id) => return Some(Event::Lost(id)),
+                None => {}
+            }
+        }
+        self.messages.pop_front().map(Event::Message)
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        None
+        let own = self.own.values();
+        let own = own.flat_map(|own| [Some(own.next_heartbeat), own.tell]);
+        let peers = self.peers.values().map(|peer| Some(peer.next));
+        let all = own.chain(peers).chain([self.carrier.poll_timeout()]);
+        all.flatten().min()
     }
 
     /// What was seen, done and thrown away.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
-        &self.counters
+        self.carrier.counters()
+    }
+
+    /// How datagrams are read and written, and where others are.
+    #[must_use]
+    pub const fn carrier(&self) -> &Carrier {
+        &self.carrier
     }
 
     /// The settings.
@@ -113,8 +300,14 @@ impl RaNode {
         &self.settings
     }
 
-    /// The RA subsystems that are there now, in order of their numbers.
+    /// The RA subsystems that are heard now, in order of their numbers, with what they have told so
+    /// far.
     pub fn subsystems(&self) -> impl Iterator<Item = &Subsystem> + '_ {
-        std::iter::empty()
+        self.peers.values().map(|peer| &peer.subsystem)
+    }
+
+    /// What we show, node managers and communicators included.
+    pub fn own(&self) -> impl Iterator<Item = &Subsystem> + '_ {
+        self.own.values().map(|own| &own.subsystem)
     }
 }

@@ -20,6 +20,8 @@ pub struct Settings {
     pub tries: u32,
     /// How often a subsystem's configuration is asked for again, in case that it tells no changes.
     pub refresh: Duration,
+    /// How often names and services of all components are asked for again.
+    pub review: Duration,
     /// How long changes of what we show are gathered before they are told: each of them makes
     /// OpenJAUS ask everything again.
     pub gather: Duration,
@@ -27,13 +29,13 @@ pub struct Settings {
     pub answers: Rate,
     /// Questions to one subsystem.
     pub questions: Rate,
-    /// The most subsystems that are known; there are no more than 254.
-    pub max_subsystems: usize,
     /// The most components that are known of one subsystem.
     pub max_components: usize,
+    /// The most messages of services that are known of one subsystem.
+    pub max_commands: usize,
     /// The most subscriptions to our configurations.
     pub max_events: usize,
-    /// The most events that wait for the owner.
+    /// The most messages that wait for the owner.
     pub queue_limit: usize,
 }
 
@@ -46,11 +48,12 @@ impl Default for Settings {
             patience: Duration::from_millis(500),
             tries: 4,
             refresh: Duration::from_secs(10),
-            gather: Duration::from_millis(100),
+            review: Duration::from_secs(60),
+            gather: Duration::from_millis(250),
             answers: Rate::new(200, 1000),
             questions: Rate::new(100, 400),
-            max_subsystems: 254,
             max_components: 512,
+            max_commands: 32_768,
             max_events: 1024,
             queue_limit: 4096,
         }

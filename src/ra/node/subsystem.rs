@@ -1,5 +1,8 @@
 //! What a subsystem says of itself: nodes, components, names and services.
 
+use std::fmt;
+use std::net::IpAddr;
+
 use crate::ra::RaId;
 
 /// A subsystem, ours or another's.
@@ -85,6 +88,19 @@ pub enum BadSubsystem {
     #[error("{0} has more {1} than one message can tell: at most 255")]
     TooMany(RaId, &'static str),
     /// A subsystem of that number is heard from elsewhere.
-    #[error("subsystem {0} is there already, at {1}: give ours another number")]
-    Taken(u8, std::net::IpAddr),
+    #[error("subsystem {0} is there already{1}: give ours another number")]
+    Taken(u8, Where),
+}
+
+/// Where somebody was heard, if that is known; reads as the end of a clause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Where(pub Option<IpAddr>);
+
+impl fmt::Display for Where {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(address) => write!(f, ", at {address}"),
+            None => Ok(()),
+        }
+    }
 }
