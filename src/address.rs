@@ -136,6 +136,29 @@ impl JausId {
             && (self.component == component.component || self.component == Self::ANY_COMPONENT)
     }
 
+    /// The id with each 0 read as the wildcard of its field, as some peers mean it.
+    ///
+    /// ```
+    /// use jaus::address::JausId;
+    ///
+    /// assert_eq!(JausId::new(101, 0, 0).with_zeros_for_all(), JausId::new(101, 255, 255));
+    /// ```
+    #[must_use]
+    pub const fn with_zeros_for_all(self) -> Self {
+        const fn any_for_zero(octet: u8) -> u8 {
+            if octet == 0 { 0xFF } else { octet }
+        }
+        let subsystem = match self.subsystem {
+            0 => Self::ANY_SUBSYSTEM,
+            subsystem => subsystem,
+        };
+        Self::new(
+            subsystem,
+            any_for_zero(self.node),
+            any_for_zero(self.component),
+        )
+    }
+
     /// Every component of this id's node: `subsystem.node.255`.
     #[must_use]
     pub const fn whole_node(self) -> Self {

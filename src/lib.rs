@@ -8,10 +8,11 @@
 //! | run a node and see raw messages | [`node`] |
 //! | embed the protocol where there is no tokio | [`endpoint`], [`service`] |
 //! | look into datagrams | [`wire`], and [`view`] for captures and JSON |
+//! | know what other implementations do otherwise | [`peer`] |
 //!
 //! Modules know only those below them: `view` and `component`, then `service` and `node`, then
-//! `link`, `endpoint` and `messages`, then `wire` and `codec`, then `address`. From `service` and
-//! `endpoint` downwards nothing opens a socket or reads a clock.
+//! `link`, `endpoint`, `peer` and `messages`, then `wire` and `codec`, then `address`. From
+//! `service` and `endpoint` downwards nothing opens a socket or reads a clock.
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "ground")]

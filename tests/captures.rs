@@ -283,7 +283,7 @@ fn what_junior_sends_is_taken_as_junior_takes_it() {
         (
             "11-priority0-bug",
             "judp2",
-            and(plain(2, 1, 1), (Counter::ReservedBroadcast, 1)),
+            and(plain(2, 1, 1), (Counter::PriorityFault, 1)),
         ),
         ("12-priority15", "judp2", plain(1, 1, 1)),
     ] {

@@ -253,6 +253,34 @@ async fn a_peer_that_writes_one_octet_at_a_time_is_answered_on_its_connection() 
     assert_eq!(report.flags.acknowledgement(), Acknowledgement::None);
 }
 
+/// Junior opens a connection for each id, and takes a connection for the first id heard on it.
+#[tokio::test]
+async fn each_id_is_answered_on_the_connection_on_which_it_was_heard_last() {
+    let vehicle = Node::start(listening(101)).unwrap();
+    let mut driver = vehicle.attach(1).unwrap();
+    let ids = [JausId::new(2, 1, 1), JausId::new(2, 1, 2)];
+    let mut connections = Vec::new();
+    for id in ids {
+        let mut connection = Scripted::connect(address(&vehicle)).await;
+        let encoded = jtcp::encode(&frame(id, driver.id(), 1)).unwrap();
+        connection.write(&encoded).await;
+        assert_eq!(receive(&mut driver).await.source, id);
+        connections.push(connection);
+    }
+    for (connection, id) in connections.iter_mut().zip(ids) {
+        driver.send(to(&driver, id, REPORT_HEARTBEAT)).unwrap();
+        let report = connection.read().await.unwrap();
+        assert_eq!((report.destination, report.payload), (id, REPORT_HEARTBEAT));
+    }
+    // It was restarted, and has the first id in a connection of its own again.
+    let mut again = Scripted::connect(address(&vehicle)).await;
+    let encoded = jtcp::encode(&frame(ids[0], driver.id(), 2)).unwrap();
+    again.write(&encoded).await;
+    receive(&mut driver).await;
+    driver.send(to(&driver, ids[0], REPORT_HEARTBEAT)).unwrap();
+    assert_eq!(again.read().await.unwrap().destination, ids[0]);
+}
+
 /// JAUS++ writes the version octet before each message, as a segment of its own.
 #[tokio::test]
 async fn a_version_octet_before_each_message_is_taken() {

@@ -3,8 +3,9 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-use super::{Access, LargeStyle, Pacing, Packing, Path, Rate, Rates};
+use super::{Access, Pacing, Packing, Path, Rate, Rates};
 use crate::address::JausId;
+use crate::peer::Assignment;
 
 /// The payloads that packets may be limited to, in octets.
 pub const PAYLOAD_LIMITS: RangeInclusive<usize> = 64..=4079;
@@ -30,10 +31,9 @@ pub struct Config {
     /// The longest message, in octets, that is sent or received. Above
     /// [`payload_limit`](Self::payload_limit) it travels in fragments.
     pub max_message: usize,
-    /// How peers cut large messages, if that is known beforehand: ids, which may hold wildcards,
-    /// of which the first that fits counts. That a peer repeats the code in each fragment is also
-    /// learned from what it sends.
-    pub large_styles: Vec<(JausId, LargeStyle)>,
+    /// What peers are, if that is known beforehand; of those that fit an id the first counts. The
+    /// others are [recognised](crate::peer::Recogniser) by what they send.
+    pub profiles: Vec<Assignment>,
     /// The most octets that are kept of unfinished messages of one sender, with 64 more for each
     /// fragment and 256 for each gap. The oldest are forgotten first.
     pub max_reassembly_per_sender: usize,
@@ -114,7 +114,7 @@ impl Default for Config {
             static_peers: Vec::new(),
             payload_limit: 1425,
             max_message: 16 << 20,
-            large_styles: Vec::new(),
+            profiles: Vec::new(),
             max_reassembly_per_sender: 24 << 20,
             max_reassembly: 48 << 20,
             reassembly_timeout: Duration::from_secs(6),

@@ -63,6 +63,9 @@ counters! {
     ReservedType = "dropped: reserved message type",
     /// Dropped: a compressed header, which nobody negotiated with us.
     CompressedHeader = "dropped: compressed header",
+    /// Dropped: a message with all flags set, which Junior makes of priority 0 and which could be any
+    /// part of one.
+    PriorityFault = "dropped: all flags set, as Junior does for priority 0",
     /// Dropped: the reserved value of the broadcast field.
     ReservedBroadcast = "dropped: reserved broadcast value",
     /// Dropped: a source id with a wildcard or a zero.

@@ -62,7 +62,6 @@ pub use config::{Config, PAYLOAD_LIMITS, StaticPeer};
 pub use counters::{Counter, Counters};
 pub use delivery::FlowStatus;
 pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
-pub use large::LargeStyle;
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
 pub use occupancy::Occupancy;
@@ -76,7 +75,7 @@ pub use send::SendError;
 
 use crate::address::JausId;
 use delivery::Deliveries;
-use large::{LargeStyles, Numbers, Reassembly};
+use large::{Numbers, Reassembly};
 use local::Components;
 use pacing::Pacer;
 use packing::Gathering;
@@ -103,7 +102,6 @@ pub struct Endpoint {
     heard: Recent,
     sent_to_group: Recent,
     reassembly: Reassembly,
-    large_styles: LargeStyles,
     deliveries: Deliveries,
     conflicts: BTreeMap<JausId, Instant>,
     transmits: PriorityQueue<Transmit>,
@@ -132,7 +130,7 @@ impl Endpoint {
         Self {
             components: Components::new(config.max_components),
             links: BTreeMap::new(),
-            peers: Peers::new(config.max_peers, config.static_peers.clone()),
+            peers: Peers::new(&config),
             numbers: Numbers::after(config.first_sequence),
             gate: Gate::new(&config.rates, config.max_peers),
             credit: 0,
@@ -141,7 +139,6 @@ impl Endpoint {
             heard: Recent::new(config.max_recent, longest, keys.clone()),
             sent_to_group: Recent::new(config.max_recent, config.echo_window, keys),
             reassembly: Reassembly::new(&config),
-            large_styles: LargeStyles::new(&config),
             deliveries: Deliveries::new(&config),
             conflicts: BTreeMap::new(),
             transmits: PriorityQueue::new(config.queue_limit),

@@ -8,8 +8,9 @@
 use std::collections::{HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
-use super::{LinkId, Path, StaticPeer};
+use super::{Config, LinkId, Path, StaticPeer};
 use crate::address::JausId;
+use crate::peer::{self, Assignment, LargeStyle, Recogniser};
 use crate::wire::{Frame, Version};
 
 /// A peer whose address was learned, and what was counted about it since.
@@ -26,6 +27,8 @@ pub struct Peer {
     pub first_heard: Instant,
     /// When the latest message came.
     pub last_heard: Instant,
+    /// What it is: what was configured, or what it was recognised as for sure.
+    pub profile: peer::Peer,
     /// Messages from it, fragments and acknowledgements among them, without duplicates.
     pub received: Traffic,
     /// Messages that components of ours sent to it alone.
@@ -99,6 +102,8 @@ struct Known {
     place: u64,
     /// Its latest sequence number, counted on over all rounds.
     latest: u32,
+    /// Who it is.
+    recogniser: Recogniser,
 }
 
 /// Somebody's place in a queue for being forgotten.
@@ -120,20 +125,22 @@ pub(super) struct Peers {
     configured: Vec<StaticPeer>,
     /// Those of the configured that are one component.
     fixed: HashMap<JausId, Path>,
+    assigned: Vec<Assignment>,
     limit: usize,
 }
 
 impl Peers {
-    pub(super) fn new(limit: usize, configured: Vec<StaticPeer>) -> Self {
+    pub(super) fn new(config: &Config) -> Self {
         let mut peers = Self {
             learned: HashMap::new(),
             queues: Default::default(),
             places: 0,
             configured: Vec::new(),
             fixed: HashMap::new(),
-            limit: limit.max(1),
+            assigned: config.profiles.clone(),
+            limit: config.max_peers.max(1),
         };
-        peers.configure(configured);
+        peers.configure(config.static_peers.clone());
         peers
     }
 
@@ -179,6 +186,7 @@ impl Peers {
             if number.wrapping_sub(known.latest) as i32 > 0 {
                 known.latest = number;
             }
+            known.recogniser.handle_frame(frame, 0);
             let peer = &mut known.peer;
             peer.received.add(octets);
             (peer.version, peer.last_heard) = (version, now);
@@ -205,6 +213,7 @@ impl Peers {
             version,
             first_heard: now,
             last_heard: now,
+            profile: peer::Peer::Standard,
             received,
             sent: Traffic::default(),
             duplicates: 0,
@@ -212,15 +221,44 @@ impl Peers {
             lost: 0,
             round_trip: None,
         };
+        let mut recogniser = Recogniser::new();
+        recogniser.handle_frame(frame, 0);
         let known = Known {
             peer,
             standing: Standing::Heard,
             place: 0,
             latest: number,
+            recogniser,
         };
         self.learned.insert(peer.id, known);
         self.queue_up(peer.id);
         Learned::New { evicted }
+    }
+
+    /// What a peer is: what was configured, or what it was recognised as for sure.
+    pub(super) fn profile(&self, id: JausId) -> peer::Peer {
+        let recognised = || {
+            self.learned
+                .get(&id)
+                .map(|known| known.recogniser.certain())
+        };
+        let assigned = Assignment::find(&self.assigned, id);
+        assigned.or_else(recognised).unwrap_or_default()
+    }
+
+    /// How a peer cuts large messages, if that is known. Who is configured to be no particular peer
+    /// keeps to the standard.
+    pub(super) fn large_style(&self, id: JausId) -> Option<LargeStyle> {
+        let style = self.profile(id).large_style();
+        let assigned = || Assignment::find(&self.assigned, id);
+        style.or_else(|| assigned().map(|_| LargeStyle::Standard))
+    }
+
+    /// Something else about a peer than a frame that was taken may tell who it is.
+    pub(super) fn recognise(&mut self, id: JausId, by: impl FnOnce(&mut Recogniser)) {
+        if let Some(known) = self.learned.get_mut(&id) {
+            by(&mut known.recogniser);
+        }
     }
 
     /// The round of its sequence numbers in which a sender is with this frame.
@@ -385,7 +423,11 @@ impl Peers {
 
     /// All of them, in order of their ids.
     pub(super) fn iter(&self) -> impl Iterator<Item = Peer> + '_ {
-        let mut peers: Vec<_> = self.learned.values().map(|known| known.peer).collect();
+        let peers = self.learned.values().map(|known| Peer {
+            profile: self.profile(known.peer.id),
+            ..known.peer
+        });
+        let mut peers: Vec<_> = peers.collect();
         peers.sort_unstable_by_key(|peer| peer.id);
         peers.into_iter()
     }

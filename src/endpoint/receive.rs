@@ -10,7 +10,8 @@ use super::peers::Learned;
 use super::recent::{Class, Fingerprint};
 use super::{Counter, Endpoint, Event, Path, Received};
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version, as5669a, judp};
+use crate::peer;
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Version, as5669a, judp};
 
 /// Octets of IPv4 and UDP around a datagram.
 const DATAGRAM_OVERHEAD: usize = 28;
@@ -49,9 +50,13 @@ impl Endpoint {
                 return self.counters.add(Counter::NotJaus);
             }
         };
+        let mut latest = None;
         for frame in &mut frames {
             match frame {
-                Ok(frame) => self.receive(now, from, &frame),
+                Ok(frame) => {
+                    self.receive(now, from, &frame);
+                    latest = Some(frame.source);
+                }
                 Err(error) => {
                     debug!(?from, %error, "malformed");
                     return self.counters.add(Counter::Malformed);
@@ -62,6 +67,10 @@ impl Endpoint {
             trace!(?from, octets = frames.remaining(), "stale octets");
             self.counters
                 .add_many(Counter::StaleOctets, frames.remaining() as u64);
+            if let Some(source) = latest {
+                self.peers
+                    .recognise(source, peer::Recogniser::handle_stale_octets);
+            }
         }
     }
 
@@ -94,15 +103,34 @@ impl Endpoint {
     fn receive(&mut self, now: Instant, from: Path, frame: &Frame) {
         self.counters.add(Counter::MessagesReceived);
         let (source, destination) = (frame.source, frame.destination);
-        if let Err(reason) = self.accept(now, from, frame) {
+        let accepted = match self.with_wildcards_for_zeros(frame) {
+            Some(meant) => self.accept(now, from, &meant),
+            None => self.accept(now, from, frame),
+        };
+        if let Err(reason) = accepted {
             trace!(%source, %destination, peer = %from.peer, %reason);
             self.counters.add(reason);
         }
     }
 
+    /// The message as somebody means it who writes 0 for "all"; `None` if it stays as it is.
+    fn with_wildcards_for_zeros(&self, frame: &Frame) -> Option<Frame> {
+        let means_all = frame.destination.has_zero()
+            && self.peers.profile(frame.source).reads_zero_as_wildcard();
+        means_all.then(|| Frame {
+            destination: frame.destination.with_zeros_for_all(),
+            ..frame.clone()
+        })
+    }
+
     /// Does all that a message causes, or tells why it is dropped.
     fn accept(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
-        let broadcast = check_header(frame)?;
+        let broadcast = check_header(frame).inspect_err(|reason| {
+            if *reason == Counter::PriorityFault {
+                self.peers
+                    .recognise(frame.source, |it| it.handle_frame(frame, 0));
+            }
+        })?;
         let seen = self.heard.fingerprint(frame);
         self.refuse_own(now, from, frame.source, seen)?;
         self.config.access.check_source(frame.source)?;
@@ -166,9 +194,12 @@ impl Endpoint {
             return Ok(());
         }
         let payload = match frame.flags.data() {
-            DataControl::Single => frame.payload.clone(),
+            DataControl::Single => {
+                self.finish_large(from, frame);
+                frame.payload.clone()
+            }
             _ => {
-                let style = self.large_styles.of(frame.source);
+                let style = self.peers.large_style(frame.source);
                 let whole = self.reassembly.insert(
                     now,
                     frame,
@@ -177,12 +208,29 @@ impl Endpoint {
                     &mut self.counters,
                 )?;
                 let Some(whole) = whole else { return Ok(()) };
-                self.large_styles.learn(frame.source, whole.style);
+                self.peers
+                    .recognise(frame.source, |it| it.handle_large(whole.style));
                 whole.payload
             }
         };
         self.deliver(from, frame, broadcast, &payload, receivers);
         Ok(())
+    }
+
+    /// Delivers a large message whose end only the next message of its sender shows.
+    fn finish_large(&mut self, from: Path, next: &Frame) {
+        let finished = self.reassembly.finish(next.source, next.sequence);
+        let Some((destination, priority, whole)) = finished else {
+            return;
+        };
+        self.peers
+            .recognise(next.source, |it| it.handle_large(whole.style));
+        let large = Frame {
+            flags: Flags::new(priority),
+            ..Frame::new(next.source, destination, Bytes::new())
+        };
+        let receivers = self.components.matching(destination);
+        self.deliver(from, &large, Broadcast::None, &whole.payload, &receivers);
     }
 
     /// Whether one more message may come from there, and from somebody who was not known.
@@ -384,6 +432,9 @@ fn check_header(frame: &Frame) -> Result<Broadcast, Counter> {
     }
     if !frame.source.is_unicast() {
         return Err(Counter::InvalidSource);
+    }
+    if peer::is_priority_fault(frame) {
+        return Err(Counter::PriorityFault);
     }
     let broadcast = frame.flags.broadcast().ok_or(Counter::ReservedBroadcast)?;
     if frame.flags.acknowledgement().is_answer() {

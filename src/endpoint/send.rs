@@ -4,12 +4,13 @@ use std::time::Instant;
 
 use tracing::{debug, trace};
 
-use super::large::{Cut, LargeStyle};
+use super::large::Cut;
 use super::pacing::Stretch;
 use super::{
     Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To, Transmit,
 };
 use crate::address::JausId;
+use crate::peer::LargeStyle;
 use crate::wire::{
     Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version,
 };
@@ -190,10 +191,9 @@ impl Endpoint {
         }
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
-        let repeat_code = self.repeats_code(destination, version);
         let length = message.payload.len();
-        self.check_length(length, repeat_code)?;
-        let cut = Cut::new(length, self.config.payload_limit, repeat_code);
+        self.check_length(length, destination, version)?;
+        let cut = self.cut(length, destination, version);
         // What is large goes to everybody only until the address is known.
         let seeks = scope == Broadcast::None && route.is_none();
         if message.acknowledge || cut.count() > 1 && seeks {
@@ -268,14 +268,33 @@ impl Endpoint {
         }
     }
 
-    /// Whether what is sent to `destination` names the message code in each fragment.
-    pub(super) fn repeats_code(&self, destination: JausId, version: Version) -> bool {
-        version != Version::As5669a
-            || self.large_styles.of(destination) == Some(LargeStyle::RepeatedCode)
+    /// How a message to `destination` is cut.
+    fn cut(&self, length: usize, destination: JausId, version: Version) -> Cut {
+        let (limit, repeat_code) = self.limits_of(destination, version);
+        Cut::new(length, limit, repeat_code)
     }
 
-    fn check_length(&self, length: usize, repeat_code: bool) -> Result<(), SendError> {
-        let longest = Cut::longest(self.config.payload_limit, repeat_code);
+    /// The longest payload of a packet to `destination`, and whether each fragment names the message
+    /// code.
+    pub(super) fn limits_of(&self, destination: JausId, version: Version) -> (usize, bool) {
+        let longest = self.peers.profile(destination).payload_limit();
+        let limit = self.config.payload_limit;
+        let repeat_code = version != Version::As5669a
+            || self.peers.large_style(destination) == Some(LargeStyle::RepeatedCode);
+        (
+            longest.map_or(limit, |longest| longest.min(limit)),
+            repeat_code,
+        )
+    }
+
+    fn check_length(
+        &self,
+        length: usize,
+        destination: JausId,
+        version: Version,
+    ) -> Result<(), SendError> {
+        let (limit, repeat_code) = self.limits_of(destination, version);
+        let longest = Cut::longest(limit, repeat_code);
         let limit = self.config.max_message.min(longest);
         if length > limit {
             return Err(SendError::TooLong { length, limit });

@@ -69,8 +69,8 @@ departures! {
     NarrowReassembly = Entry {
         name: "narrow reassembly",
         peers: &[JausPlusPlus],
-        does: "takes at most 1425 octets in one packet, refuses the number 0 in fragments, loses a \
-               message whose numbers go round, and puts one message of a code together at a time",
+        does: "takes at most 1425 octets in one packet, refuses the number 0 in fragments, and \
+               loses a message whose numbers go round",
         source: Source::Read,
         told: Told::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
         ours: "no packet to it is longer; numbers leave out 0 and do not go round within a message \
@@ -154,13 +154,14 @@ departures! {
     UnreadRejections = Entry {
         name: "cannot read a rejection",
         peers: &[JausPlusPlus],
-        does: "drops a Reject Event Request whose presence vector says that there is a code, and \
-               waits 250 ms in vain",
+        does: "takes the first bit of the presence vector of Reject Event Request for a text, so \
+               that one with a code alone is too short for it, and it waits in vain",
         source: Source::Provoked,
-        told: Told::By(&[Sign::JausPlusPlusService, Sign::RegistersAcrossSubsystems]),
-        ours: "a component that has been told the profile writes it as JAUS++ does",
+        told: Told::NeedNotBe,
+        ours: "each rejection has code and text: then what JAUS++ expects is in the places where \
+               the standard has it. It shows the code one too high",
         place: "src/service/events/rejecting.rs",
-        test: "a_rejection_to_jauspp_is_one_that_it_reads",
+        test: "a_rejection_is_one_that_jauspp_reads_too",
     };
     /// Query Services without wildcards.
     NoServiceWildcards = Entry {
@@ -191,10 +192,10 @@ departures! {
         does: "sends Set Emergency (0006h) for Clear Emergency, and does not know 0007h",
         source: Source::Provoked,
         told: Told::NeedNotBe,
-        ours: "it is taken at its word: the emergency stays, and no client loses what it may do; \
-               another client must clear it",
+        ours: "it is taken at its word: the emergency stays, however often it is set. One Clear \
+               Emergency with the client's id ends it, or the vehicle's application does",
         place: "src/service/control/management.rs",
-        test: "an_emergency_that_is_set_again_stays_and_another_client_clears_it",
+        test: "an_emergency_that_is_set_again_stays_and_is_cleared_at_once",
     };
     /// No heartbeats.
     NoHeartbeats = Entry {
@@ -218,7 +219,7 @@ departures! {
         ours: "both ways of writing are read. It hangs when a message of ours comes in two \
                segments: use UDP with it",
         place: "src/wire/jtcp/decoder.rs",
-        test: "jauspps_version_octet_before_each_message_is_read",
+        test: "a_version_octet_before_each_message_is_read",
     };
     /// A unicast message as a broadcast.
     CallsUnknownIds = Entry {
@@ -270,7 +271,7 @@ departures! {
                are. Only one of our components reaches it by a connection of ours: let it connect, \
                or use UDP",
         place: "src/link/tcp/mod.rs",
-        test: "each_id_is_answered_on_the_connection_that_it_was_heard_on",
+        test: "each_id_is_answered_on_the_connection_on_which_it_was_heard_last",
     };
     /// Header compression flags from the wrong end.
     CompressionBits = Entry {

@@ -47,13 +47,6 @@ impl Peer {
         matches!(self, Self::Iop | Self::Jts)
     }
 
-    /// Whether it reads Reject Event Request (01F4h) wrongly: the response code is always there and
-    /// one lower, and the presence vector's only bit means the text.
-    #[must_use]
-    pub const fn misreads_event_rejections(self) -> bool {
-        matches!(self, Self::JausPlusPlus)
-    }
-
     /// Whether it cannot keep two components apart, and delivers to one what is for the other.
     ///
     /// ```

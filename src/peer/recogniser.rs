@@ -75,6 +75,8 @@ pub struct Verdict {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Recogniser {
     signs: Signs,
+    /// Who it is for sure.
+    certain: Peer,
     begun: bool,
     numbers: Numbers,
     large: Option<Large>,
@@ -100,7 +102,7 @@ impl Recogniser {
     /// Frames that nobody should accept are welcome: they tell a lot.
     pub fn handle_frame(&mut self, frame: &Frame, trailing: usize) {
         if trailing > 0 {
-            self.note(Sign::StaleOctets);
+            self.handle_stale_octets();
         }
         if is_priority_fault(frame) {
             self.note(Sign::PriorityFault);
@@ -118,6 +120,11 @@ impl Recogniser {
             DataControl::Single => self.handle_single(frame),
             _ => self.handle_fragment(frame),
         }
+    }
+
+    /// Takes note that octets were left behind the last message of a datagram.
+    pub fn handle_stale_octets(&mut self) {
+        self.note(Sign::StaleOctets);
     }
 
     /// Takes the style of a large message that was put together.
@@ -164,11 +171,8 @@ impl Recogniser {
 
     /// Who it is for sure; else [`Peer::Standard`].
     #[must_use]
-    pub fn certain(&self) -> Peer {
-        match self.best() {
-            (peer, Certainty::Certain) => peer,
-            _ => Peer::Standard,
-        }
+    pub const fn certain(&self) -> Peer {
+        self.certain
     }
 
     /// For whom most speaks, and how much; of equals the first.
@@ -190,7 +194,11 @@ impl Recogniser {
     }
 
     fn note(&mut self, sign: Sign) {
-        self.signs.insert(sign);
+        if self.signs.insert(sign)
+            && let (peer, Certainty::Certain) = self.best()
+        {
+            self.certain = peer;
+        }
     }
 
     fn handle_number(&mut self, frame: &Frame) {

@@ -140,8 +140,11 @@ impl fmt::Display for Sign {
 pub(super) struct Signs(u16);
 
 impl Signs {
-    pub(super) fn insert(&mut self, sign: Sign) {
+    /// Says whether it is new.
+    pub(super) fn insert(&mut self, sign: Sign) -> bool {
+        let new = self.0 & sign.bit() == 0;
         self.0 |= sign.bit();
+        new
     }
 
     pub(super) fn iter(self) -> impl Iterator<Item = Sign> {

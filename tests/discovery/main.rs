@@ -8,6 +8,7 @@
 
 mod answers;
 mod finding;
+mod profiles;
 mod rubbish;
 mod traffic;
 mod world;

@@ -291,8 +291,7 @@ impl Endpoint {
     ) -> Option<Transmit> {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
-        let repeat = self.repeats_code(destination, version);
-        let limit = self.config.payload_limit;
+        let (limit, repeat) = self.limits_of(destination, version);
         let flow = self.deliveries.flows.get_mut(&destination)?;
         flow.known = route.is_some();
         let begin = |length| (Cut::new(length, limit, repeat), version);

@@ -11,5 +11,3 @@ mod style;
 
 pub(super) use reassembly::Reassembly;
 pub(super) use split::{Cut, Numbers};
-pub use style::LargeStyle;
-pub(super) use style::LargeStyles;

@@ -13,9 +13,10 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use super::style::{self, LargeStyle};
+use super::style;
 use crate::address::JausId;
 use crate::endpoint::{Config, Counter, Counters};
+use crate::peer::LargeStyle;
 use crate::wire::{Acknowledgement, DataControl, Frame, Priority, Version, ra};
 
 /// What a piece costs beside its octets.
@@ -265,6 +266,31 @@ impl Reassembly {
                 Err(reason)
             }
         }
+    }
+
+    /// Takes the number of a whole message, and gives the large one before it, with its receiver
+    /// and priority, that has just lacked the mark of its end: JAUS++ gives the number of the last
+    /// fragment to the next message again. See
+    /// [`NoLastFragment`](crate::peer::Departure::NoLastFragment).
+    pub(in crate::endpoint) fn finish(
+        &mut self,
+        source: JausId,
+        number: u16,
+    ) -> Option<(JausId, Priority, Whole)> {
+        let sender = self.senders.get_mut(&source)?;
+        let ended = |(_, run): &(&Place, &Run)| {
+            run.last == number
+                && run.begins
+                && !run.ends
+                && style::may_lack_the_mark(run.kind.version, &run.pieces)
+        };
+        let place = *sender.runs.iter().find(ended)?.0;
+        let run = sender.take(place)?;
+        self.cost -= run.cost();
+        self.drop_if_empty(source);
+        let style = Some(LargeStyle::RepeatedCode);
+        let whole = style::join(run.kind.version, &run.pieces, style);
+        Some((place.0, run.kind.priority, whole))
     }
 
     fn drop_if_empty(&mut self, source: JausId) {

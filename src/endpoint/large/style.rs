@@ -1,43 +1,25 @@
-//! Where a large message's code stands: once, as the standard has it, or in each fragment, as
-//! JAUS++ does.
+//! Putting the fragments of a whole message together: with their codes left out where they repeat
+//! them, as JAUS++ does.
 
-use std::collections::{HashSet, VecDeque};
+use std::collections::VecDeque;
 
 use bytes::Bytes;
 
 use super::reassembly::Whole;
-use crate::address::JausId;
-use crate::endpoint::Config;
+use crate::peer::{JAUSPP_FRAGMENT, LargeStyle};
 use crate::wire::{Version, large};
-
-/// How large messages are cut for AS5669A, by the sender's habit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum LargeStyle {
-    /// The message is cut as it is; only the first fragment begins with its code. So do the
-    /// standard and Junior.
-    #[default]
-    Standard,
-    /// Each fragment begins with the message code. So does JAUS++, and it understands nothing else.
-    RepeatedCode,
-}
-
-/// The payload of JAUS++'s fragments, but for the last: the code and 1571 octets.
-const JAUSPP_FRAGMENT: usize = 1573;
 
 /// Joins the fragments of a whole message, whose sender may be known to cut in some style.
 ///
 /// Nothing in a fragment tells the style. JAUS++ is known by the length of its fragments, all of
 /// which begin with the same code.
 pub(super) fn join(version: Version, pieces: &VecDeque<Bytes>, known: Option<LargeStyle>) -> Whole {
-    let of_jauspp = || {
-        let all_but_last = pieces.iter().take(pieces.len().saturating_sub(1));
-        all_but_last.map(Bytes::len).all(|n| n == JAUSPP_FRAGMENT)
-    };
+    let all_but_last = || pieces.iter().take(pieces.len().saturating_sub(1));
     let repeated = version == Version::As5669a
         && match known {
             Some(LargeStyle::Standard) => false,
             Some(LargeStyle::RepeatedCode) => large::repeats_code(pieces),
-            None => of_jauspp() && large::repeats_code(pieces),
+            None => are_of_jauspp(all_but_last()) && large::repeats_code(pieces),
         };
     let (skip, style) = if repeated {
         (large::CODE_LEN, LargeStyle::RepeatedCode)
@@ -50,39 +32,16 @@ pub(super) fn join(version: Version, pieces: &VecDeque<Bytes>, known: Option<Lar
     }
 }
 
-/// Whose habits are known.
-#[derive(Debug)]
-pub(in crate::endpoint) struct LargeStyles {
-    configured: Vec<(JausId, LargeStyle)>,
-    /// Who repeats the code.
-    learned: HashSet<JausId>,
-    limit: usize,
+/// Whether these are full fragments of JAUS++, by their length.
+fn are_of_jauspp<'a>(mut pieces: impl Iterator<Item = &'a Bytes>) -> bool {
+    pieces.all(|piece| piece.len() == JAUSPP_FRAGMENT)
 }
 
-impl LargeStyles {
-    pub(in crate::endpoint) fn new(config: &Config) -> Self {
-        Self {
-            configured: config.large_styles.clone(),
-            learned: HashSet::new(),
-            limit: config.max_peers,
-        }
-    }
-
-    /// The habit of a peer, if it is known.
-    pub(in crate::endpoint) fn of(&self, peer: JausId) -> Option<LargeStyle> {
-        let configured = self.configured.iter().find(|(id, _)| id.matches(peer));
-        let learned = || {
-            self.learned
-                .contains(&peer)
-                .then_some(LargeStyle::RepeatedCode)
-        };
-        configured.map(|&(_, style)| style).or_else(learned)
-    }
-
-    /// Takes note of how a peer has cut a message.
-    pub(in crate::endpoint) fn learn(&mut self, peer: JausId, style: LargeStyle) {
-        if style == LargeStyle::RepeatedCode && self.learned.len() < self.limit {
-            self.learned.insert(peer);
-        }
-    }
+/// Whether these may be all fragments of a message of JAUS++ that fills them, so that the last is
+/// not marked.
+pub(super) fn may_lack_the_mark(version: Version, pieces: &VecDeque<Bytes>) -> bool {
+    version == Version::As5669a
+        && pieces.len() > 1
+        && are_of_jauspp(pieces.iter())
+        && large::repeats_code(pieces)
 }

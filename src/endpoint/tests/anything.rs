@@ -151,6 +151,7 @@ fn is_accounted_for(rig: &Rig) -> bool {
     let before_delivery: u64 = [
         Counter::ReservedType,
         Counter::CompressedHeader,
+        Counter::PriorityFault,
         Counter::ReservedBroadcast,
         Counter::InvalidSource,
         Counter::OwnEcho,

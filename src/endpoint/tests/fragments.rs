@@ -412,7 +412,10 @@ fn octets_that_happen_to_repeat_are_not_taken_for_a_repeated_code() {
         .for_each(|frame| rig.hear(frame));
     assert_eq!(payloads(&mut rig), std::slice::from_ref(&zeros));
     let configured = Config {
-        large_styles: vec![(JausId::EVERYONE, LargeStyle::Standard)],
+        profiles: vec![crate::peer::Assignment {
+            id: JausId::EVERYONE,
+            profile: crate::peer::Peer::Standard,
+        }],
         ..Config::default()
     };
     let mut rig = Rig::with(configured);

@@ -9,6 +9,7 @@ mod flood;
 mod fragments;
 mod identity;
 mod output;
+mod profiles;
 mod receiving;
 mod routing;
 mod sending;

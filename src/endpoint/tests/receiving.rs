@@ -182,19 +182,6 @@ fn rubbish_is_counted_by_its_kind() {
     }
 }
 
-/// Recorded: Junior turns priority 0 into flags FFh, an acknowledgement of the end of a large
-/// reserved broadcast.
-#[test]
-fn juniors_priority_zero_fault_is_dropped() {
-    let mut rig = Rig::new();
-    rig.hear(&Frame {
-        flags: Flags(0xFF),
-        ..from_peer(QUERY_IDENTIFICATION)
-    });
-    assert_eq!(rig.events(), []);
-    assert_eq!(rig.count(Counter::ReservedBroadcast), 1);
-}
-
 #[test]
 fn a_datagram_of_a_link_that_is_gone_is_dropped() {
     let mut rig = Rig::new();

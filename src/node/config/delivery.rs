@@ -8,7 +8,8 @@ use std::time::Duration;
 #[cfg(feature = "serde")]
 use super::units;
 use crate::address::JausId;
-use crate::endpoint::{self, LargeStyle, Pacing, Packing};
+use crate::endpoint::{self, Pacing, Packing};
+use crate::peer::{self, Assignment};
 
 const PATIENCES: RangeInclusive<Duration> = Duration::from_millis(100)..=Duration::from_secs(600);
 const WINDOWS: RangeInclusive<usize> = 2..=16_384;
@@ -61,7 +62,8 @@ pub struct Delivery {
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub pace_rate: usize,
     /// Peers that repeat the message code in each fragment of a large message, by id, which may
-    /// hold wildcards. That a peer does is also learned when it sends one.
+    /// hold wildcards: the same as a `[[profile]]` with `profile = "jaus++"` for each. That a peer
+    /// does is also learned when it sends one.
     pub repeat_code_to: Vec<JausId>,
 }
 
@@ -103,7 +105,12 @@ impl Delivery {
 
     /// Puts the settings to the others of the endpoint.
     pub(super) fn apply(&self, to: endpoint::Config) -> endpoint::Config {
-        let repeat = |&id: &JausId| (id, LargeStyle::RepeatedCode);
+        let repeat = |&id: &JausId| Assignment {
+            id,
+            profile: peer::Peer::JausPlusPlus,
+        };
+        let repeating = self.repeat_code_to.iter().map(repeat);
+        let profiles = to.profiles.into_iter().chain(repeating).collect();
         endpoint::Config {
             acknowledge_patience: self.patience,
             retransmission_window: self.patience + Duration::from_millis(500),
@@ -114,7 +121,7 @@ impl Delivery {
                 burst: self.pace_burst,
                 rate: self.pace_rate as u64,
             }),
-            large_styles: self.repeat_code_to.iter().map(repeat).collect(),
+            profiles,
             ..to
         }
     }
@@ -221,7 +228,8 @@ mod tests {
         assert_eq!(endpoint.packing, Packing::Within(Duration::from_millis(2)));
         assert_eq!(endpoint.pacing.unwrap().rate, 1_000_000);
         assert_eq!(endpoint.max_unacknowledged_octets, 1 << 20);
-        assert_eq!(endpoint.large_styles[0].0, JausId::new(7, 255, 255));
+        assert_eq!(endpoint.profiles[0].id, JausId::new(7, 255, 255));
+        assert_eq!(endpoint.profiles[0].profile, peer::Peer::JausPlusPlus);
         assert_eq!(read("packing = \"off\"").unwrap(), Delivery::default());
         assert!(
             read("packing = 5")

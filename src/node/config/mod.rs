@@ -24,6 +24,10 @@
 //! listen = "0.0.0.0"                   # port 3794; or "10.0.0.5:3795"
 //! connect = ["10.0.0.7", "102.255.255@10.0.0.8:3794"]
 //!
+//! [[profile]]                          # what a peer is that cannot be recognised (see `peer`)
+//! id = "7.255.255"
+//! profile = "jaus++"
+//!
 //! [[serial]]                           # one for each serial line (feature `serial`)
 //! device = "/dev/ttyUSB0"
 //! baud = 115200                        # the default
@@ -51,6 +55,7 @@ use crate::link::local::{Address, Local};
 use crate::link::serial::Settings as SerialLine;
 use crate::link::udp::{self, Broadcasts, PortTaken};
 use crate::link::{Group, Group6, Interfaces, InvalidGroup, Ip};
+use crate::peer::Assignment;
 
 const LONGEST_MESSAGE: usize = 16 << 20;
 /// Sequence numbers have 16 bits, and 0 is left out.
@@ -115,6 +120,8 @@ pub struct Config {
     pub serial: Vec<SerialLine>,
     /// Acknowledged messages, and how datagrams leave.
     pub delivery: Delivery,
+    /// What peers are that cannot be recognised by what they send.
+    pub profile: Vec<Assignment>,
     /// Whether messages for others are passed on between the links.
     pub routing: Routing,
     /// Who may speak to this node.
@@ -156,6 +163,7 @@ impl Config {
             #[cfg(feature = "serial")]
             serial: Vec::new(),
             delivery: Delivery::default(),
+            profile: Vec::new(),
             routing: Routing::default(),
             access: Access::default(),
             limits: Limits::default(),
@@ -299,6 +307,7 @@ impl Config {
             access: self.access.clone(),
             rates: self.limits.rates(),
             first_sequence,
+            profiles: self.profile.clone(),
             ..usual
         })
     }

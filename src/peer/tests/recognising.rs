@@ -139,6 +139,16 @@ fn services_tell_jauspp_and_the_profiles() {
 }
 
 #[test]
+fn junior_of_the_tool_set_confuses_ids_with_zero_octets() {
+    let confused =
+        |one: &str, other: &str| Peer::Jts.confuses(one.parse().unwrap(), other.parse().unwrap());
+    assert!(confused("1.1.1", "513.1.1") && confused("513.1.1", "1.1.1"));
+    assert!(!confused("1.1.1", "2.1.1") && !confused("257.1.1", "513.1.1"));
+    assert!(!confused("1.1.1", "1.1.1"), "it is the same");
+    assert!(!Peer::Fkie.confuses(JausId::new(1, 1, 1), JausId::new(513, 1, 1)));
+}
+
+#[test]
 fn junior_is_likely_by_its_first_call_and_certain_by_its_fault() {
     let call = Frame {
         flags: Flags::default()

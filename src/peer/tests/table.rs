@@ -1,7 +1,42 @@
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::super::*;
+
+/// Every Rust file below a directory of the repository.
+fn sources(directory: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(directory).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn each_departure_names_a_file_and_a_test_that_are_there() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    for directory in ["src", "tests"] {
+        sources(&root.join(directory), &mut files);
+    }
+    let code: String = files
+        .iter()
+        .map(|file| fs::read_to_string(file).unwrap())
+        .collect();
+    for departure in Departure::ALL {
+        let entry = departure.entry();
+        assert!(root.join(entry.place).is_file(), "{}", entry.place);
+        let test = format!("fn {}() {{", entry.test);
+        assert!(
+            code.contains(&test),
+            "{departure}: there is no test {}",
+            entry.test
+        );
+    }
+}
 
 /// Set to write the page of the table anew.
 const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
@@ -13,11 +48,8 @@ fn the_page_shows_the_table_as_it_is() {
     if std::env::var_os(RENEW).is_some() {
         fs::write(&page, &table).unwrap();
     }
-    assert_eq!(
-        fs::read_to_string(page).unwrap(),
-        table,
-        "set {RENEW} to write it anew"
-    );
+    let shown = fs::read_to_string(page).unwrap();
+    assert!(shown == table, "set {RENEW} to write it anew");
 }
 
 #[test]

@@ -375,6 +375,23 @@ fn anybody_can_set_an_emergency_and_only_the_same_client_clears_it() {
     assert_eq!(rig.controller(), Some((FIRST, 100)), "control is kept");
 }
 
+/// JAUS++ sends Set Emergency when it means Clear Emergency.
+#[test]
+fn an_emergency_that_is_set_again_stays_and_is_cleared_at_once() {
+    let mut rig = Rig::ready();
+    for _again in 0..3 {
+        rig.hear(FIRST, &STOP);
+        assert_eq!(rig.state(), State::Emergency);
+    }
+    assert_eq!(
+        rig.controller().map(|(id, _)| id),
+        Some(FIRST),
+        "control stays"
+    );
+    rig.hear(FIRST, &CLEAR);
+    assert_eq!(rig.state(), State::Standby);
+}
+
 #[test]
 fn an_emergency_ends_when_the_last_of_several_is_cleared() {
     let mut rig = Rig::ready();

@@ -24,6 +24,7 @@
 //!   and for clients that may give them; others are refused before anything is carried out.
 
 mod commands;
+mod rejecting;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -40,11 +41,12 @@ use crate::messages::core::query_events::QueryEventsVar;
 use crate::messages::core::reject_event_request::ResponseCode;
 use crate::messages::core::{
     self, CancelEvent, ConfirmEventRequest, CreateCommandEvent, CreateEvent, Event,
-    QueryEventTimeout, QueryEvents, RejectEventRequest, ReportEventTimeout, ReportEvents,
-    UpdateEvent, report_event_timeout, report_events,
+    QueryEventTimeout, QueryEvents, ReportEventTimeout, ReportEvents, UpdateEvent,
+    report_event_timeout, report_events,
 };
 use commands::Commands;
 pub(super) use commands::{CommandTrial, Refusal};
+use rejecting::{INVALID_EVENT, reject, rejection};
 pub(super) use table::Due;
 use table::{Kind, Name, Subscription, Table};
 
@@ -392,8 +394,6 @@ impl Events {
 }
 
 /// What is answered to a number that the client has no event by.
-const INVALID_EVENT: ResponseCode = ResponseCode::ERROR_INVALID_EVENT_ID_FOR_UPDATE_EVENT_REQUEST;
-
 fn create(message: &Received, create: &CreateEvent, out: &mut Outbox) -> Outcome {
     let trial = Trial {
         request: message.clone(),
@@ -482,20 +482,6 @@ fn set_rate(confirm: &mut ConfirmEventRequest, subscription: &Subscription) {
     {
         // Settings beyond what the field can say.
         tracing::debug!(%error, "rate cannot be confirmed");
-    }
-}
-
-fn reject(request: &Received, request_id: u8, why: ResponseCode, out: &mut Outbox) {
-    tracing::debug!(client = %request.source, request_id, ?why, "event refused");
-    out.reply(request, &rejection(request_id, why));
-}
-
-/// The code alone: the text for people would be 80 octets that no known peer shows.
-fn rejection(request_id: u8, why: ResponseCode) -> RejectEventRequest {
-    RejectEventRequest {
-        request_id,
-        response_code: Some(why),
-        error_message: None,
     }
 }
 

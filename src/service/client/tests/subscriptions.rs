@@ -10,7 +10,7 @@ use crate::messages::core::create_event::EventType;
 use crate::messages::core::{
     CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryControl, QueryEventTimeout,
     QueryStatus, RejectEventRequest, ReportControl, ReportEventTimeout, ReportIdentification,
-    ReportStatus,
+    ReportStatus, UpdateEvent,
 };
 use crate::service::{
     CannotSubscribe, Event as StackEvent, Outage, Patience, Scope, SubscriptionEnd, SubscriptionId,
@@ -396,6 +396,56 @@ fn events_with_the_same_number_are_told_apart_by_their_reports() {
         })
         .collect();
     assert_eq!(owners, [second, first]);
+}
+
+/// JAUS++ crashes on it.
+#[test]
+fn no_update_event_is_sent_in_the_whole_life_of_a_subscription() {
+    let mut bench = Bench::new();
+    let mut sent = Vec::new();
+    for hz in [1.0, 5.0] {
+        let id = subscribe(&mut bench, &status(When::hz(hz)));
+        sent.append(&mut bench.sent);
+        let [create] = CreateEvent::decode(&sent[sent.len() - 1].1)
+            .map(|it| [it])
+            .unwrap();
+        confirm(&mut bench, create.request_id, 0, hz);
+        fire(&mut bench, 0, 0);
+        // It stops, is asked for again, and comes back.
+        bench.run_ms(20_000);
+        confirm(&mut bench, create.request_id, 0, hz);
+        bench.stack.unsubscribe(bench.now, id);
+        bench.run_ms(3000);
+        sent.append(&mut bench.sent);
+    }
+    let of = |code: u16| {
+        let is_it = |(_, octets): &&(_, Bytes)| octets.starts_with(&code.to_le_bytes());
+        sent.iter().filter(is_it).count()
+    };
+    assert!(of(CreateEvent::CODE) > 4 && of(CancelEvent::CODE) >= 2);
+    assert_eq!(of(UpdateEvent::CODE), 0);
+}
+
+/// As JAUS++ sends the first report of Global Pose: numbers 0 to 3 within a moment.
+#[test]
+fn a_first_report_that_comes_four_times_loses_nothing_and_cancels_nothing() {
+    let mut bench = Bench::new();
+    subscribe(&mut bench, &status(When::hz(5.0)));
+    confirm_all(&mut bench, 0, 5.0);
+    bench.sent.clear();
+    for sequence in 0..4 {
+        fire(&mut bench, 0, sequence);
+    }
+    bench.run_ms(200);
+    fire(&mut bench, 0, 4);
+    let all = told(&mut bench);
+    assert_eq!(all.len(), 1 + 5, "{all:?}");
+    assert!(
+        all[1..]
+            .iter()
+            .all(|news| *news == Told::Report { lost: 0 })
+    );
+    assert_eq!(bench.sent::<CancelEvent>(), []);
 }
 
 #[test]

@@ -10,6 +10,31 @@ use crate::messages::core::reject_event_request::ResponseCode;
 use crate::messages::core::*;
 use crate::service::EventSettings;
 
+/// JAUS++ reads presence vector, request, code and, with the vector's first bit, 80 octets of text.
+#[test]
+fn a_rejection_is_one_that_jauspp_reads_too() {
+    let mut rig = Rig::new();
+    let said = rig.hear(
+        CLIENT,
+        &CancelEvent {
+            request_id: 9,
+            event_id: 77,
+        },
+    );
+    let [(to, octets)] = &said[..] else {
+        panic!("one answer: {said:?}")
+    };
+    assert_eq!(*to, CLIENT);
+    let [0xF4, 0x01, presence, request, code, ref text @ ..] = octets[..] else {
+        panic!("{octets:?}")
+    };
+    assert_eq!((presence & 1, request, code), (1, 9, 6));
+    assert_eq!(text.len(), 80);
+    assert!(text.starts_with(b"no event of yours"));
+    let strict: RejectEventRequest = answer(&said);
+    assert_eq!(strict.response_code, Some(ResponseCode(6)));
+}
+
 #[test]
 fn what_nobody_could_answer_is_refused() {
     let rate = |create: CreateEvent, hertz| {
