@@ -24,6 +24,7 @@ mod party;
 mod process;
 mod report;
 mod scenario;
+mod scripted;
 mod settings;
 mod verdict;
 
@@ -37,7 +38,7 @@ use settings::Party;
 use verdict::{Column, Verdict};
 
 /// Whom the subject meets if nobody says.
-const PEERS: &str = "ours";
+const PEERS: &str = "ours,scripted-jauspp,scripted-junior,scripted-judge";
 /// The one test of this binary.
 const TEST: &str = "interop";
 

@@ -147,6 +147,7 @@ impl<'a> Place<'a> {
             ("{actor:x}", hexadecimal(self.party.actor)),
             ("{other}", other.to_string()),
             ("{other:x}", hexadecimal(other)),
+            ("{needs}", self.other.needs.clone()),
             ("{address}", self.host.address().to_owned()),
             ("{other-address}", other_host.address().to_owned()),
             ("{interface}", INTERFACE.to_owned()),

@@ -32,6 +32,8 @@ fn markdown(directory: &Path, versions: &[Version], columns: &[Column]) -> Strin
         line(&mut text, &format!("- {name}: {version}"));
     }
     line(&mut text, "\nWho asks → who answers.\n");
+    let (columns, empty): (Vec<_>, Vec<_>) =
+        columns.iter().partition(|column| is_applicable(column));
     let heads = columns.iter().map(|column| format!(" {} |", title(column)));
     line(
         &mut text,
@@ -39,9 +41,9 @@ fn markdown(directory: &Path, versions: &[Version], columns: &[Column]) -> Strin
     );
     line(&mut text, &format!("|---|{}", "---|".repeat(columns.len())));
     let mut notes = Notes::default();
-    for scenario in scenarios(columns) {
+    for scenario in scenarios(&columns) {
         let mut row = format!("| {} |", scenario.title());
-        for column in columns {
+        for column in &columns {
             let cell = column.cells.iter().find(|cell| cell.scenario == scenario);
             row += &cell.map_or_else(
                 || "  |".to_owned(),
@@ -49,6 +51,16 @@ fn markdown(directory: &Path, versions: &[Version], columns: &[Column]) -> Strin
             );
         }
         line(&mut text, &row);
+    }
+    for column in empty {
+        let why = column
+            .cells
+            .first()
+            .map_or_else(String::new, |cell| notes.of(directory, cell));
+        line(
+            &mut text,
+            &format!("\n{}: {why} for every scenario", title(column)),
+        );
     }
     if !notes.0.is_empty() {
         line(&mut text, "");
@@ -59,8 +71,14 @@ fn markdown(directory: &Path, versions: &[Version], columns: &[Column]) -> Strin
     text
 }
 
+/// Whether there is anything in a column.
+fn is_applicable(column: &Column) -> bool {
+    let mut cells = column.cells.iter();
+    cells.any(|cell| !matches!(cell.verdict, Verdict::NotApplicable(_)))
+}
+
 /// The scenarios that any column has, in order.
-fn scenarios(columns: &[Column]) -> impl Iterator<Item = Scenario> {
+fn scenarios(columns: &[&Column]) -> impl Iterator<Item = Scenario> {
     let has = |scenario: &Scenario| {
         let mut cells = columns.iter().flat_map(|column| &column.cells);
         cells.any(|cell| cell.scenario == *scenario)

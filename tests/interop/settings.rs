@@ -26,6 +26,9 @@ pub(crate) struct Party {
     /// Who speaks to others.
     #[serde(deserialize_with = "id")]
     pub(crate) actor: JausId,
+    /// What others have to be told about it, in their words; `{needs}` in their commands.
+    #[serde(default)]
+    pub(crate) needs: String,
     /// A command that prints the version.
     #[serde(default)]
     pub(crate) version: Vec<String>,

@@ -8,7 +8,7 @@ use jaus::messages::mobility::{ReportVelocityState, SetWrenchEffort};
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::asking::FORWARD;
-use super::{Outcome, Told};
+use super::{Outcome, Told, operator};
 
 /// Less and more authority.
 const AUTHORITIES: [u8; 2] = [100, 200];
@@ -28,12 +28,7 @@ fn in_words(error: impl std::fmt::Display) -> String {
 /// Takes control, loses it to somebody of more authority, who then gives it back.
 pub(super) async fn control(told: &Told) -> Outcome {
     let (node, weak) = told.component()?;
-    let strong = Component::builder(
-        jaus::component::Kind::OperatorControlUnit,
-        "Interoperability",
-    )
-    .attach(&node, told.id.component() + 1)
-    .map_err(in_words)?;
+    let strong = operator(&node, told.colleague())?;
     let mut held = weak
         .control(told.other, AUTHORITIES[0])
         .await

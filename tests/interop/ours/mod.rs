@@ -12,6 +12,8 @@ use jaus::address::JausId;
 use jaus::component::{Component, Kind};
 use jaus::node::{Config, Node};
 
+use crate::scripted;
+
 /// Says what went wrong, in a line.
 pub(crate) type Outcome = Result<(), String>;
 
@@ -19,27 +21,29 @@ pub(crate) type Outcome = Result<(), String>;
 #[derive(Debug, Clone)]
 pub(crate) struct Told {
     /// Who we are.
-    id: JausId,
+    pub(crate) id: JausId,
     /// Whom to speak to.
-    other: JausId,
-    /// Where that is.
-    address: String,
+    pub(crate) other: JausId,
+    /// An address: of the other for ours, of its own for a scripted peer.
+    pub(crate) address: String,
     /// The octets of a message.
-    size: usize,
+    pub(crate) size: usize,
     /// How long it may take.
-    within: Duration,
+    pub(crate) within: Duration,
     /// How messages go: `udp`, `unacknowledged` or `tcp`.
-    by: String,
+    pub(crate) by: String,
+    /// What the other needs: `repeated-code` in each fragment, or nothing.
+    needs: String,
 }
 
-/// Plays the role that the arguments name.
+/// Plays the role that the arguments name: one of ours, or `PEER PART` of a scripted peer.
 pub(crate) fn play(arguments: &[String]) -> ExitCode {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build();
-    let outcome = runtime
-        .map_err(|error| error.to_string())
-        .and_then(|runtime| runtime.block_on(play_within(arguments)));
+    let outcome = match arguments {
+        [scripted, peer, part, rest @ ..] if scripted == "scripted" => {
+            Told::read(rest).and_then(|told| scripted::play(peer, part, &told))
+        }
+        _ => play_ours(arguments),
+    };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -47,6 +51,14 @@ pub(crate) fn play(arguments: &[String]) -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn play_ours(arguments: &[String]) -> Outcome {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    let runtime = runtime.map_err(|error| error.to_string())?;
+    runtime.block_on(play_within(arguments))
 }
 
 async fn play_within(arguments: &[String]) -> Outcome {
@@ -86,6 +98,7 @@ impl Told {
             size: 16,
             within: Duration::from_secs(30),
             by: "udp".to_owned(),
+            needs: String::new(),
         };
         for argument in arguments {
             let wrong = || format!("`{argument}` cannot be");
@@ -99,15 +112,26 @@ impl Told {
                     told.within = Duration::from_secs(value.parse().map_err(|_| wrong())?);
                 }
                 "by" => value.clone_into(&mut told.by),
+                "needs" => value.clone_into(&mut told.needs),
                 _ => return Err(wrong()),
             }
         }
         Ok(told)
     }
 
-    /// A node as it is by default.
+    /// Somebody on the same node.
+    pub(crate) fn colleague(&self) -> JausId {
+        let (subsystem, node) = (self.id.subsystem(), self.id.node());
+        JausId::new(subsystem, node, self.id.component() + 1)
+    }
+
+    /// A node as it is by default, but for what the other needs.
     fn config(&self) -> Config {
-        Config::new(self.id.subsystem(), self.id.node()).or_any_free_port()
+        let mut config = Config::new(self.id.subsystem(), self.id.node()).or_any_free_port();
+        if self.needs == "repeated-code" {
+            config.delivery.repeat_code_to.push(self.other);
+        }
+        config
     }
 
     /// A component that offers nothing of its own.
@@ -123,4 +147,11 @@ impl Told {
             .map_err(|error| error.to_string())?;
         Ok((node, component))
     }
+}
+
+/// A component that offers nothing of its own.
+fn operator(node: &Node, id: JausId) -> Result<Component, String> {
+    Component::builder(Kind::OperatorControlUnit, "Interoperability")
+        .attach(node, id.component())
+        .map_err(|error| error.to_string())
 }

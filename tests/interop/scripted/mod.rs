@@ -1,0 +1,53 @@
+//! Peers that are played: each speaks with the habits that captures show of a known one, over
+//! framing and message bodies of its own, and does only what its part needs.
+
+mod asking;
+mod body;
+mod echoing;
+mod events;
+mod frame;
+mod habits;
+mod speaker;
+mod vehicle;
+
+use std::net::Ipv4Addr;
+use std::time::Instant;
+
+use crate::ours::{Outcome, Told};
+use asking::Asker;
+use habits::Habits;
+use speaker::Speaker;
+
+/// Plays a part of a peer: `jauspp drive`.
+pub(crate) fn play(peer: &str, part: &str, told: &Told) -> Outcome {
+    let habits = Habits::of(peer).ok_or_else(|| format!("no peer {peer}"))?;
+    let address: Ipv4Addr = told
+        .address
+        .parse()
+        .map_err(|_| "what is our address?".to_owned())?;
+    let open = |id| Speaker::open(id, habits, address).map_err(|error| error.to_string());
+    let speaker = open(told.id)?;
+    match part {
+        "vehicle" => return vehicle::run(speaker),
+        "echo" => return echoing::echo(speaker),
+        _ => {}
+    }
+    let asker = |speaker| Asker {
+        speaker,
+        other: told.other,
+        deadline: Instant::now() + told.within,
+    };
+    let mut asks = asker(speaker);
+    match part {
+        "discover" => asks.discover(),
+        "query" => asks.query().map(|velocity| println!("{velocity:.3} m/s")),
+        "subscribe-periodic" => asks.periodic(),
+        "subscribe-on-change" => asks.on_change(),
+        "control" => asks.control(&mut asker(open(told.colleague())?)),
+        "drive" => asks.drive(),
+        "large" => asks.send(told.size, told.by != "unacknowledged"),
+        "keep" => asks.keep(),
+        "keep-echo" => asks.keep_echo(),
+        other => Err(format!("{peer} has no part {other}")),
+    }
+}
