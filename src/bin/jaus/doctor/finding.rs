@@ -82,12 +82,12 @@ impl Finding {
             true => format!("{}{name:8}\x1b[0m", self.mark.colour()),
             false => format!("{name:8}"),
         };
-        let mut text = format!("{mark} {:12}{}", self.check, wrapped(&self.what));
+        let mut text = format!("{mark} {:12}{}", self.check, wrapped(&self.what, INDENT));
         if let Some(advice) = &self.advice {
             text.push_str(&format!(
                 "\n{:INDENT$}{}",
                 "",
-                wrapped(&format!("→ {advice}"))
+                wrapped(&format!("→ {advice}"), INDENT)
             ));
         }
         text
@@ -103,23 +103,24 @@ impl Finding {
     }
 }
 
-/// Breaks words into lines that begin behind the columns of mark and check.
-fn wrapped(text: &str) -> String {
+/// Breaks words into lines that begin behind so many columns.
+pub(super) fn wrapped(text: &str, indent: usize) -> String {
     let mut lines = String::new();
-    let mut column = INDENT;
-    for word in text.split_whitespace() {
+    let mut column = indent;
+    // What belongs together has a non-breaking space.
+    for word in text.split_ascii_whitespace() {
         let length = word.chars().count();
-        if column > INDENT && column + 1 + length > WIDTH {
-            lines.push_str(&format!("\n{:INDENT$}", ""));
-            column = INDENT;
-        } else if column > INDENT {
+        if column > indent && column + 1 + length > WIDTH {
+            lines.push_str(&format!("\n{:indent$}", ""));
+            column = indent;
+        } else if column > indent {
             lines.push(' ');
             column += 1;
         }
         lines.push_str(word);
         column += length;
     }
-    lines
+    lines.replace('\u{a0}', " ")
 }
 
 #[cfg(test)]

@@ -1,9 +1,11 @@
 //! `jaus doctor`: looks at everything that keeps nodes from finding each other, and says what to
-//! do. One file per check; a check gives [`Finding`]s.
+//! do. One file per check; a check gives [`Finding`]s. With `--peer` it examines one peer instead:
+//! see [`peer`].
 
 mod finding;
 mod host;
 mod neighbours;
+mod peer;
 mod port;
 
 use std::time::Duration;
@@ -12,6 +14,7 @@ use clap::Args;
 use serde_json::json;
 
 use self::finding::{Finding, Mark};
+use self::peer::{Target, Wish};
 use jaus::cli::failure::{Failure, Outcome};
 use jaus::cli::network::Network;
 use jaus::cli::output::{Output, colours_wanted, say};
@@ -23,17 +26,34 @@ use jaus::cli::runtime;
 /// moment: does multicast come back, who is there, do two of them have one id? It needs no
 /// rights. Give it the flags or the settings file of the node that does not work. Exit status: 0
 /// all is well, 1 there are warnings, 2 there are problems.
+///
+/// With --peer it examines one peer: recognises it, and tries the exchanges with it one by one, in
+/// the order in which integrations fail. Nothing is commanded. Exit status: 0 all went well, 1 some
+/// exchange failed, 2 nothing can be exchanged.
 #[derive(Args)]
+#[command(mut_arg("peer", |peer| peer.long("unicast")))]
 #[command(after_help = "Examples:\n  \
     jaus doctor\n  \
     jaus doctor --config node.toml        with the settings of a node\n  \
     jaus doctor --id 101.1.1              and whether somebody has that id already\n  \
     jaus doctor --interface eth0 --seconds 10\n  \
+    jaus doctor --peer 192.168.7.2        what works with whoever is there\n  \
+    jaus doctor --peer 77.1.1             the same, found by its id\n  \
     jaus doctor --json | jq '.findings[] | select(.mark != \"ok\")'")]
 pub(crate) struct Doctor {
-    /// How long to listen to the network
-    #[arg(long, default_value = "3", value_parser = runtime::seconds)]
-    seconds: Duration,
+    /// Examine this peer: an id (77.1.1), an address (192.168.7.2 or 192.168.7.2:3795), or both
+    /// (77.1.1@192.168.7.2)
+    // The network's flag for peers has this one's usual id.
+    #[arg(id = "examined", long = "peer", value_name = "ADDRESS")]
+    examined: Option<Target>,
+
+    /// Take control of the peer and release it again, if nobody has it
+    #[arg(long, requires = "examined")]
+    control: bool,
+
+    /// How long to listen to the network [default: 3; with --peer 6 at most]
+    #[arg(long, value_parser = runtime::seconds)]
+    seconds: Option<Duration>,
 
     /// Print the findings as one JSON object
     #[arg(long)]
@@ -43,8 +63,22 @@ pub(crate) struct Doctor {
     network: Network,
 }
 
+/// How long to listen if nobody says.
+const LISTEN: Duration = Duration::from_secs(3);
+
 impl Doctor {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        if let Some(target) = self.examined {
+            let (id, config) = self.network.for_examination()?;
+            let wish = Wish {
+                target,
+                listen: self.seconds,
+                control: self.control,
+                json: self.json,
+                colours: colours_wanted(&std::io::stdout()),
+            };
+            return runtime::run(peer::examine(wish, id, config));
+        }
         let mut report = Report {
             output: Output::new(),
             colours: colours_wanted(&std::io::stdout()),
@@ -73,12 +107,13 @@ impl Doctor {
             report.add_all(port::check(&config, interface))?;
         }
         report.add_all(port::check_tcp(&config))?;
+        let listen = self.seconds.unwrap_or(LISTEN);
         if !self.json {
-            let seconds = self.seconds.as_secs_f64();
+            let seconds = listen.as_secs_f64();
             say(format_args!("listening to the network for {seconds} s …"));
         }
         let clock = host::ClockWatch::start();
-        report.add_all(neighbours::look(config, id, self.seconds).await)?;
+        report.add_all(neighbours::look(config, id, listen).await)?;
         report.add(clock.finish())
     }
 }

@@ -86,7 +86,7 @@ fn who(peers: &[Peer], directory: &Directory) -> Vec<Finding> {
         return vec![Finding::ok(CHECK, "nobody else was heard").advice(
             "if somebody should be: is it on the same network and group, does its firewall let \
              UDP 3794 in, does the switch or access point pass multicast (IGMP snooping without \
-             a querier does not)? --peer reaches it without",
+             a querier does not)? `jaus doctor --peer ADDRESS` looks at one host",
         )];
     }
     let one = |peer: &Peer| {

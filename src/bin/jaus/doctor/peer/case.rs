@@ -1,0 +1,306 @@
+//! What is known of a peer while it is examined, and the questions that are put to it.
+
+use std::collections::VecDeque;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version};
+
+use super::exchange::{Exchange, Mark, Trial, Verdict};
+use super::large::Transfer;
+use super::seen::{Heard, Seen};
+use super::target::Target;
+
+/// Who asks whom, and how.
+#[derive(Clone, Debug)]
+pub(super) struct Settings {
+    pub(super) target: Target,
+    /// The id that asks.
+    pub(super) own: JausId,
+    /// The id that our node is to have, if one is chosen.
+    pub(super) wanted: Option<JausId>,
+    /// The port that we ask from.
+    pub(super) port: u16,
+    /// Why there is no multicast group to speak to and to hear, if there is none.
+    pub(super) no_group: Option<String>,
+    /// How long to wait for a first sign.
+    pub(super) listen: Duration,
+    /// Whether control may be taken.
+    pub(super) control: bool,
+    /// The most octets of payload in one packet.
+    pub(super) payload_limit: usize,
+}
+
+/// Something to do on the network.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Send {
+    /// A message to one address, on the interface that leads there.
+    To(SocketAddr, Frame),
+    /// A message to the multicast group, on the peer's interface or on all.
+    Group(Frame),
+    /// A message from a passing socket, which hears whether the port refuses.
+    Probe(SocketAddr, Frame),
+    /// A TCP connection, which is closed as soon as it is open.
+    Connect(SocketAddr),
+}
+
+/// What is asked, and for how long.
+#[derive(Clone, Debug)]
+pub(super) struct Question {
+    pub(super) sends: Vec<Send>,
+    /// When they are sent again while no answer comes.
+    pub(super) again: Option<Duration>,
+    /// How long to wait for an answer.
+    pub(super) patience: Duration,
+}
+
+impl Question {
+    /// Asked three times within a second.
+    pub(super) fn new(send: Send) -> Self {
+        Self {
+            sends: vec![send],
+            again: Some(Duration::from_millis(350)),
+            patience: Duration::from_secs(1),
+        }
+    }
+
+    /// Nothing is asked; what comes is looked at.
+    pub(super) const fn silence(patience: Duration) -> Self {
+        Self {
+            sends: Vec::new(),
+            again: None,
+            patience,
+        }
+    }
+
+    /// Asked once: what is done twice would be something else.
+    pub(super) const fn once(mut self) -> Self {
+        self.again = None;
+        self
+    }
+
+    pub(super) const fn patience(mut self, patience: Duration) -> Self {
+        self.patience = patience;
+        self
+    }
+}
+
+/// A service that the component lists.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Offer {
+    pub(super) urn: String,
+    pub(super) major: u8,
+    pub(super) minor: u8,
+}
+
+/// An event at the peer that is not cancelled yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct OpenEvent {
+    pub(super) id: u8,
+}
+
+/// The peer, as far as it is known.
+#[derive(Debug)]
+pub(super) struct Case {
+    pub(super) settings: Settings,
+    /// Where it is.
+    pub(super) address: Option<SocketAddr>,
+    /// The component that is asked.
+    pub(super) id: Option<JausId>,
+    /// The interface that leads there.
+    pub(super) link: Option<usize>,
+    pub(super) seen: Seen,
+    pub(super) trials: Vec<Trial>,
+    /// The services that the component lists, once it has.
+    pub(super) services: Option<Vec<Offer>>,
+    /// What the component is called.
+    pub(super) name: Option<String>,
+    /// What has to be undone before we go.
+    pub(super) open_events: Vec<OpenEvent>,
+    pub(super) in_control: bool,
+    /// A large message on its way to the peer.
+    pub(super) transfer: Option<Transfer>,
+    /// Whether somebody there sends back what nobody acts on.
+    pub(super) echoes: bool,
+    pub(super) unsent: VecDeque<Send>,
+    sequence: u16,
+}
+
+impl Case {
+    pub(super) fn new(settings: Settings) -> Self {
+        Self {
+            address: settings.target.address(),
+            id: settings.target.id,
+            settings,
+            link: None,
+            seen: Seen::default(),
+            trials: Vec::new(),
+            services: None,
+            name: None,
+            open_events: Vec::new(),
+            in_control: false,
+            transfer: None,
+            echoes: false,
+            unsent: VecDeque::new(),
+            sequence: 0,
+        }
+    }
+
+    /// The id under which the port is probed: a neighbour of ours, so that nobody learns a wrong
+    /// address of ours.
+    pub(super) fn probe_id(&self) -> JausId {
+        let own = self.settings.own;
+        let next = own.component() % (JausId::ANY_COMPONENT - 1) + 1;
+        JausId::new(own.subsystem(), own.node(), next)
+    }
+
+    pub(super) fn next_sequence(&mut self) -> u16 {
+        self.sequence = self.sequence.wrapping_add(1);
+        self.sequence
+    }
+
+    /// A message to somebody.
+    pub(super) fn frame(&mut self, destination: JausId, payload: Bytes) -> Frame {
+        let sequence = self.next_sequence();
+        Frame {
+            flags: Flags::new(Priority::Standard),
+            sequence,
+            ..Frame::new(self.settings.own, destination, payload)
+        }
+    }
+
+    /// A message to the peer's component alone.
+    pub(super) fn ask_peer(&mut self, message: &impl Message) -> Option<Send> {
+        let (id, address) = (self.id?, self.address?);
+        Some(Send::To(address, self.frame(id, octets(message))))
+    }
+
+    /// A message to everybody, by multicast.
+    pub(super) fn ask_everybody(&mut self, message: &impl Message) -> Send {
+        Send::Group(self.global(JausId::EVERYONE, message))
+    }
+
+    /// A message to everybody who reads it, sent to one address.
+    pub(super) fn ask_all_at(&mut self, address: SocketAddr, message: &impl Message) -> Send {
+        Send::To(address, self.global(JausId::EVERYONE, message))
+    }
+
+    pub(super) fn global(&mut self, destination: JausId, message: &impl Message) -> Frame {
+        let mut frame = self.frame(destination, octets(message));
+        frame.flags = frame.flags.with_broadcast(Broadcast::Global);
+        frame
+    }
+
+    /// The same questions once more, with numbers of their own: one that was heard before is taken
+    /// for a duplicate.
+    pub(super) fn anew(&mut self, sends: &[Send]) -> Vec<Send> {
+        let mut sends = sends.to_vec();
+        for send in &mut sends {
+            if let Send::To(_, frame) | Send::Group(frame) | Send::Probe(_, frame) = send {
+                frame.sequence = self.next_sequence();
+            }
+        }
+        sends
+    }
+
+    /// The acknowledgement that somebody wants.
+    pub(super) fn acknowledge(&mut self, heard: &Heard) -> Option<Send> {
+        let wanted = heard.frame.flags.acknowledgement() == Acknowledgement::Request;
+        let for_us = heard.frame.destination == self.settings.own;
+        if !wanted || !for_us || heard.frame.version != Version::As5669a {
+            return None;
+        }
+        let flags = Flags::new(heard.frame.flags.priority());
+        let frame = Frame {
+            flags: flags.with_acknowledgement(Acknowledgement::Positive),
+            sequence: heard.frame.sequence,
+            ..Frame::new(self.settings.own, heard.frame.source, Bytes::new())
+        };
+        Some(Send::To(heard.from, frame))
+    }
+
+    /// What the peer's component has said to us behind a mark.
+    pub(super) fn told(&self, mark: usize) -> impl DoubleEndedIterator<Item = &Heard> {
+        let (own, id) = (self.settings.own, self.id);
+        self.seen.since(mark).iter().filter(move |heard| {
+            heard.frame.destination == own
+                && Some(heard.frame.source) == id
+                && heard.frame.version == Version::As5669a
+        })
+    }
+
+    /// The first report of a kind that the peer's component has sent us behind a mark.
+    pub(super) fn report<M: Message>(&self, mark: usize) -> Option<M> {
+        let mut all = self.reports(mark);
+        all.next()
+    }
+
+    /// All of them, as far as they can be read.
+    pub(super) fn reports<M: Message>(&self, mark: usize) -> impl Iterator<Item = M> {
+        let of_kind = self
+            .told(mark)
+            .filter(|heard| heard.code() == Some(M::CODE));
+        of_kind.filter_map(|heard| M::decode(&heard.frame.payload).ok())
+    }
+
+    /// Whether something of the kind came that cannot be read.
+    pub(super) fn unreadable<M: Message>(&self, mark: usize) -> Option<String> {
+        let mut of_kind = self
+            .told(mark)
+            .filter(|heard| heard.code() == Some(M::CODE));
+        of_kind
+            .find_map(|heard| M::decode(&heard.frame.payload).err())
+            .map(|error| error.to_string())
+    }
+
+    /// What became of an exchange that was tried before.
+    pub(super) fn mark_of(&self, exchange: Exchange) -> Option<Mark> {
+        let mut trials = self.trials.iter();
+        let trial = trials.find(|trial| trial.exchange == exchange)?;
+        Some(trial.verdict.mark)
+    }
+
+    pub(super) fn went_well(&self, exchange: Exchange) -> bool {
+        self.mark_of(exchange) == Some(Mark::Ok)
+    }
+
+    /// Why nothing can be asked: something without which nothing works has failed.
+    pub(super) fn cut_off(&self) -> Option<Verdict> {
+        let mut basic = self
+            .trials
+            .iter()
+            .filter(|t| t.exchange.is_basic() && t.failed());
+        let failed = basic.next()?.exchange.name();
+        Some(Verdict::cut_off(format!("not without \"{failed}\"")))
+    }
+
+    /// Why nobody can be asked: that, or the id is not known.
+    pub(super) fn nobody(&self) -> Option<Verdict> {
+        if let Some(skip) = self.cut_off() {
+            return Some(skip);
+        }
+        let known = self.id.is_some() && self.address.is_some();
+        (!known).then(|| {
+            Verdict::skipped("no id is known there")
+                .advice("name it with its address: --peer 77.1.1@10.0.0.2")
+        })
+    }
+
+    /// Why a service need not be asked: the component lists its services, and not this one.
+    pub(super) fn lacks(&self, service: &str) -> Option<Verdict> {
+        let listed = self.services.as_ref()?;
+        let has = listed
+            .iter()
+            .any(|offer| offer.urn.ends_with(&format!(":{service}")));
+        (!has).then(|| Verdict::skipped(format!("it lists no service {service}")))
+    }
+}
+
+/// A message's octets.
+pub(super) fn octets(message: &impl Message) -> Bytes {
+    // Nothing that is asked here is longer than its definition allows.
+    message.encode().unwrap_or_default()
+}

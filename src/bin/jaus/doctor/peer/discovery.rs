@@ -1,0 +1,375 @@
+//! The trials of Discovery: who it is, whether multicast passes, and what it lists.
+
+use std::time::Duration;
+
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::messages::core::{
+    QueryConfiguration, QueryServices, ReportConfiguration, ReportIdentification, ReportServices,
+    query_configuration, query_services, report_identification::Type,
+};
+use jaus::wire::{Acknowledgement, Broadcast};
+
+use super::case::{Case, Offer, Question, Send};
+use super::examiner::{Begin, Judgement};
+use super::exchange::{Exchange, Mark, Verdict};
+use super::reach::query_identification;
+use super::seen::{Door, Heard};
+use super::standing::PADDING;
+
+pub(super) fn identification(case: &mut Case) -> Begin {
+    if let Some(skip) = case.nobody() {
+        return Begin::Over(skip);
+    }
+    match case.ask_peer(&query_identification()) {
+        Some(send) => Begin::Ask(Question::new(send)),
+        None => Begin::Over(Verdict::skipped("no id is known there")),
+    }
+}
+
+pub(super) fn identified(case: &mut Case, mark: usize) -> Judgement {
+    let Some(report) = case.report::<ReportIdentification>(mark) else {
+        return Judgement::Wait;
+    };
+    let name = report.identification.to_string_lossy();
+    let name = name.trim_end_matches('\0').to_owned();
+    let kind = match report.r#type {
+        Type::VEHICLE => "a vehicle".to_owned(),
+        Type::OCU => "an operator's station".to_owned(),
+        Type::OTHER_SUBSYSTEM => "another subsystem".to_owned(),
+        other => format!("of type {}", other.0),
+    };
+    let verdict = Verdict::ok(format!("\"{name}\", {kind}"));
+    case.name = Some(name);
+    Judgement::Over(verdict)
+}
+
+pub(super) fn not_identified(case: &Case, mark: usize) -> Verdict {
+    let id = shown(case);
+    if let Some(error) = case.unreadable::<ReportIdentification>(mark) {
+        return malformed("Report Identification", &error);
+    }
+    let own = case.settings.own;
+    let other = case.seen.since(mark).iter().find(|heard| {
+        heard.frame.destination == own && heard.code() == Some(ReportIdentification::CODE)
+    });
+    if let Some(heard) = other {
+        let other = heard.frame.source;
+        return Verdict::failed(
+            format!("{id} was asked, and {other} answers"),
+            "another component speaks for the node, or the id is mistaken",
+            format!("examine that: --peer {other}@{}", heard.from),
+        );
+    }
+    Verdict::failed(
+        format!("{id} does not answer Query Identification"),
+        "the component offers no Discovery service (a bare Junior client has no services), or the \
+         id is not the one that it has",
+        "ask its node's discovery component; look at the id in the peer's settings",
+    )
+}
+
+/// A report that is there and cannot be read.
+pub(super) fn malformed(report: &str, error: &str) -> Verdict {
+    Verdict::failed(
+        format!("its {report} cannot be read: {error}"),
+        "the peer writes the message otherwise than its definition says",
+        "`jaus record`, then `jaus decode` show its octets field by field",
+    )
+}
+
+pub(super) fn shown(case: &Case) -> String {
+    case.id.map_or_else(|| "it".to_owned(), |id| id.to_string())
+}
+
+pub(super) fn multicast(case: &mut Case) -> Begin {
+    if let Some(skip) = case.nobody() {
+        return Begin::Over(skip);
+    }
+    if let Some(why) = &case.settings.no_group {
+        return Begin::Over(Verdict::skipped(format!("no multicast here: {why}")));
+    }
+    let mut sends = vec![case.ask_everybody(&query_identification())];
+    if !case.went_well(Exchange::Identification) {
+        sends.extend(call_alone(case));
+    }
+    Begin::Ask(Question {
+        sends,
+        again: Some(Duration::from_millis(700)),
+        patience: Duration::from_secs(2),
+    })
+}
+
+/// What is for one alone and goes to everybody, as Junior calls whose address it does not know: it
+/// is acknowledged by who has no Discovery.
+fn call_alone(case: &mut Case) -> Option<Send> {
+    let id = case.id?;
+    let mut frame = case.frame(id, PADDING.to_le_bytes().to_vec().into());
+    let flags = frame.flags.with_broadcast(Broadcast::Global);
+    frame.flags = flags.with_acknowledgement(Acknowledgement::Request);
+    Some(Send::Group(frame))
+}
+
+pub(super) fn multicast_answered(case: &mut Case, mark: usize) -> Judgement {
+    // Any component of its node may answer for all.
+    let (own, id) = (case.settings.own, case.id);
+    let answers = |heard: &&Heard| {
+        let same = id.is_some_and(|id| id.subsystem() == heard.frame.source.subsystem());
+        same && heard.frame.destination == own && heard.code() == Some(ReportIdentification::CODE)
+    };
+    if case.seen.since(mark).iter().any(|heard| answers(&heard)) {
+        return Judgement::Over(Verdict::ok("a question to everybody is answered"));
+    }
+    let mut told = case.told(mark);
+    if told.any(|heard| heard.frame.flags.acknowledgement().is_answer()) {
+        return Judgement::Over(Verdict::ok("a message to everybody is acknowledged"));
+    }
+    Judgement::Wait
+}
+
+pub(super) fn multicast_unanswered(case: &Case) -> Verdict {
+    let id = shown(case);
+    if case.mark_of(Exchange::Identification) != Some(Mark::Ok) {
+        return Verdict::failed(
+            "a question to everybody is neither answered nor acknowledged",
+            "it has not joined the group, or the network passes no multicast; or it answers and \
+             acknowledges nothing at all",
+            "see \"identification\" and \"acknowledgement\"",
+        );
+    }
+    Verdict::failed(
+        format!("{id} answers when it is asked alone, and not when everybody is asked"),
+        "the peer has not joined the group, or on another interface; or the network passes no \
+         multicast (IGMP snooping without a querier, an access point, a container)",
+        "let the peer join 239.255.0.1 on the interface of this network; on ours peers = \
+         [\"ADDRESS\"] does without multicast",
+    )
+}
+
+/// Judged by all that was heard since the beginning; waits if that is not long ago.
+pub(super) fn multicast_back(case: &mut Case, now: Duration) -> Begin {
+    if let Some(skip) = case.nobody() {
+        return Begin::Over(skip);
+    }
+    if let Some(why) = &case.settings.no_group {
+        return Begin::Over(Verdict::skipped(format!("no multicast here: {why}")));
+    }
+    let left = case.settings.listen.saturating_sub(now);
+    match heard_by_multicast(case) {
+        Judgement::Over(verdict) => Begin::Over(verdict),
+        _ if left.is_zero() => Begin::Over(nothing_by_multicast(case)),
+        _ => Begin::Ask(Question::silence(left)),
+    }
+}
+
+pub(super) fn heard_by_multicast(case: &mut Case) -> Judgement {
+    let (address, id) = (case.address, case.id);
+    let by_group = |heard: &&Heard| {
+        let same = id.is_some_and(|id| id.subsystem() == heard.frame.source.subsystem());
+        let there = address.is_some_and(|address| address.ip() == heard.from.ip());
+        heard.door == Door::Group && same && there
+    };
+    match case.seen.all().iter().find(by_group) {
+        Some(heard) => Judgement::Over(Verdict::ok(format!(
+            "{} speaks to everybody, and is heard",
+            heard.frame.source
+        ))),
+        None => Judgement::Wait,
+    }
+}
+
+/// Not everybody speaks to everybody, so silence is no proof.
+pub(super) fn nothing_by_multicast(case: &Case) -> Verdict {
+    let seconds = case.settings.listen.as_secs_f64();
+    Verdict::skipped(format!("it said nothing to everybody within {seconds} s"))
+        .advice("if it should (JAUS++ calls every 5 s), listen longer: --seconds 15")
+}
+
+pub(super) fn configuration(case: &mut Case) -> Begin {
+    if let Some(skip) = case.nobody() {
+        return Begin::Over(skip);
+    }
+    let query = QueryConfiguration {
+        query_type: query_configuration::QueryType::SUBSYSTEM_IDENTIFICATION,
+    };
+    match case.ask_peer(&query) {
+        Some(send) => Begin::Ask(Question::new(send)),
+        None => Begin::Over(Verdict::skipped("no id is known there")),
+    }
+}
+
+pub(super) fn configured(case: &mut Case, mark: usize) -> Judgement {
+    let Some(report) = case.report::<ReportConfiguration>(mark) else {
+        return Judgement::Wait;
+    };
+    let components: usize = report
+        .node_list
+        .iter()
+        .map(|n| n.component_list.len())
+        .sum();
+    let lists_itself = case.id.is_some_and(|id| {
+        report.node_list.iter().any(|node| {
+            let mut all = node.component_list.iter();
+            node.node_rec.node_id == id.node() && all.any(|c| c.component_id == id.component())
+        })
+    });
+    let nodes = report.node_list.len();
+    let what = format!(
+        "{}, {}",
+        counted(nodes, "node"),
+        counted(components, "component")
+    );
+    if lists_itself {
+        return Judgement::Over(Verdict::ok(what));
+    }
+    Judgement::Over(Verdict::failed(
+        format!("{what}, and {} itself is not among them", shown(case)),
+        "its node manager does not know the component, or lists another node's",
+        "whoever finds components by their node's list does not find it: name its id outright",
+    ))
+}
+
+pub(super) fn counted(count: usize, what: &str) -> String {
+    match count {
+        1 => format!("1 {what}"),
+        _ => format!("{count} {what}s"),
+    }
+}
+
+pub(super) fn not_configured(case: &Case, mark: usize) -> Verdict {
+    if let Some(error) = case.unreadable::<ReportConfiguration>(mark) {
+        return malformed("Report Configuration", &error);
+    }
+    Verdict::failed(
+        format!("{} does not answer Query Configuration", shown(case)),
+        "the component does not speak for its subsystem",
+        "ask its node manager; our side lists components that it hears, too",
+    )
+}
+
+/// Asks for services, by one of the three ways that there are.
+pub(super) fn services(case: &mut Case, way: Exchange) -> Begin {
+    if let Some(skip) = case.nobody() {
+        return Begin::Over(skip);
+    }
+    let Some(id) = case.id else {
+        return Begin::Over(Verdict::skipped("no id is known there"));
+    };
+    let list = |node, component| vec![node_seq(node, vec![component])];
+    let node_list = match way {
+        Exchange::ServicesWildcard => list(JausId::ANY_NODE, JausId::ANY_COMPONENT),
+        Exchange::ServicesNamed => list(id.node(), id.component()),
+        _ => Vec::new(),
+    };
+    match case.ask_peer(&QueryServices { node_list }) {
+        Some(send) => Begin::Ask(Question::new(send)),
+        None => Begin::Over(Verdict::skipped("no id is known there")),
+    }
+}
+
+/// One node with some of its components, in a Query Services.
+pub(super) fn node_seq(node: u8, components: Vec<u8>) -> query_services::NodeSeq {
+    query_services::NodeSeq {
+        node_rec: query_services::NodeRec {
+            node_id: query_services::NodeId(node),
+        },
+        component_list: components
+            .into_iter()
+            .map(|component| query_services::ComponentRec {
+                component_id: query_services::ComponentId(component),
+            })
+            .collect(),
+    }
+}
+
+pub(super) fn serves(case: &mut Case, way: Exchange, mark: usize) -> Judgement {
+    let reports: Vec<ReportServices> = case.reports(mark).collect();
+    if reports.is_empty() {
+        return Judgement::Wait;
+    }
+    let listed = |report: &ReportServices| {
+        let components = report
+            .node_list
+            .iter()
+            .flat_map(|node| &node.component_list);
+        components.map(|c| c.service_list.len()).sum::<usize>()
+    };
+    let services: usize = reports.iter().map(listed).sum();
+    if services == 0 {
+        return Judgement::Over(empty(way));
+    }
+    note_services(case, &reports);
+    Judgement::Over(Verdict::ok(counted(services, "service")))
+}
+
+/// Keeps what the component itself offers.
+fn note_services(case: &mut Case, reports: &[ReportServices]) {
+    let Some(id) = case.id else {
+        return;
+    };
+    let nodes = reports.iter().flat_map(|report| &report.node_list);
+    let own_node = nodes.filter(|node| node.node_rec.node_id == id.node());
+    let components = own_node.flat_map(|node| &node.component_list);
+    let own = components.filter(|c| c.component_rec.component_id == id.component());
+    let offers: Vec<Offer> = own
+        .flat_map(|component| &component.service_list)
+        .map(|service| Offer {
+            urn: service
+                .uri
+                .to_string_lossy()
+                .trim_end_matches('\0')
+                .to_owned(),
+            major: service.major_version_number,
+            minor: service.minor_version_number,
+        })
+        .collect();
+    if !offers.is_empty() {
+        case.services = Some(offers);
+    }
+}
+
+fn empty(way: Exchange) -> Verdict {
+    match way {
+        Exchange::ServicesWildcard => Verdict::failed(
+            "Query Services with 255 for node and component gets an empty list",
+            "the peer takes 255 for a number instead of \"all\" (JAUS++ does)",
+            "ask with numbers, or with an empty list; our clients do",
+        ),
+        Exchange::ServicesNamed => Verdict::failed(
+            "Query Services with its own numbers gets an empty list",
+            "its node manager does not know the component's services, or not yet",
+            "ask again later; ask the component itself rather than its node manager",
+        ),
+        _ => Verdict::failed(
+            "Query Services with an empty list gets an empty list",
+            "the peer takes the list at its word instead of as \"all\"",
+            "ask with numbers; our clients do",
+        ),
+    }
+}
+
+pub(super) fn no_services(case: &Case, way: Exchange, mark: usize) -> Verdict {
+    if let Some(error) = case.unreadable::<ReportServices>(mark) {
+        return malformed("Report Services", &error);
+    }
+    let how = match way {
+        Exchange::ServicesWildcard => "for everything (255)",
+        Exchange::ServicesNamed => "by numbers",
+        _ => "with an empty list",
+    };
+    if case
+        .id
+        .is_some_and(|id| case.seen.large_from(id, mark).is_some())
+    {
+        return Verdict::failed(
+            format!("asked {how}, it answers in fragments that make no Report Services"),
+            "it cuts large messages in a way of its own",
+            "ask for fewer components at a time",
+        );
+    }
+    Verdict::failed(
+        format!("Query Services {how} is not answered"),
+        "the component offers no Discovery, or does not take this form of the question",
+        "ask in one of the other two forms; our clients try them",
+    )
+}

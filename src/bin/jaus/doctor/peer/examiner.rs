@@ -1,0 +1,307 @@
+//! The examination: one exchange after the other is asked, judged and noted. Fed with datagrams
+//! and time, it says what is to be sent; no sockets here, and no clock.
+
+use std::time::Duration;
+
+use super::case::{Case, Question, Send, Settings};
+use super::exchange::{Exchange, Trial, Verdict};
+use super::seen::{Arrival, Refusal, TcpAnswer};
+use super::{discovery, events, large, manners, ra, reach, standing};
+
+/// What an exchange begins with.
+pub(super) enum Begin {
+    Ask(Question),
+    /// It is judged by what is known already, or left out.
+    Over(Verdict),
+}
+
+/// What is made of what was heard.
+pub(super) enum Judgement {
+    Wait,
+    /// A next question of the same exchange.
+    Ask(Question),
+    Over(Verdict),
+}
+
+/// An exchange while it goes on.
+struct Running {
+    exchange: Exchange,
+    began: Duration,
+    /// How much had been heard when its question was asked.
+    mark: usize,
+    /// Which of its questions it is.
+    stage: u8,
+    question: Question,
+    next: Option<Duration>,
+    deadline: Duration,
+}
+
+/// One examination.
+pub(super) struct Examiner {
+    case: Case,
+    plan: std::array::IntoIter<Exchange, 32>,
+    running: Option<Running>,
+    /// Trials that were given out.
+    told: usize,
+    done: bool,
+}
+
+impl Examiner {
+    pub(super) fn new(settings: Settings) -> Self {
+        Self {
+            case: Case::new(settings),
+            plan: Exchange::ALL.into_iter(),
+            running: None,
+            told: 0,
+            done: false,
+        }
+    }
+
+    /// Asks the first question. `now` is the time since the examination began.
+    pub(super) fn start(&mut self, now: Duration) {
+        self.go_on(now);
+    }
+
+    pub(super) fn handle_arrival(&mut self, now: Duration, arrival: &Arrival) {
+        let count = self.case.seen.take(now, arrival);
+        let first = self.case.seen.len() - count;
+        for heard in self.case.seen.since(first).to_vec() {
+            let answer = self.case.acknowledge(&heard);
+            self.case.unsent.extend(answer);
+        }
+        self.judge(now);
+    }
+
+    /// The system says that the peer's port or host is not there.
+    pub(super) fn handle_refusal(&mut self, now: Duration, refusal: Refusal) {
+        self.case.seen.refused.get_or_insert(refusal);
+        self.judge(now);
+    }
+
+    pub(super) fn handle_tcp(&mut self, now: Duration, answer: TcpAnswer) {
+        self.case.seen.tcp = Some(answer);
+        self.judge(now);
+    }
+
+    pub(super) fn handle_timeout(&mut self, now: Duration) {
+        let Some(running) = &mut self.running else {
+            return;
+        };
+        if now >= running.deadline {
+            let (exchange, mark, stage) = (running.exchange, running.mark, running.stage);
+            let verdict = at_the_end(exchange, &mut self.case, mark, stage);
+            self.close(now, verdict);
+            self.go_on(now);
+        } else if running.next.is_some_and(|next| now >= next) {
+            running.next = running.question.again.map(|again| now + again);
+            let sends = match running.exchange {
+                Exchange::Large(_) => large::again(&mut self.case, now),
+                _ => self.case.anew(&running.question.sends),
+            };
+            self.case.unsent.extend(sends);
+        }
+    }
+
+    /// When [`handle_timeout`](Self::handle_timeout) is to be called.
+    pub(super) fn poll_timeout(&self) -> Option<Duration> {
+        let running = self.running.as_ref()?;
+        let next = running.next.unwrap_or(running.deadline);
+        Some(next.min(running.deadline))
+    }
+
+    pub(super) fn poll_send(&mut self) -> Option<Send> {
+        self.case.unsent.pop_front()
+    }
+
+    /// The next exchange that has come to its end, and the one before it.
+    pub(super) fn poll_trial(&mut self) -> Option<(&Trial, Option<&Trial>)> {
+        let trial = self.case.trials.get(self.told)?;
+        let before = self.told.checked_sub(1);
+        self.told += 1;
+        Some((
+            trial,
+            before.and_then(|before| self.case.trials.get(before)),
+        ))
+    }
+
+    /// Whether all exchanges have come to their ends.
+    pub(super) const fn is_done(&self) -> bool {
+        self.done
+    }
+
+    pub(super) const fn case(&self) -> &Case {
+        &self.case
+    }
+
+    /// Undoes what is still held at the peer, for whoever stops before the end.
+    pub(super) fn leave(&mut self) {
+        let mut sends = events::cancel_all(&mut self.case);
+        sends.extend(standing::release(&mut self.case));
+        self.case.unsent.extend(sends);
+    }
+
+    /// Begins exchanges until one has to wait.
+    fn go_on(&mut self, now: Duration) {
+        while self.running.is_none() {
+            let Some(exchange) = self.plan.next() else {
+                self.done = true;
+                return;
+            };
+            let mark = self.case.seen.len();
+            let running = |question: Question| Running {
+                exchange,
+                began: now,
+                mark,
+                stage: 0,
+                next: question.again.map(|again| now + again),
+                deadline: now + question.patience,
+                question,
+            };
+            match begin(exchange, &mut self.case, now) {
+                Begin::Ask(question) => {
+                    self.case.unsent.extend(question.sends.iter().cloned());
+                    self.running = Some(running(question));
+                }
+                Begin::Over(verdict) => {
+                    self.running = Some(running(Question::silence(Duration::ZERO)));
+                    self.close(now, verdict);
+                }
+            }
+        }
+    }
+
+    /// Looks whether what was heard decides the exchange.
+    fn judge(&mut self, now: Duration) {
+        let Some(running) = &mut self.running else {
+            return;
+        };
+        let (exchange, mark, stage) = (running.exchange, running.mark, running.stage);
+        match judge(exchange, &mut self.case, mark, stage, now) {
+            Judgement::Wait => {}
+            Judgement::Ask(question) => {
+                self.case.unsent.extend(question.sends.iter().cloned());
+                running.mark = self.case.seen.len();
+                running.stage = running.stage.saturating_add(1);
+                running.next = question.again.map(|again| now + again);
+                running.deadline = now + question.patience;
+                running.question = question;
+            }
+            Judgement::Over(verdict) => {
+                self.close(now, verdict);
+                self.go_on(now);
+            }
+        }
+    }
+
+    fn close(&mut self, now: Duration, verdict: Verdict) {
+        if let Some(running) = self.running.take() {
+            self.case.trials.push(Trial {
+                exchange: running.exchange,
+                verdict,
+                took: now.saturating_sub(running.began),
+            });
+        }
+    }
+}
+
+fn begin(exchange: Exchange, case: &mut Case, now: Duration) -> Begin {
+    match exchange {
+        Exchange::Find => reach::find(case),
+        Exchange::Reach => reach::reach(case),
+        Exchange::Answer => reach::answer(case),
+        Exchange::Framing => reach::framing(case),
+        Exchange::SourcePort => reach::source_port(case),
+        Exchange::Identification => discovery::identification(case),
+        Exchange::Multicast => discovery::multicast(case),
+        Exchange::MulticastBack => discovery::multicast_back(case, now),
+        Exchange::Heartbeat => standing::heartbeat(case),
+        Exchange::Acknowledgement => standing::acknowledgement(case),
+        Exchange::Configuration => discovery::configuration(case),
+        Exchange::ServicesWildcard | Exchange::ServicesNamed | Exchange::ServicesAll => {
+            discovery::services(case, exchange)
+        }
+        Exchange::Authority => standing::authority(case),
+        Exchange::Status => standing::status(case),
+        Exchange::Control => standing::control(case),
+        Exchange::TakeControl => standing::take_control(case),
+        Exchange::EventPeriodic => events::periodic(case),
+        Exchange::EventArrives => events::arrival(case),
+        Exchange::EventCancel => events::cancel(case),
+        Exchange::EventOnChange => events::on_change(case),
+        Exchange::Large(octets) => large::to_peer(case, octets, now),
+        Exchange::LargeBack => large::from_peer(case),
+        Exchange::Tcp => manners::tcp(case),
+        Exchange::Rate => manners::rate(case),
+        Exchange::Sequence => Begin::Over(manners::sequence(case)),
+        Exchange::Stacks => Begin::Over(manners::stacks(case)),
+        Exchange::Ids => Begin::Over(manners::ids(case)),
+    }
+}
+
+fn judge(exchange: Exchange, case: &mut Case, mark: usize, stage: u8, now: Duration) -> Judgement {
+    match exchange {
+        Exchange::Find => reach::found(case),
+        Exchange::Reach => reach::reached(case, stage),
+        Exchange::Answer => reach::answered(case, mark),
+        Exchange::Framing => ra::named(case),
+        Exchange::SourcePort => reach::asked_at_its_source(case, mark),
+        Exchange::Identification => discovery::identified(case, mark),
+        Exchange::Multicast => discovery::multicast_answered(case, mark),
+        Exchange::MulticastBack => discovery::heard_by_multicast(case),
+        Exchange::Heartbeat => standing::beats(case, mark),
+        Exchange::Acknowledgement => standing::acknowledged(case, mark),
+        Exchange::Configuration => discovery::configured(case, mark),
+        Exchange::ServicesWildcard | Exchange::ServicesNamed | Exchange::ServicesAll => {
+            discovery::serves(case, exchange, mark)
+        }
+        Exchange::Authority => standing::has_authority(case, mark),
+        Exchange::Status => standing::has_status(case, mark),
+        Exchange::Control => standing::is_controlled(case, mark),
+        Exchange::TakeControl => standing::taking_control(case, mark, stage),
+        Exchange::EventPeriodic => events::created(case, mark),
+        Exchange::EventArrives => events::arrived(case, mark),
+        Exchange::EventCancel => events::cancelled(case, mark, stage),
+        Exchange::EventOnChange => events::changes(case, mark, stage),
+        Exchange::Large(octets) => large::acknowledged(case, octets, mark, now),
+        Exchange::LargeBack => large::came_back(case, mark, stage),
+        Exchange::Tcp => manners::tcp_answered(case),
+        Exchange::Rate => manners::all_answered(case, mark),
+        Exchange::Sequence | Exchange::Stacks | Exchange::Ids => Judgement::Wait,
+    }
+}
+
+/// The time for an answer is over.
+fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Verdict {
+    match exchange {
+        Exchange::Find => reach::not_found(case),
+        Exchange::Reach => reach::not_refused(case, stage),
+        Exchange::Answer => reach::unanswered(case),
+        Exchange::Framing => match case.address {
+            Some(address) => ra::verdict(case, address, None),
+            None => Verdict::skipped("its address is not known"),
+        },
+        Exchange::SourcePort => reach::deaf_source(case),
+        Exchange::Identification => discovery::not_identified(case, mark),
+        Exchange::Multicast => discovery::multicast_unanswered(case),
+        Exchange::MulticastBack => discovery::nothing_by_multicast(case),
+        Exchange::Heartbeat => standing::no_heartbeat(case),
+        Exchange::Acknowledgement => standing::not_acknowledged(case),
+        Exchange::Configuration => discovery::not_configured(case, mark),
+        Exchange::ServicesWildcard | Exchange::ServicesNamed | Exchange::ServicesAll => {
+            discovery::no_services(case, exchange, mark)
+        }
+        Exchange::Authority => standing::silent(case, "Query Authority", "AccessControl"),
+        Exchange::Status => standing::silent(case, "Query Status", "Management"),
+        Exchange::Control => standing::silent(case, "Query Control", "AccessControl"),
+        Exchange::TakeControl => standing::control_unanswered(case, stage),
+        Exchange::EventPeriodic => events::not_created(case, mark),
+        Exchange::EventArrives => events::not_arrived(case, mark),
+        Exchange::EventCancel => events::after_cancel(case, mark, stage),
+        Exchange::EventOnChange => events::not_on_change(case, mark, stage),
+        Exchange::Large(octets) => large::unacknowledged(case, octets),
+        Exchange::LargeBack => large::not_back(case, mark, stage),
+        Exchange::Tcp => manners::tcp_silent(case),
+        Exchange::Rate => manners::some_answered(case, mark),
+        Exchange::Sequence | Exchange::Stacks | Exchange::Ids => Verdict::skipped("not asked"),
+    }
+}

@@ -1,0 +1,124 @@
+//! Which known peer it is, and how that was seen.
+
+use jaus::peer::{Certainty, LargeStyle, Peer, Recogniser, Verdict};
+use jaus::wire::{Version, ra::RaId};
+use serde_json::{Value as Json, json};
+
+use super::case::Case;
+
+/// What a peer is taken for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Profile {
+    /// It speaks AS5669A.
+    As5669a(Verdict),
+    /// It speaks the Reference Architecture alone: its subsystem's number there.
+    Ra(u8),
+    /// Too little was heard.
+    Unknown,
+}
+
+impl Case {
+    /// Who it is, by all that was heard of it.
+    pub(super) fn recognise(&self) -> Verdict {
+        let mut recogniser = Recogniser::new();
+        let all = self.seen.all().iter();
+        for heard in all.filter(|heard| Some(heard.frame.source) == self.id) {
+            recogniser.handle_frame(&heard.frame, heard.stale);
+        }
+        if let Some(offers) = &self.services {
+            let offers = offers.iter();
+            recogniser.handle_services(offers.map(|o| (o.urn.as_str(), o.major, o.minor)));
+        }
+        recogniser.verdict()
+    }
+
+    /// Whether the fragments of what we send are each to begin with the message code.
+    pub(super) fn repeats_code(&self) -> bool {
+        let verdict = self.recognise();
+        let sure = verdict.certainty >= Certainty::Likely;
+        sure && verdict.peer.large_style() == Some(LargeStyle::RepeatedCode)
+    }
+
+    /// What it is taken for at the end.
+    pub(super) fn profile(&self) -> Profile {
+        let of_it = |version: Version| {
+            let all = self
+                .seen
+                .all()
+                .iter()
+                .filter(move |heard| heard.frame.version == version);
+            let ip = self.address.map(|address| address.ip());
+            all.filter(move |heard| Some(heard.from.ip()) == ip)
+        };
+        if of_it(Version::As5669a).next().is_some() {
+            return Profile::As5669a(self.recognise());
+        }
+        let older = of_it(Version::Ra).chain(of_it(Version::As5669)).next();
+        older.map_or(Profile::Unknown, |heard| {
+            Profile::Ra(RaId::from(heard.frame.source).subsystem)
+        })
+    }
+}
+
+impl Profile {
+    /// What is said of it, line by line.
+    pub(super) fn in_words(&self, case: &Case) -> Vec<String> {
+        let verdict = match self {
+            Self::Unknown => return vec!["not recognised: too little was heard".to_owned()],
+            Self::Ra(_) => {
+                return vec![
+                    "Reference Architecture 3.x (OpenJAUS 3.x and its like): it speaks no AS5669A"
+                        .to_owned(),
+                    "→ `jaus-ra-gateway` makes its components AS5669A ones: docs/ra-gateway.md"
+                        .to_owned(),
+                ];
+            }
+            Self::As5669a(verdict) => verdict,
+        };
+        let peer = verdict.peer;
+        if peer == Peer::Standard {
+            return vec![
+                "none: nothing tells it from a peer that keeps to the standard".to_owned(),
+            ];
+        }
+        let mut lines = vec![format!("{} ({})", peer.title(), verdict.certainty)];
+        lines.extend(
+            verdict
+                .reasons
+                .iter()
+                .map(|reason| format!("because {reason}")),
+        );
+        if verdict.certainty < Certainty::Certain {
+            let id = case.id.map_or_else(String::new, |id| id.to_string());
+            lines.push(format!(
+                "→ a node treats it so once that is certain, or if its settings say: [[profile]] \
+                 id = \"{id}\", profile = \"{peer}\""
+            ));
+        }
+        let departures: Vec<_> = peer.departures().map(|d| d.entry().name).collect();
+        if !departures.is_empty() {
+            lines.push(format!("known of it: {}", departures.join("; ")));
+        }
+        lines
+    }
+
+    pub(super) fn to_json(&self) -> Json {
+        match self {
+            Self::Unknown => Json::Null,
+            Self::Ra(subsystem) => json!({"peer": "ra", "subsystem": subsystem}),
+            Self::As5669a(verdict) => {
+                let departures = verdict.peer.departures().map(|departure| {
+                    let entry = departure.entry();
+                    json!({"name": entry.name, "does": entry.does, "ours": entry.ours})
+                });
+                let reasons = verdict.reasons.iter().map(ToString::to_string);
+                json!({
+                    "peer": verdict.peer.name(),
+                    "certainty": verdict.certainty.to_string(),
+                    "reasons": reasons.collect::<Vec<_>>(),
+                    "departures": departures.collect::<Vec<_>>(),
+                })
+            }
+        }
+    }
+}

@@ -1,0 +1,436 @@
+//! The first trials: is anybody there, in which framing, and from which port does it answer?
+
+use std::collections::BTreeSet;
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use jaus::address::JausId;
+use jaus::messages::core::{
+    QueryHeartbeatPulse, QueryIdentification, query_identification::QueryType,
+};
+use jaus::wire::{Acknowledgement, Frame, Version, judp};
+
+use super::case::{Case, Question, Send, octets};
+use super::examiner::{Begin, Judgement};
+use super::exchange::Verdict;
+use super::ra;
+use super::seen::{Door, Heard, Refusal};
+use super::standing::PADDING;
+
+pub(super) fn query_identification() -> QueryIdentification {
+    QueryIdentification {
+        query_type: QueryType::SUBSYSTEM_IDENTIFICATION,
+    }
+}
+
+/// Looks for a peer that is named by its id alone.
+pub(super) fn find(case: &mut Case) -> Begin {
+    let Some(id) = case.settings.target.id else {
+        return Begin::Over(Verdict::skipped("its address is given"));
+    };
+    if let Some(address) = case.address {
+        return Begin::Over(Verdict::ok(format!("{id} is said to be at {address}")));
+    }
+    if let Some(why) = &case.settings.no_group {
+        return Begin::Over(Verdict::failed(
+            format!("there is no multicast group to call {id} by"),
+            why.clone(),
+            "name the address too: --peer ID@ADDRESS",
+        ));
+    }
+    // To everybody, and to it alone as Junior calls those whose address it does not know.
+    let everybody = case.ask_everybody(&query_identification());
+    let alone = Send::Group(case.global(id, &query_identification()));
+    Begin::Ask(Question {
+        sends: vec![everybody, alone],
+        again: Some(Duration::from_secs(1)),
+        patience: case.settings.listen,
+    })
+}
+
+pub(super) fn found(case: &mut Case) -> Judgement {
+    let of_it = |heard: &&Heard| Some(heard.frame.source) == case.id;
+    let Some(heard) = case.seen.all().iter().find(of_it).cloned() else {
+        return Judgement::Wait;
+    };
+    case.address = Some(heard.from);
+    case.link = Some(heard.link);
+    Judgement::Over(Verdict::ok(format!("it is at {}", heard.from)))
+}
+
+pub(super) fn not_found(case: &Case) -> Verdict {
+    let seconds = case.settings.listen.as_secs_f64();
+    let others = others(case);
+    let id = case.id.map_or_else(String::new, |id| id.to_string());
+    if others.is_empty() {
+        return Verdict::failed(
+            format!("neither {id} nor anybody else was heard in {seconds} s"),
+            "multicast does not pass between the two hosts, or the peer is not running",
+            "name its address: --peer ID@ADDRESS; `jaus doctor` alone looks at multicast here",
+        );
+    }
+    Verdict::failed(
+        format!(
+            "{id} was not heard in {seconds} s, but {}",
+            others.join(", ")
+        ),
+        "it has another id, or is not running",
+        "take the id from its settings, or name its address: --peer ADDRESS",
+    )
+}
+
+/// Who was heard besides, with where.
+fn others(case: &Case) -> Vec<String> {
+    const SOME: usize = 6;
+    let all = case
+        .seen
+        .all()
+        .iter()
+        .filter(|heard| Some(heard.frame.source) != case.id);
+    let set: BTreeSet<(JausId, SocketAddr)> =
+        all.map(|heard| (heard.frame.source, heard.from)).collect();
+    let named = set.iter().take(SOME);
+    named.map(|(id, from)| format!("{id} at {from}")).collect()
+}
+
+/// Asks whether the port refuses, from a passing socket, so that no answer is expected there.
+pub(super) fn reach(case: &mut Case) -> Begin {
+    if let Some(skip) = case.cut_off() {
+        return Begin::Over(skip);
+    }
+    let Some(address) = case.address else {
+        return Begin::Over(Verdict::skipped("its address is not known"));
+    };
+    let destination = case.id.unwrap_or(JausId::EVERYONE);
+    let frame = Frame::new(case.probe_id(), destination, octets(&QueryHeartbeatPulse));
+    Begin::Ask(Question {
+        sends: vec![Send::Probe(address, frame)],
+        again: Some(Duration::from_millis(200)),
+        patience: Duration::from_millis(500),
+    })
+}
+
+pub(super) fn reached(case: &mut Case, stage: u8) -> Judgement {
+    let Some(address) = case.address.filter(|_| stage == 0) else {
+        return Judgement::Wait;
+    };
+    let probed = |heard: &Heard| heard.door == Door::Probe && heard.from.ip() == address.ip();
+    if case.seen.all().iter().any(probed) {
+        return Judgement::Over(Verdict::ok(format!("UDP {address} answers")));
+    }
+    if case.seen.refused.is_none() {
+        return Judgement::Wait;
+    }
+    // Perhaps it speaks from another port.
+    let sends = match case.settings.no_group {
+        None => vec![case.ask_everybody(&query_identification())],
+        Some(_) => Vec::new(),
+    };
+    Judgement::Ask(Question {
+        sends,
+        ..Question::silence(Duration::from_secs(1))
+    })
+}
+
+fn refused(case: &Case, address: SocketAddr, refusal: Refusal) -> Verdict {
+    let (ip, port) = (address.ip(), address.port());
+    if refusal == Refusal::Host {
+        return Verdict::failed(
+            format!("there is no way to {ip}, or nobody has that address"),
+            "the host is off, or has another address, or is on another network",
+            format!("`ip route get {ip}`, `ping {ip}`; look at the cable and the address"),
+        );
+    }
+    let ports = other_ports(case, address);
+    if let Some(other) = ports.first() {
+        return Verdict::failed(
+            format!("{ip} says that nobody listens at UDP {port}, but {other} speaks"),
+            "the peer has another port",
+            format!("name that: --peer {other}"),
+        );
+    }
+    Verdict::failed(
+        format!("{ip} says that nobody listens at UDP {port}"),
+        "no JAUS program runs there, or it is bound to another address or port of that host",
+        format!(
+            "on that host: `ss -ulpn 'sport = :{port}'` shows who listens, and at which address"
+        ),
+    )
+}
+
+pub(super) fn not_refused(case: &Case, stage: u8) -> Verdict {
+    match (case.address, case.seen.refused) {
+        (Some(address), Some(refusal)) if stage > 0 => refused(case, address, refusal),
+        (Some(address), _) => Verdict::ok(format!("UDP {address} does not refuse")),
+        (None, _) => Verdict::skipped("its address is not known"),
+    }
+}
+
+/// The places at the host, other than the one that is asked, that JAUS messages come from.
+fn other_ports(case: &Case, address: SocketAddr) -> Vec<SocketAddr> {
+    let others = case.seen.of_host(address.ip());
+    let others = others
+        .map(|heard| heard.from)
+        .filter(|from| *from != address);
+    others.collect::<BTreeSet<_>>().into_iter().collect()
+}
+
+/// Asks for any sign of life: by unicast, so that whatever comes back is due to that.
+pub(super) fn answer(case: &mut Case) -> Begin {
+    if let Some(skip) = case.cut_off() {
+        return Begin::Over(skip);
+    }
+    let Some(address) = case.address else {
+        return Begin::Over(Verdict::skipped("its address is not known"));
+    };
+    let query = query_identification();
+    let sends = match case.id {
+        Some(id) => {
+            // Who has no Discovery acknowledges, at least.
+            let mut padding = case.frame(id, PADDING.to_le_bytes().to_vec().into());
+            padding.flags = padding.flags.with_acknowledgement(Acknowledgement::Request);
+            let query = case.frame(id, octets(&query));
+            vec![Send::To(address, query), Send::To(address, padding)]
+        }
+        None => vec![case.ask_all_at(address, &query)],
+    };
+    Begin::Ask(Question {
+        sends,
+        again: Some(Duration::from_millis(500)),
+        patience: case.settings.listen,
+    })
+}
+
+pub(super) fn answered(case: &mut Case, mark: usize) -> Judgement {
+    let Some(address) = case.address else {
+        return Judgement::Wait;
+    };
+    let own = case.settings.own;
+    let to_us = |heard: &&Heard| {
+        let of_it = heard.from.ip() == address.ip() || Some(heard.frame.source) == case.id;
+        of_it && heard.frame.destination == own && heard.door == Door::Unicast
+    };
+    let Some(heard) = case.seen.since(mark).iter().find(to_us).cloned() else {
+        return older(case, address);
+    };
+    case.link = Some(heard.link);
+    case.id = case.id.or(Some(heard.frame.source));
+    Judgement::Over(Verdict::ok(format!(
+        "{} answers from {}",
+        heard.frame.source, heard.from
+    )))
+}
+
+/// A peer that beats in an older framing, and does not answer meanwhile, speaks that alone.
+fn older(case: &Case, address: SocketAddr) -> Judgement {
+    const ENOUGH: usize = 3;
+    let versions = case
+        .seen
+        .of_host(address.ip())
+        .map(|heard| heard.frame.version);
+    let (new, old): (Vec<_>, Vec<_>) = versions.partition(|v| *v == Version::As5669a);
+    if new.is_empty() && old.len() >= ENOUGH {
+        return Judgement::Over(only_older(address));
+    }
+    Judgement::Wait
+}
+
+/// What it is, the next trial tells.
+fn only_older(address: SocketAddr) -> Verdict {
+    Verdict::ok(format!("{} was heard, but not in AS5669A", address.ip()))
+}
+
+/// Nothing came by unicast; perhaps something came to the groups.
+pub(super) fn unanswered(case: &mut Case) -> Verdict {
+    let Some(address) = case.address else {
+        return not_refused(case, 0);
+    };
+    let ip = address.ip();
+    let seconds = case.settings.listen.as_secs_f64();
+    if let Some(refusal) = case.seen.refused {
+        return refused(case, address, refusal);
+    }
+    let framings = case.seen.framings(ip);
+    if framings.iter().any(|version| *version != Version::As5669a) {
+        return only_older(address);
+    }
+    let heard = case.seen.of_host(ip).next().cloned();
+    if let Some(heard) = heard {
+        return heard_only(case, address, &heard);
+    }
+    if let Some(beginning) = case.seen.unreadable_from(ip) {
+        return Verdict::failed(
+            format!("{ip} sends datagrams of no JAUS framing: they begin with {beginning}"),
+            "another program has that port",
+            format!(
+                "on that host: `ss -ulpn 'sport = :{}'` shows which",
+                address.port()
+            ),
+        );
+    }
+    silent(case, address, seconds)
+}
+
+/// It speaks to everybody, and does not answer us.
+fn heard_only(case: &mut Case, address: SocketAddr, heard: &Heard) -> Verdict {
+    case.id = case.id.or(Some(heard.frame.source));
+    let (id, from) = (heard.frame.source, heard.from);
+    if from.port() != address.port() {
+        return Verdict::failed(
+            format!("{id} speaks from {from}, and nobody answers at {address}"),
+            "the peer has another port",
+            format!("name that: --peer {from}"),
+        );
+    }
+    Verdict::failed(
+        format!("{id} was heard from {from}, but does not answer what is sent there"),
+        "its firewall lets no UDP in, or it answers to an address that we do not have",
+        format!(
+            "on that host: let UDP {} in (`nft list ruleset`); `jaus record` there shows whether \
+             our questions arrive",
+            address.port()
+        ),
+    )
+}
+
+fn silent(case: &Case, address: SocketAddr, seconds: f64) -> Verdict {
+    let elsewhere = case
+        .seen
+        .all()
+        .iter()
+        .find(|heard| Some(heard.frame.source) == case.id);
+    if let Some(heard) = elsewhere {
+        let (id, from) = (heard.frame.source, heard.from);
+        return Verdict::failed(
+            format!("{address} is silent, but {id} speaks from {from}"),
+            "the peer has another address",
+            format!("name that: --peer {id}@{from}"),
+        );
+    }
+    let others = others(case);
+    if !others.is_empty() {
+        return Verdict::failed(
+            format!(
+                "{address} was silent for {seconds} s; heard were {}",
+                others.join(", ")
+            ),
+            "the address is wrong, or the peer does not run, or its firewall drops UDP",
+            "compare the address with those heard; look at the peer and its firewall",
+        );
+    }
+    let remedy = if case.settings.target.id.is_some() {
+        "look at both firewalls, and run `jaus doctor` alone; without its id (--peer ADDRESS) \
+         whoever is there is asked"
+    } else {
+        "name its id too (--peer ID@ADDRESS), look at both firewalls, and run `jaus doctor` alone"
+    };
+    Verdict::failed(
+        format!("{address} was silent for {seconds} s, and nobody else was heard"),
+        "the peer does not run, or a firewall on either side drops UDP, or nobody there has the id \
+         that is asked",
+        remedy,
+    )
+}
+
+/// Which framings its host speaks.
+pub(super) fn framing(case: &mut Case) -> Begin {
+    if let Some(skip) = case.cut_off() {
+        return Begin::Over(skip);
+    }
+    let Some(address) = case.address else {
+        return Begin::Over(Verdict::skipped("its address is not known"));
+    };
+    let framings = case.seen.framings(address.ip());
+    if framings.contains(&Version::As5669a) || framings.is_empty() {
+        let besides = framings.len() > 1;
+        let besides = if besides {
+            ", and older framings besides"
+        } else {
+            ""
+        };
+        return Begin::Over(Verdict::ok(format!("AS5669A{besides}")));
+    }
+    ra::ask(case, address)
+}
+
+/// Whether what it says comes from where it is asked.
+pub(super) fn source_port(case: &mut Case) -> Begin {
+    if let Some(skip) = case.cut_off() {
+        return Begin::Over(skip);
+    }
+    let (Some(address), Some(id)) = (case.address, case.id) else {
+        return Begin::Over(Verdict::skipped("nobody answered"));
+    };
+    let Some(from) = case.told(0).map(|heard| heard.from).next() else {
+        return Begin::Over(Verdict::skipped("nothing came by unicast"));
+    };
+    if from == address {
+        let port = from.port();
+        let usual = if port == judp::PORT {
+            ""
+        } else {
+            ", which is not the usual 3794"
+        };
+        return Begin::Over(Verdict::ok(format!("it answers from {port}{usual}")));
+    }
+    if from.ip() != address.ip() {
+        return Begin::Over(other_address(address, from, id));
+    }
+    // Does it listen where it speaks from?
+    let frame = case.frame(id, octets(&query_identification()));
+    Begin::Ask(Question::new(Send::To(from, frame)))
+}
+
+fn other_address(address: SocketAddr, from: SocketAddr, id: JausId) -> Verdict {
+    Verdict::failed(
+        format!("{id} is asked at {address} and answers from {from}"),
+        "its host has several addresses, and the peer is bound to none or to another",
+        format!(
+            "name the one it answers from (--peer {id}@{from}), or bind the peer to one address"
+        ),
+    )
+}
+
+pub(super) fn asked_at_its_source(case: &mut Case, mark: usize) -> Judgement {
+    let Some(heard) = case.told(mark).next() else {
+        return Judgement::Wait;
+    };
+    let (from, id) = (heard.from, heard.frame.source);
+    let Some(address) = case.address else {
+        return Judgement::Wait;
+    };
+    Judgement::Over(Verdict::failed(
+        format!(
+            "asked at port {}, it answers from {}",
+            address.port(),
+            from.port()
+        ),
+        "something between translates ports (NAT, a container), or two sockets share the work",
+        format!("messages reach it at both; name the one it speaks from: --peer {id}@{from}"),
+    ))
+}
+
+/// It sends from a port at which it does not listen.
+pub(super) fn deaf_source(case: &Case) -> Verdict {
+    let (Some(address), Some(id)) = (case.address, case.id) else {
+        return Verdict::skipped("nobody answered");
+    };
+    let from = case
+        .told(0)
+        .map(|heard| heard.from.port())
+        .next()
+        .unwrap_or(0);
+    let port = address.port();
+    Verdict::failed(
+        format!("it answers from port {from}, and does not listen there"),
+        format!(
+            "the peer sends from a socket of its own instead of the one bound to {port}; whoever \
+             answers to where a message came from (Junior, JAUS++ and this stack do) speaks to \
+             nobody"
+        ),
+        format!(
+            "let the peer send from its port {port}; until then pin its address in our settings: \
+             peers = [\"{id}@{address}\"]"
+        ),
+    )
+}

@@ -1,0 +1,268 @@
+//! The trials of Liveness, of the transport's acknowledgement, and of Access Control and
+//! Management. Nothing is commanded, and control is taken only if that is wanted.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::messages::core::{
+    ConfirmControl, QueryAuthority, QueryControl, QueryHeartbeatPulse, QueryStatus, RejectControl,
+    ReleaseControl, ReportAuthority, ReportControl, ReportHeartbeatPulse, ReportStatus,
+    RequestControl, confirm_control::ResponseCode,
+};
+use jaus::wire::Acknowledgement;
+
+use super::case::{Case, Question, Send};
+use super::discovery::shown;
+use super::examiner::{Begin, Judgement};
+use super::exchange::{Exchange, Mark, Verdict};
+
+/// The code of messages that nobody acts on: user-defined (AS5710 leaves D000h and above to users).
+pub(super) const PADDING: u16 = 0xD7F0;
+
+fn ask(case: &mut Case, message: &impl jaus::codec::Message) -> Begin {
+    match case.ask_peer(message) {
+        Some(send) => Begin::Ask(Question::new(send)),
+        None => Begin::Over(Verdict::skipped("no id is known there")),
+    }
+}
+
+pub(super) fn heartbeat(case: &mut Case) -> Begin {
+    match case.nobody() {
+        Some(skip) => Begin::Over(skip),
+        None => ask(case, &QueryHeartbeatPulse),
+    }
+}
+
+pub(super) fn beats(case: &mut Case, mark: usize) -> Judgement {
+    match case.report::<ReportHeartbeatPulse>(mark) {
+        Some(_) => Judgement::Over(Verdict::ok("Query Heartbeat Pulse is answered")),
+        None => Judgement::Wait,
+    }
+}
+
+pub(super) fn no_heartbeat(case: &Case) -> Verdict {
+    Verdict::failed(
+        format!("{} does not answer Query Heartbeat Pulse", shown(case)),
+        "the component offers no Liveness service",
+        "whoever watches it by heartbeats takes it for gone: watch its other reports instead",
+    )
+}
+
+pub(super) fn acknowledgement(case: &mut Case) -> Begin {
+    if let Some(skip) = case.nobody() {
+        return Begin::Over(skip);
+    }
+    let (Some(id), Some(address)) = (case.id, case.address) else {
+        return Begin::Over(Verdict::skipped("no id is known there"));
+    };
+    let mut frame = case.frame(id, Bytes::copy_from_slice(&PADDING.to_le_bytes()));
+    frame.flags = frame.flags.with_acknowledgement(Acknowledgement::Request);
+    Begin::Ask(Question::new(Send::To(address, frame)))
+}
+
+pub(super) fn acknowledged(case: &mut Case, mark: usize) -> Judgement {
+    let mut told = case.told(mark);
+    let answer = told.find(|heard| heard.frame.flags.acknowledgement().is_answer());
+    let verdict = match answer.map(|heard| &heard.frame) {
+        None => return Judgement::Wait,
+        Some(frame) if frame.flags.acknowledgement() == Acknowledgement::Negative => {
+            Verdict::failed(
+                "a message that wants an acknowledgement gets a negative one",
+                "the peer does not know the user-defined message, or cannot take it just now",
+                "send without acknowledgements to it",
+            )
+        }
+        Some(frame) if !frame.payload.is_empty() => Verdict::failed(
+            format!("its acknowledgement carries {} octets", frame.payload.len()),
+            "the peer sends the message back instead of an empty acknowledgement; JAUS++ and \
+             others drop such",
+            "send without acknowledgements to it",
+        ),
+        Some(_) => Verdict::ok("a message that wants an acknowledgement gets it"),
+    };
+    Judgement::Over(verdict)
+}
+
+pub(super) fn not_acknowledged(case: &Case) -> Verdict {
+    Verdict::failed(
+        format!("{} acknowledges nothing", shown(case)),
+        "its transport does not implement acknowledgements, or answers them to another address",
+        "send without acknowledgements to it; large messages to it are then never certain",
+    )
+}
+
+pub(super) fn authority(case: &mut Case) -> Begin {
+    match case.nobody().or_else(|| case.lacks("AccessControl")) {
+        Some(skip) => Begin::Over(skip),
+        None => ask(case, &QueryAuthority),
+    }
+}
+
+pub(super) fn has_authority(case: &mut Case, mark: usize) -> Judgement {
+    match case.report::<ReportAuthority>(mark) {
+        Some(report) => Judgement::Over(Verdict::ok(format!("{}", report.authority_code))),
+        None => Judgement::Wait,
+    }
+}
+
+pub(super) fn status(case: &mut Case) -> Begin {
+    match case.nobody().or_else(|| case.lacks("Management")) {
+        Some(skip) => Begin::Over(skip),
+        None => ask(case, &QueryStatus),
+    }
+}
+
+pub(super) fn has_status(case: &mut Case, mark: usize) -> Judgement {
+    const NAMES: [&str; 6] = [
+        "init",
+        "ready",
+        "standby",
+        "shutdown",
+        "failure",
+        "emergency",
+    ];
+    let Some(report) = case.report::<ReportStatus>(mark) else {
+        return Judgement::Wait;
+    };
+    let name = NAMES.get(usize::from(report.status.0));
+    Judgement::Over(match name {
+        Some(name) => Verdict::ok(*name),
+        None => Verdict::ok(format!("{}, which has no name", report.status.0)),
+    })
+}
+
+pub(super) fn control(case: &mut Case) -> Begin {
+    match case.nobody().or_else(|| case.lacks("AccessControl")) {
+        Some(skip) => Begin::Over(skip),
+        None => ask(case, &QueryControl),
+    }
+}
+
+/// Who is in control, if anybody.
+fn controller(report: &ReportControl) -> Option<String> {
+    let (subsystem, node, component) = (report.subsystem_id, report.node_id, report.component_id);
+    (subsystem != 0).then(|| format!("{subsystem}.{node}.{component}"))
+}
+
+pub(super) fn is_controlled(case: &mut Case, mark: usize) -> Judgement {
+    let Some(report) = case.report::<ReportControl>(mark) else {
+        return Judgement::Wait;
+    };
+    Judgement::Over(Verdict::ok(match controller(&report) {
+        Some(who) => format!("{who} is in control"),
+        None => "nobody is in control".to_owned(),
+    }))
+}
+
+/// Nothing came to a query of a service.
+pub(super) fn silent(case: &Case, query: &str, service: &str) -> Verdict {
+    let id = shown(case);
+    if case.services.is_some() {
+        return Verdict::failed(
+            format!("{id} lists the service {service} and does not answer {query}"),
+            "it implements the service in part, or dropped the question",
+            "ask again; `jaus record` at the peer shows whether the question arrives",
+        );
+    }
+    Verdict::failed(
+        format!("{id} does not answer {query}"),
+        format!("the component offers no {service}"),
+        "ask the component that offers it: `jaus discover` lists components with their services",
+    )
+}
+
+/// Control is taken if that is wanted, with no more authority than it needs, and from nobody.
+pub(super) fn take_control(case: &mut Case) -> Begin {
+    if let Some(skip) = case.nobody().or_else(|| case.lacks("AccessControl")) {
+        return Begin::Over(skip);
+    }
+    if !case.settings.control {
+        return Begin::Over(Verdict::skipped("only with --control"));
+    }
+    if let Some(who) = case
+        .report::<ReportControl>(0)
+        .as_ref()
+        .and_then(controller)
+    {
+        return Begin::Over(Verdict::skipped(format!("{who} has it, and keeps it")));
+    }
+    let authority = case.report::<ReportAuthority>(0);
+    let request = RequestControl {
+        authority_code: authority.map_or(1, |report| report.authority_code.max(1)),
+    };
+    case.in_control = true;
+    match case.ask_peer(&request) {
+        Some(send) => Begin::Ask(Question::new(send)),
+        None => Begin::Over(Verdict::skipped("no id is known there")),
+    }
+}
+
+/// First the confirmation, then the release.
+pub(super) fn taking_control(case: &mut Case, mark: usize, stage: u8) -> Judgement {
+    if stage > 0 {
+        return match case.report::<RejectControl>(mark) {
+            Some(_) => Judgement::Over(Verdict::ok("granted, and released again")),
+            None => Judgement::Wait,
+        };
+    }
+    let Some(confirm) = case.report::<ConfirmControl>(mark) else {
+        return Judgement::Wait;
+    };
+    if confirm.response_code == ResponseCode::CONTROL_ACCEPTED {
+        let send = release(case);
+        return Judgement::Ask(Question {
+            sends: send.into_iter().collect(),
+            ..Question::silence(Duration::from_secs(1))
+        });
+    }
+    case.in_control = false;
+    let why = match confirm.response_code {
+        ResponseCode::NOT_AVAILABLE => "it is not available",
+        ResponseCode::INSUFFICIENT_AUTHORITY => "our authority does not suffice",
+        _ => "a reason without a name",
+    };
+    Judgement::Over(Verdict::failed(
+        format!("control is refused: {why}"),
+        "somebody with more authority has it, or the component is not to be controlled now",
+        "`jaus query ID QueryControl` shows who has it; raise the client's authority code",
+    ))
+}
+
+pub(super) fn control_unanswered(case: &mut Case, stage: u8) -> Verdict {
+    if stage == 0 {
+        // It may have been granted, and the answer lost.
+        let send = release(case);
+        case.unsent.extend(send);
+        return Verdict::failed(
+            "Request Control is not answered",
+            "the component is not controlled by this service, or does not know who asks",
+            "look at the peer's access settings",
+        );
+    }
+    Verdict::failed(
+        "control was granted, and Release Control is not answered",
+        "the peer sends no Reject Control when control is released",
+        "do not wait for it; Query Control shows whether control is free",
+    )
+}
+
+/// Gives back what may have been taken.
+pub(super) fn release(case: &mut Case) -> Option<Send> {
+    let held = std::mem::take(&mut case.in_control);
+    held.then(|| case.ask_peer(&ReleaseControl)).flatten()
+}
+
+/// The queries that are known to be answered, the best to subscribe to first.
+pub(super) fn answered_query(case: &Case) -> Option<(Bytes, u16, &'static str)> {
+    use jaus::codec::Message;
+
+    use super::case::octets;
+    if case.mark_of(Exchange::Status) == Some(Mark::Ok) {
+        return Some((octets(&QueryStatus), ReportStatus::CODE, "Query Status"));
+    }
+    if case.mark_of(Exchange::Heartbeat) == Some(Mark::Ok) {
+        let code = ReportHeartbeatPulse::CODE;
+        return Some((octets(&QueryHeartbeatPulse), code, "Query Heartbeat Pulse"));
+    }
+    None
+}

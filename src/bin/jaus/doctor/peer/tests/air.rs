@@ -1,0 +1,139 @@
+//! What lies between an examination and a scripted peer: virtual time, and what is on its way.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::wire::{Frame, judp};
+
+use super::super::case::{Send, Settings};
+use super::super::examiner::Examiner;
+use super::super::seen::{Arrival, Door, Refusal, TcpAnswer};
+
+/// How long everything is under way.
+const WAY: Duration = Duration::from_millis(1);
+/// How often a peer may do something by itself.
+const BEAT: Duration = Duration::from_millis(100);
+
+/// A peer that does as it is told.
+pub(super) trait Scripted {
+    /// Something was sent, to it or to somebody else.
+    fn hear(&mut self, send: &Send, air: &mut Air);
+    /// A tenth of a second has passed.
+    fn beat(&mut self, _air: &mut Air) {}
+}
+
+/// What happens to the examination.
+#[derive(Debug)]
+enum Happening {
+    Arrived(Arrival),
+    Refused(Refusal),
+    Tcp(TcpAnswer),
+}
+
+/// What is on its way, and the time.
+pub(super) struct Air {
+    pub(super) now: Duration,
+    next_beat: Duration,
+    flying: Vec<(Duration, Happening)>,
+}
+
+impl Air {
+    pub(super) fn new() -> Self {
+        Self {
+            now: Duration::ZERO,
+            next_beat: BEAT,
+            flying: Vec::new(),
+        }
+    }
+
+    pub(super) fn say(&mut self, door: Door, from: SocketAddr, frame: &Frame) {
+        self.say_octets(door, from, judp::encode(frame).unwrap());
+    }
+
+    pub(super) fn say_octets(&mut self, door: Door, from: SocketAddr, datagram: Bytes) {
+        let arrival = Arrival {
+            door,
+            link: 0,
+            from,
+            datagram,
+        };
+        self.flying
+            .push((self.now + WAY, Happening::Arrived(arrival)));
+    }
+
+    pub(super) fn refuse(&mut self) {
+        self.flying
+            .push((self.now + WAY, Happening::Refused(Refusal::Port)));
+    }
+
+    pub(super) fn answer_tcp(&mut self, answer: TcpAnswer) {
+        self.flying.push((self.now + WAY, Happening::Tcp(answer)));
+    }
+
+    /// Lets time pass until the examination is done, or `go_on` says otherwise.
+    pub(super) fn run(
+        &mut self,
+        examiner: &mut Examiner,
+        peer: &mut dyn Scripted,
+        go_on: impl Fn(&Examiner) -> bool,
+    ) {
+        examiner.start(self.now);
+        while !examiner.is_done() && go_on(examiner) {
+            assert!(
+                self.now < Duration::from_secs(120),
+                "it does not come to its end"
+            );
+            self.deliver_sends(examiner, peer);
+            self.step(examiner, peer);
+        }
+    }
+
+    pub(super) fn deliver_sends(&mut self, examiner: &mut Examiner, peer: &mut dyn Scripted) {
+        while let Some(send) = examiner.poll_send() {
+            peer.hear(&send, self);
+        }
+    }
+
+    /// The next thing that happens.
+    fn step(&mut self, examiner: &mut Examiner, peer: &mut dyn Scripted) {
+        self.flying.sort_by_key(|(at, _)| *at);
+        let arrival = self.flying.first().map(|(at, _)| *at);
+        let timeout = examiner.poll_timeout().unwrap();
+        let soonest = timeout.min(self.next_beat);
+        if let Some(at) = arrival.filter(|at| *at <= soonest) {
+            self.now = at;
+            let (_, happening) = self.flying.remove(0);
+            match happening {
+                Happening::Arrived(arrival) => examiner.handle_arrival(self.now, &arrival),
+                Happening::Refused(refusal) => examiner.handle_refusal(self.now, refusal),
+                Happening::Tcp(answer) => examiner.handle_tcp(self.now, answer),
+            }
+        } else if self.next_beat <= timeout {
+            self.now = self.next_beat;
+            self.next_beat += BEAT;
+            peer.beat(self);
+        } else {
+            self.now = timeout;
+            examiner.handle_timeout(self.now);
+        }
+    }
+}
+
+/// A whole examination.
+pub(super) fn examine(settings: Settings, peer: &mut dyn Scripted) -> Examiner {
+    let mut examiner = Examiner::new(settings);
+    Air::new().run(&mut examiner, peer, |_| true);
+    examiner
+}
+
+/// Answers whatever comes with rubbish.
+pub(super) struct Noise(pub(super) Box<dyn FnMut() -> Vec<u8>>);
+
+impl Scripted for Noise {
+    fn hear(&mut self, _: &Send, air: &mut Air) {
+        for door in [Door::Unicast, Door::Group, Door::RaGroup, Door::Probe] {
+            air.say_octets(door, ([10, 0, 0, 2], 3794).into(), (self.0)().into());
+        }
+    }
+}
