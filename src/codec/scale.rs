@@ -187,6 +187,15 @@ pub trait Scaled: Copy {
     const UNIT: &'static str;
     /// The range.
     const SCALE: Scale;
+
+    /// The nearest value that the field can hold.
+    ///
+    /// # Errors
+    /// If the value is outside the range, which includes its limits.
+    fn from_real(value: f64) -> Result<Self, OutOfRange>;
+
+    /// The value in the unit of the field.
+    fn to_real(self) -> f64;
 }
 
 /// A number that a field cannot hold.
@@ -255,6 +264,16 @@ macro_rules! __codec_scaled {
                 <$raw>::MAX as i64,
                 $crate::codec::Rounding::$rounding,
             );
+
+            #[inline]
+            fn from_real(value: f64) -> Result<Self, $crate::codec::OutOfRange> {
+                Self::new(value)
+            }
+
+            #[inline]
+            fn to_real(self) -> f64 {
+                self.value()
+            }
         }
 
         impl $name {

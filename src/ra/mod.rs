@@ -7,6 +7,7 @@
 //! | [`carrier`] | datagrams: the framings "JAUS01.0" and AS5669, addresses, large messages |
 //! | [`node`] | our presence among RA systems: heartbeats, identification, configuration, services |
 //! | [`connection`] | service connections, as the one who reports and as the one who is reported to |
+//! | `convert` | which RA message stands for which of ours, and what cannot be said |
 //! | [`ids`] | which RA id stands for which of ours |
 //!
 //! Ids have four octets here, [`RaId`]: subsystem, node, component and instance, where the number of
@@ -15,6 +16,8 @@
 
 pub mod carrier;
 pub mod connection;
+#[cfg(all(feature = "ra33", feature = "mobility"))]
+pub mod convert;
 mod counters;
 pub mod ids;
 mod message;
