@@ -5,6 +5,9 @@
 
 use crate::codec::{MessageInfo, Registry, ServiceInfo};
 
+#[cfg(feature = "ra33")]
+pub mod ra;
+
 /// The modules of the sets.
 macro_rules! modules {
     ($($(#[$doc:meta])* $set:ident $(if $feature:literal)?;)*) => {

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use jaus::codec::view;
-use jaus::codec::{AnyMessage, MessageInfo, ServiceId};
+use jaus::codec::{AnyMessage, MessageInfo, ServiceId, ServiceInfo};
 use jaus::messages;
 use jsidl::dynamic::{arbitrary, decode, encode, to_json};
 use jsidl::model::{Id, Message, Version};
@@ -26,7 +26,7 @@ use proptest::test_runner::TestRunner;
 
 fn catalogue() -> Library {
     let mut loader = Loader::new();
-    loader.catalogue();
+    loader.catalogue().reference_architecture();
     loader.load().library
 }
 
@@ -39,6 +39,23 @@ fn id(service: &ServiceId) -> Id {
         urn: service.urn.into(),
         version,
     }
+}
+
+/// All generated messages, those of the Reference Architecture too.
+fn every_message() -> impl Iterator<Item = &'static MessageInfo> {
+    #[cfg(feature = "ra33")]
+    return messages::registry()
+        .iter()
+        .chain(messages::ra_registry().iter());
+    #[cfg(not(feature = "ra33"))]
+    messages::registry().iter()
+}
+
+fn every_service() -> impl Iterator<Item = &'static ServiceInfo> {
+    #[cfg(feature = "ra33")]
+    return messages::services().chain(messages::ra_services());
+    #[cfg(not(feature = "ra33"))]
+    messages::services()
 }
 
 /// What a service says about a generated message.
@@ -122,7 +139,7 @@ fn both_codecs_agree_on_every_generated_message() {
     let wanted = std::env::var("JAUS_CASES").ok();
     let wanted = wanted.map_or(24, |cases| cases.parse().unwrap());
     let mut types = 0;
-    for info in messages::registry().iter() {
+    for info in every_message() {
         for service in info.services {
             let message = definition(&library, service, info);
             let cases = if *service == info.services[0] {
@@ -141,15 +158,14 @@ fn both_codecs_agree_on_every_generated_message() {
 #[test]
 fn every_message_of_the_definitions_is_generated() {
     let library = catalogue();
-    let generated: BTreeSet<(ServiceId, u16, &str)> = messages::registry()
-        .iter()
+    let generated: BTreeSet<(ServiceId, u16, &str)> = every_message()
         .flat_map(|info| {
             info.services
                 .iter()
                 .map(|service| (*service, info.code, info.name))
         })
         .collect();
-    for info in messages::services() {
+    for info in every_service() {
         let service = library.service(&id(&info.id)).unwrap();
         for message in service.messages() {
             let key = (info.id, message.code, message.name.as_str());

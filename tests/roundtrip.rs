@@ -20,7 +20,17 @@ mod constructs;
 /// What the service sets have, and what they have not.
 fn every_message() -> impl Iterator<Item = &'static MessageInfo> {
     let constructs = Registry::new(constructs::MESSAGES);
-    messages::registry().iter().chain(constructs.iter())
+    messages::registry()
+        .iter()
+        .chain(reference_architecture())
+        .chain(constructs.iter())
+}
+
+fn reference_architecture() -> impl Iterator<Item = &'static MessageInfo> {
+    #[cfg(feature = "ra33")]
+    return messages::ra_registry().iter();
+    #[cfg(not(feature = "ra33"))]
+    std::iter::empty()
 }
 
 /// Octets that a random message is made from.
@@ -129,7 +139,7 @@ mod people {
     fn definitions() -> HashMap<(String, u16), Message> {
         let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("jsidl/tests/rust");
         let mut loader = Loader::new();
-        loader.catalogue().path(directory);
+        loader.catalogue().reference_architecture().path(directory);
         let loaded = loader.load();
         assert!(loaded.diagnostics.is_empty(), "{}", loaded.diagnostics);
         let mut definitions = HashMap::new();

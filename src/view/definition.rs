@@ -13,7 +13,7 @@ use serde_json::Value as Json;
 
 use super::Unreadable;
 use crate::codec::view::Value;
-use crate::codec::{MessageInfo, ServiceId};
+use crate::codec::{AnyMessage, DecodeError, MessageInfo, ServiceId};
 
 /// One layout of a message, and the services that define it so, the newest first.
 #[derive(Debug)]
@@ -25,6 +25,9 @@ pub(super) struct Definition {
 #[derive(Debug)]
 enum Codec {
     Generated(&'static MessageInfo),
+    /// A generated type of the Reference Architecture, read with its peers' habits in mind.
+    #[cfg(feature = "ra33")]
+    Ra(&'static MessageInfo),
     Dynamic(Arc<Message>),
 }
 
@@ -97,6 +100,16 @@ pub(super) fn parse_version(text: &str) -> Result<Version, Unreadable> {
 impl Definition {
     /// A generated type.
     pub(super) fn generated(info: &'static MessageInfo) -> Self {
+        Self::of_type(info, Codec::Generated(info))
+    }
+
+    /// A generated type of the Reference Architecture.
+    #[cfg(feature = "ra33")]
+    pub(super) fn ra(info: &'static MessageInfo) -> Self {
+        Self::of_type(info, Codec::Ra(info))
+    }
+
+    fn of_type(info: &MessageInfo, codec: Codec) -> Self {
         let id = |id: &ServiceId| Id {
             urn: id.urn.into(),
             version: Version {
@@ -106,7 +119,7 @@ impl Definition {
         };
         Self {
             services: info.services.iter().map(id).collect(),
-            codec: Codec::Generated(info),
+            codec,
         }
     }
 
@@ -124,31 +137,43 @@ impl Definition {
         matches!(self.codec, Codec::Dynamic(_)) && newest >= Some(version)
     }
 
+    /// The generated type, or the definition that was loaded.
+    fn info(&self) -> Result<&'static MessageInfo, &Message> {
+        match &self.codec {
+            Codec::Generated(info) => Ok(info),
+            #[cfg(feature = "ra33")]
+            Codec::Ra(info) => Ok(info),
+            Codec::Dynamic(message) => Err(message),
+        }
+    }
+
     pub(super) fn belongs_to(&self, service: &ServiceName) -> bool {
         self.services.iter().any(|known| service.matches(known))
     }
 
     pub(super) fn name(&self) -> &str {
-        match &self.codec {
-            Codec::Generated(info) => info.name,
-            Codec::Dynamic(message) => &message.name,
+        match self.info() {
+            Ok(info) => info.name,
+            Err(message) => &message.name,
         }
     }
 
     pub(super) fn code(&self) -> u16 {
-        match &self.codec {
-            Codec::Generated(info) => info.code,
-            Codec::Dynamic(message) => message.code,
+        match self.info() {
+            Ok(info) => info.code,
+            Err(message) => message.code,
         }
     }
 
     pub(super) fn decode(&self, octets: &Bytes) -> Result<Body, Unreadable> {
+        let generated = |message: Result<Box<dyn AnyMessage>, DecodeError>| match message {
+            Ok(message) => Ok(Body::Generated(message.view())),
+            Err(error) => Err(Unreadable::new(error.to_string(), error.offset())),
+        };
         match &self.codec {
-            Codec::Generated(info) => {
-                let message = (info.decode)(octets)
-                    .map_err(|error| Unreadable::new(error.to_string(), error.offset()))?;
-                Ok(Body::Generated(message.view()))
-            }
+            Codec::Generated(info) => generated((info.decode)(octets)),
+            #[cfg(feature = "ra33")]
+            Codec::Ra(info) => generated(crate::messages::ra::forgiving(octets, info.decode)),
             Codec::Dynamic(message) => {
                 let value = dynamic::decode(message, octets)
                     .map_err(|error| Unreadable::new(error.to_string(), error.offset))?;
@@ -160,14 +185,14 @@ impl Definition {
     }
 
     pub(super) fn encode(&self, body: &Json) -> Result<Bytes, String> {
-        match &self.codec {
-            Codec::Generated(info) => {
+        match self.info() {
+            Ok(info) => {
                 let named = |problem: String| format!("{}: {problem}", info.name);
                 let body = Value::deserialize(body).map_err(|error| named(error.to_string()))?;
                 let message = (info.from_view)(&body).map_err(|error| named(error.to_string()))?;
                 message.encode().map_err(|error| error.to_string())
             }
-            Codec::Dynamic(message) => {
+            Err(message) => {
                 let value = dynamic::from_json(message, body).map_err(|error| error.to_string())?;
                 let octets = dynamic::encode(message, &value).map_err(|error| error.to_string())?;
                 Ok(octets.into())

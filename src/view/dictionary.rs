@@ -30,6 +30,8 @@ use crate::messages;
 #[derive(Debug)]
 pub struct Dictionary {
     by_code: BTreeMap<u16, Vec<Definition>>,
+    /// The Reference Architecture's, whose codes are those of other layouts in `by_code`.
+    ra: BTreeMap<u16, Definition>,
     preferred: Vec<ServiceName>,
 }
 
@@ -103,6 +105,7 @@ impl Dictionary {
         }
         Self {
             by_code,
+            ra: reference_architecture(),
             preferred: Vec::new(),
         }
     }
@@ -235,6 +238,18 @@ impl Dictionary {
                 Reading::unknown(Some(code), Unreadable::new(problem, 0))
             }
         }
+    }
+
+    /// Looks a message of the Reference Architecture up; `None` if its code is unknown there.
+    pub(super) fn read_ra(&self, octets: &Bytes) -> Option<Reading<'_>> {
+        let code = u16::from_le_bytes(*octets.first_chunk()?);
+        let definition = self.ra.get(&code)?;
+        Some(self.reading(code, 0, definition, definition.decode(octets)))
+    }
+
+    /// The name of the Reference Architecture's message with this code.
+    pub(super) fn ra_name_of(&self, code: u16) -> Option<&str> {
+        self.ra.get(&code).map(Definition::name)
     }
 
     /// The message as a line without transport keys.
@@ -377,6 +392,18 @@ impl<'d> Reading<'d> {
             body: Err(unreadable),
         }
     }
+}
+
+/// The Reference Architecture's messages, if this crate was generated with them.
+fn reference_architecture() -> BTreeMap<u16, Definition> {
+    #[cfg(feature = "ra33")]
+    let infos = messages::ra_registry().iter();
+    #[cfg(feature = "ra33")]
+    return infos
+        .map(|info| (info.code, Definition::ra(info)))
+        .collect();
+    #[cfg(not(feature = "ra33"))]
+    BTreeMap::new()
 }
 
 /// Whether a service is one of those that come with the crate.

@@ -155,11 +155,23 @@ impl Header {
         }
     }
 
+    /// Whether the message is one of the Reference Architecture, by its header and its source.
+    ///
+    /// The two older headers carry both kinds: OpenJAUS's messages of the Reference Architecture,
+    /// and messages of the services, which Junior and its like send through them. Nothing in the
+    /// header says which. But the first of the four numbers of an id in the Reference Architecture
+    /// is never 0, and among ids with three numbers only those of subsystems from 256 on have
+    /// another octet there.
+    pub(super) fn is_ra(&self) -> bool {
+        self.transport != Version::As5669a && RaId::from(self.source).subsystem != 0
+    }
+
     /// `42.1.1`; the Reference Architecture's ids have four parts.
     fn id(&self, id: JausId) -> String {
-        match self.transport {
-            Version::Ra => RaId::from(id).to_string(),
-            Version::As5669a | Version::As5669 => id.to_string(),
+        if self.transport == Version::Ra || self.is_ra() {
+            RaId::from(id).to_string()
+        } else {
+            id.to_string()
         }
     }
 }

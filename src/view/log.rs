@@ -93,7 +93,7 @@ impl<'d> MessageLog<'d> {
             lines.push(self.fragment(envelope, frame));
             lines.extend(self.whole(time, frame));
         } else {
-            lines.push(self.line(envelope, frame.version, &frame.payload));
+            lines.push(self.line(envelope, &frame.payload));
         }
     }
 
@@ -113,18 +113,36 @@ impl<'d> MessageLog<'d> {
             time,
             header: Some(Header::of(frame)),
         };
-        Some(self.line(envelope, frame.version, &frame.payload))
+        Some(self.line(envelope, &frame.payload))
     }
 
     /// A message that is here as a whole.
-    fn line(&self, envelope: Envelope, version: Version, octets: &Bytes) -> Line<'d> {
-        if version == Version::Ra {
-            // The Reference Architecture's messages share codes and names with the services' but
-            // not layouts: reading them by the services' definitions would invent values.
-            let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
-            return self.bare(envelope, code, Content::Octets(octets.clone()));
-        }
-        Line::of_reading(Some(envelope), self.dictionary.read(octets), octets)
+    fn line(&self, envelope: Envelope, octets: &Bytes) -> Line<'d> {
+        let transport = envelope.header.as_ref().map(|header| header.transport);
+        let reading = self.ra(&envelope).and_then(|ra| ra.read_ra(octets));
+        let reading = match (reading, transport) {
+            (Some(reading), _) if reading.body.is_ok() => reading,
+            (Some(reading), Some(Version::Ra)) => reading,
+            (None, Some(Version::Ra)) => {
+                // The Reference Architecture's messages share codes and names with the services'
+                // but not layouts: reading them by the services' definitions would invent values.
+                let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
+                return self.bare(envelope, code, Content::Octets(octets.clone()));
+            }
+            // Through the other older header, a message of the services may come from a subsystem
+            // that looks like one of the Reference Architecture.
+            (of_ra, _) => {
+                let reading = self.dictionary.read(octets);
+                of_ra.filter(|_| reading.body.is_err()).unwrap_or(reading)
+            }
+        };
+        Line::of_reading(Some(envelope), reading, octets)
+    }
+
+    /// The dictionary, if the message may be one of the Reference Architecture.
+    fn ra(&self, envelope: &Envelope) -> Option<&'d Dictionary> {
+        let is_ra = envelope.header.as_ref().is_some_and(Header::is_ra);
+        is_ra.then_some(self.dictionary)
     }
 
     fn fragment(&self, envelope: Envelope, frame: &Frame) -> Line<'d> {
@@ -146,20 +164,26 @@ impl<'d> MessageLog<'d> {
                 ..Header::of(frame)
             }),
         };
-        let line = self.line(envelope.clone(), frame.version, &whole.plain);
+        let line = self.line(envelope.clone(), &whole.plain);
         let Some(octets) = whole.without_repeated_code.filter(|_| line.is_error()) else {
             return Some(line);
         };
-        let other = self.line(envelope, frame.version, &octets);
+        let other = self.line(envelope, &octets);
         Some(if other.is_error() { line } else { other })
     }
 
     /// A line without body.
     fn bare(&self, envelope: Envelope, code: Option<u16>, content: Content) -> Line<'d> {
+        let name = |code| {
+            let ra = self.ra(&envelope);
+            ra.and_then(|ra| ra.ra_name_of(code))
+                .or_else(|| self.dictionary.name_of(code))
+        };
+        let message = code.and_then(name);
         Line {
             envelope: Some(envelope),
             code,
-            message: code.and_then(|code| self.dictionary.name_of(code)),
+            message,
             service: None,
             version: None,
             content,

@@ -21,5 +21,6 @@ macro_rules! constructs {
 }
 
 constructs!(
-    arrays, bits, composites, machines, measures, names, numbers, octets, sections, versions
+    arrays, bits, centred, composites, machines, measures, names, numbers, octets, sections,
+    versions
 );

@@ -325,6 +325,31 @@ mod tests {
     }
 
     #[test]
+    fn the_zero_of_a_signed_integer_is_the_centre_of_its_range() {
+        let steps = |lower, upper, signed| {
+            let range = scale(lower, upper, Rounding::Round);
+            Steps::of(&range, Number::Signed(signed)).unwrap()
+        };
+        let height = steps(-10000.0, 35000.0, Signed::I32);
+        for (raw, real) in [
+            (0, 12500.0),
+            (i64::from(i32::MAX), 35000.0),
+            (-i64::from(i32::MAX), -10000.0),
+        ] {
+            assert_eq!(height.shown(Raw::Signed(raw)), Some(real));
+            assert_eq!(height.raw(real), Some(Raw::Signed(raw)));
+        }
+        assert_eq!(height.raw(35000.1), None);
+        let octet = steps(-127.0, 127.0, Signed::I8);
+        for raw in -128..=127 {
+            let real = octet.shown(Raw::Signed(raw)).unwrap();
+            assert_eq!(real, raw as f64);
+            assert_eq!(octet.raw(real), Some(Raw::Signed(raw)));
+        }
+        assert_eq!(octet.shown(Raw::Unsigned(1)), None);
+    }
+
+    #[test]
     fn every_octet_comes_back_from_its_shortest_decimal() {
         for rounding in [Rounding::Round, Rounding::Floor, Rounding::Ceiling] {
             for (lower, upper) in [(0.0, 100.0), (-0.3, 0.7), (-1e-9, 1e9), (99.9, 100.1)] {

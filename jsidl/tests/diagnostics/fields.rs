@@ -58,6 +58,30 @@ t.xml:4:55: error: the constant `constants.E` is not declared: declare it in a `
 }
 
 #[test]
+fn a_range_around_zero_needs_a_signed_integer_of_at_most_four_octets() {
+    let range = |field_type: &str, bias: &str| {
+        types(&format!(
+            r#"<fixed_field name="F" field_type="{field_type}" field_units="one">
+<scale_range xmlns:own="urn:jaus-rs:jsidl" own:bias="{bias}" real_lower_limit="0" real_upper_limit="1" integer_function="round"/>
+</fixed_field>"#
+        ))
+    };
+    check(&range("short integer", "centre"), "");
+    check(
+        &range("unsigned short integer", "centre"),
+        "t.xml:4:1: error: only the range of a signed integer has its zero in the centre: change the `field_type`, or remove the attribute `bias`",
+    );
+    check(
+        &range("long integer", "centre"),
+        "t.xml:4:1: error: a real number cannot tell the steps of a scaled `long integer` apart: use `integer`",
+    );
+    check(
+        &range("short integer", "lower"),
+        "t.xml:4:54: error: `lower` is not a value of `bias`: use `centre`",
+    );
+}
+
+#[test]
 fn values_fit_the_field_and_differ() {
     check(
         &types(
