@@ -93,10 +93,10 @@ impl Carrier {
         &mut self,
         now: Instant,
         from: SocketAddr,
-        datagram: &Bytes,
+        datagram: Bytes,
     ) -> Vec<Message> {
         self.counters.add(Counter::DatagramsReceived);
-        let dialect = match packet::dialect(datagram) {
+        let dialect = match packet::dialect(&datagram) {
             Ok(dialect) => dialect,
             Err(reason) => {
                 self.counters.add(reason);

@@ -7,7 +7,7 @@
 //! may share a datagram; the length that stands in front of each is written by all and read by
 //! nobody, so the header's size counts.
 
-use bytes::{BufMut, Bytes, BytesMut};
+use bytes::{Buf, BufMut, Bytes, BytesMut};
 
 use super::Dialect;
 use crate::ra::Counter;
@@ -34,15 +34,16 @@ pub(super) fn dialect(datagram: &[u8]) -> Result<Dialect, Counter> {
     }
 }
 
-/// The packets of a datagram; behind the first that cannot be read there are no more.
+/// The packets of a datagram that is written in that framing; behind the first that cannot be read there are no more.
 pub(super) fn packets(
     dialect: Dialect,
-    datagram: &Bytes,
-) -> impl Iterator<Item = Result<Packet, Counter>> + use<> {
-    let mut rest = match dialect {
-        Dialect::Opc => datagram.slice(PREFIX.len()..),
-        Dialect::As5669 => datagram.slice(1..),
-    };
+    datagram: Bytes,
+) -> impl Iterator<Item = Result<Packet, Counter>> {
+    let mut rest = datagram;
+    rest.advance(match dialect {
+        Dialect::Opc => PREFIX.len(),
+        Dialect::As5669 => 1,
+    });
     let mut begun = false;
     std::iter::from_fn(move || {
         if begun && rest.is_empty() {

@@ -21,6 +21,10 @@ fn from(host: u8) -> SocketAddr {
     SocketAddr::from(([10, 77, 0, host], 40_000))
 }
 
+fn hear(carrier: &mut Carrier, now: Instant, host: u8, datagram: &Bytes) -> Vec<Message> {
+    carrier.handle_datagram(now, from(host), datagram.clone())
+}
+
 fn carrier(settings: Settings) -> Carrier {
     let mut carrier = Carrier::new(settings);
     carrier.set_components(US.subsystem, [US, RaId::new(30, 1, 1, 1)]);
@@ -58,7 +62,7 @@ fn packet(fields: Fields, data: &[u8]) -> Bytes {
 fn counted(datagram: &[u8]) -> Vec<Counter> {
     let mut carrier = carrier(Settings::default());
     let datagram = Bytes::copy_from_slice(datagram);
-    carrier.handle_datagram(start(), from(1), &datagram);
+    hear(&mut carrier, start(), 1, &datagram);
     let counted = carrier.counters().iter().filter(|&(_, number)| number > 0);
     counted.map(|(counter, _)| counter).skip(1).collect()
 }
@@ -71,7 +75,7 @@ fn what_was_recorded_from_openjaus_is_read_and_answered_in_its_framing() {
     for recorded in [opc.as_slice(), judp] {
         let mut carrier = carrier(Settings::default());
         let recorded = Bytes::copy_from_slice(recorded);
-        let messages = carrier.handle_datagram(start(), from(1), &recorded);
+        let messages = hear(&mut carrier, start(), 1, &recorded);
         let [query] = messages.as_slice() else {
             panic!("{messages:?}")
         };
@@ -149,12 +153,7 @@ fn older_versions_are_taken_where_configured() {
     let mut carrier = carrier(settings);
     let mut octets = packet(fields(), &[]).to_vec();
     octets[9] = 1;
-    assert_eq!(
-        carrier
-            .handle_datagram(start(), from(1), &octets.into())
-            .len(),
-        1
-    );
+    assert_eq!(hear(&mut carrier, start(), 1, &octets.into()).len(), 1);
 }
 
 #[test]
@@ -164,12 +163,7 @@ fn as5669_datagrams_hold_several_messages() {
     datagram.extend_from_slice(&one[1..]);
     datagram.extend_from_slice(&[0, 0, 0]);
     let mut carrier = carrier(Settings::default());
-    assert_eq!(
-        carrier
-            .handle_datagram(start(), from(1), &datagram.into())
-            .len(),
-        2
-    );
+    assert_eq!(hear(&mut carrier, start(), 1, &datagram.into()).len(), 2);
     assert_eq!(carrier.counters().get(Counter::TooShort), 1);
 }
 
@@ -198,7 +192,7 @@ fn large_messages_are_cut_as_openjaus_does_and_put_together_again() {
         let mut carrier = carrier(Settings::default());
         let whole: Vec<_> = parts
             .iter()
-            .flat_map(|part| carrier.handle_datagram(start(), from(1), part))
+            .flat_map(|part| hear(&mut carrier, start(), 1, part))
             .collect();
         let [message] = whole.as_slice() else {
             panic!("{length}: {whole:?}")
@@ -219,11 +213,7 @@ fn middle_parts_may_swap_and_come_twice() {
     let data = vec![7; 4 * MAX_DATA + 1];
     let parts = parts_of(&data, Acknowledgement::None);
     let mut carrier = carrier(Settings::default());
-    let mut arrive = |part: usize| {
-        carrier
-            .handle_datagram(start(), from(1), &parts[part])
-            .len()
-    };
+    let mut arrive = |part: usize| hear(&mut carrier, start(), 1, &parts[part]).len();
     let whole: usize = [0, 3, 1, 1, 4, 2].into_iter().map(&mut arrive).sum();
     assert_eq!(whole, 1);
 }
@@ -234,12 +224,12 @@ fn parts_that_contradict_each_other_are_no_message() {
     let other = parts_of(&[8; 3 * MAX_DATA], Acknowledgement::None);
     let mut carrier = carrier(Settings::default());
     for part in [&parts[0], &parts[1], &other[1], &parts[2]] {
-        assert!(carrier.handle_datagram(start(), from(1), part).is_empty());
+        assert!(hear(&mut carrier, start(), 1, part).is_empty());
     }
     assert_eq!(carrier.counters().get(Counter::PartOutOfOrder), 2);
     assert_eq!(carrier.unfinished(), 0);
     for part in &other {
-        carrier.handle_datagram(start(), from(1), part);
+        hear(&mut carrier, start(), 1, part);
     }
     assert_eq!(carrier.counters().get(Counter::MessagesReceived), 1);
 }
@@ -262,7 +252,7 @@ fn fragments_that_never_end_are_bounded_and_time_out() {
                 data_flag: 1,
                 ..fields()
             };
-            carrier.handle_datagram(now, from(subsystem), &packet(first, &[0; MAX_DATA]));
+            hear(&mut carrier, now, subsystem, &packet(first, &[0; MAX_DATA]));
             assert!(carrier.unfinished() <= 120_000);
         }
     }
@@ -280,9 +270,9 @@ fn fragments_that_never_end_are_bounded_and_time_out() {
         };
         packet(fields, &[0; MAX_DATA])
     };
-    carrier.handle_datagram(now, from(1), &part(1, 0));
+    hear(&mut carrier, now, 1, &part(1, 0));
     for number in 1..100 {
-        carrier.handle_datagram(now, from(1), &part(2, number));
+        hear(&mut carrier, now, 1, &part(2, number));
     }
     let dropped = carrier.counters().get(Counter::PartsForgotten);
     assert!(dropped > 700 && carrier.unfinished() <= 50_000);
@@ -296,7 +286,7 @@ fn what_wants_an_acknowledgement_gets_one_if_it_is_for_one_of_us() {
         sequence: 0x1234,
         ..fields()
     };
-    let messages = carrier.handle_datagram(start(), from(1), &packet(wanted, &[9]));
+    let messages = hear(&mut carrier, start(), 1, &packet(wanted, &[9]));
     assert!(messages[0].acknowledge);
     let answer = carrier.poll_transmit().unwrap().datagram;
     let expected = Fields {
@@ -311,9 +301,7 @@ fn what_wants_an_acknowledgement_gets_one_if_it_is_for_one_of_us() {
         ..wanted
     };
     assert_eq!(
-        carrier
-            .handle_datagram(start(), from(1), &packet(to_all, &[]))
-            .len(),
+        hear(&mut carrier, start(), 1, &packet(to_all, &[])).len(),
         1
     );
     assert_eq!(carrier.poll_transmit(), None);
@@ -321,11 +309,7 @@ fn what_wants_an_acknowledgement_gets_one_if_it_is_for_one_of_us() {
         acknowledgement: Acknowledgement::Positive,
         ..fields()
     };
-    assert!(
-        carrier
-            .handle_datagram(start(), from(1), &packet(answers, &[]))
-            .is_empty()
-    );
+    assert!(hear(&mut carrier, start(), 1, &packet(answers, &[])).is_empty());
     assert_eq!(carrier.counters().get(Counter::AcknowledgementsReceived), 1);
 }
 
@@ -333,11 +317,11 @@ fn what_wants_an_acknowledgement_gets_one_if_it_is_for_one_of_us() {
 fn a_subsystem_is_believed_at_one_address_until_it_is_silent() {
     let (now, mut carrier) = (start(), carrier(Settings::default()));
     let heard = packet(fields(), &[]);
-    carrier.handle_datagram(now, from(1), &heard);
-    assert!(carrier.handle_datagram(now, from(2), &heard).is_empty());
+    hear(&mut carrier, now, 1, &heard);
+    assert!(hear(&mut carrier, now, 2, &heard).is_empty());
     assert_eq!(carrier.counters().get(Counter::AddressConflict), 1);
     let later = now + Duration::from_secs(5);
-    assert_eq!(carrier.handle_datagram(later, from(2), &heard).len(), 1);
+    assert_eq!(hear(&mut carrier, later, 2, &heard).len(), 1);
     let address = SocketAddr::from(([10, 77, 0, 2], 3794));
     assert_eq!(carrier.address(PEER.subsystem), Some(address));
 }
@@ -353,7 +337,12 @@ fn nobody_can_invent_subsystems_without_end() {
     for host in [1, 2] {
         for subsystem in 1..=254 {
             let source = RaId::new(subsystem, 1, 35, 1);
-            carrier.handle_datagram(now, from(host), &packet(Fields { source, ..fields() }, &[]));
+            hear(
+                &mut carrier,
+                now,
+                host,
+                &packet(Fields { source, ..fields() }, &[]),
+            );
         }
     }
     assert_eq!(carrier.known(), 20);
@@ -371,7 +360,7 @@ fn everybody_is_told_in_every_framing_that_is_spoken() {
     assert_eq!((sent.to, sent.datagram[0]), (To::Group, b'J'));
     assert_eq!(carrier.poll_transmit(), None);
     let judp = packet::datagram(Dialect::As5669, &Header::new(&fields()), &[]);
-    carrier.handle_datagram(start(), from(1), &judp);
+    hear(&mut carrier, start(), 1, &judp);
     carrier.send(&heartbeat).unwrap();
     let first: Vec<_> = std::iter::from_fn(|| carrier.poll_transmit())
         .map(|sent| sent.datagram[0])
@@ -388,7 +377,7 @@ fn what_cannot_be_sent_says_why() {
     });
     let message = Message::new(US, PEER, 1, Bytes::new());
     assert_eq!(carrier.send(&message), Err(SendError::Unknown(10)));
-    carrier.handle_datagram(start(), from(1), &packet(fields(), &[]));
+    hear(&mut carrier, start(), 1, &packet(fields(), &[]));
     let nobody = Message {
         source: PEER,
         ..message.clone()

@@ -225,9 +225,11 @@ impl RaNode {
             return;
         }
         peer.refresh(now, &self.settings);
+        self.greet(now, subsystem);
         self.ask(now, subsystem);
+        let asks = !self.own.is_empty();
         if let Some(peer) = self.peers.get_mut(&subsystem) {
-            peer.schedule(self.settings.silence);
+            peer.schedule(self.settings.silence, asks);
             if peer.take_news() {
                 self.news.insert(subsystem);
             }

@@ -20,6 +20,7 @@ mod peer;
 mod settings;
 mod subscriptions;
 mod subsystem;
+mod tell;
 #[cfg(test)]
 mod tests;
 
@@ -33,15 +34,15 @@ pub use settings::Settings;
 pub use subsystem::{BadSubsystem, Command, Component, Node, Service, Subsystem, Where};
 
 use super::carrier::{Carrier, SendError, Transmit};
-use super::{Counter, Counters, Message, RaId};
+use super::{Counter, Counters, Message};
 use crate::codec::Message as _;
 use crate::endpoint::Buckets;
 use crate::messages::ra33::{
     CancelEvent, CreateEvent, QueryConfiguration, QueryHeartbeatPulse, QueryIdentification,
-    QueryServices, ReportConfiguration, ReportHeartbeatPulse,
+    QueryServices, ReportHeartbeatPulse,
 };
 use own::Own;
-use peer::Peer;
+use peer::{Peer, Question};
 
 /// Our presence among RA systems. See the [module](self).
 #[derive(Debug)]
@@ -95,7 +96,7 @@ impl RaNode {
 
     /// A datagram has come.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: Bytes) {
-        for message in self.carrier.handle_datagram(now, from, &datagram) {
+        for message in self.carrier.handle_datagram(now, from, datagram) {
             self.handle_message(now, message);
         }
     }
@@ -145,31 +146,6 @@ impl RaNode {
         }
     }
 
-    /// Tells everybody that a subsystem of ours is there, if it is time to.
-    fn heartbeat(&mut self, now: Instant, subsystem: u8) {
-        let Some(own) = self.own.get_mut(&subsystem) else {
-            return;
-        };
-        if own.next_heartbeat > now {
-            return;
-        }
-        own.next_heartbeat = now + self.settings.heartbeat;
-        let everybody = RaId::new(RaId::ALL, RaId::ALL, RaId::NODE_MANAGER, 1);
-        let code = ReportHeartbeatPulse::CODE;
-        let heartbeat = Message::new(own.communicator(), everybody, code, Bytes::new());
-        self.transmit(&heartbeat);
-    }
-
-    /// Tells what has changed in a subsystem of ours, if it is time to.
-    fn tell_changes(&mut self, now: Instant, subsystem: u8) {
-        if let Some(own) = self.own.get_mut(&subsystem)
-            && own.tell.is_some_and(|tell| tell <= now)
-        {
-            own.tell = None;
-            self.tell_subscribers(subsystem, false);
-        }
-    }
-
     /// Shows a subsystem, or tells that something about it has changed. Node managers (1.1 in each
     /// node) and the communicator (35.1 in the first) are added where they are missing, and
     /// answer by themselves.
@@ -207,35 +183,19 @@ impl RaNode {
     /// Shows a subsystem no more, and says so.
     pub fn withdraw(&mut self, now: Instant, subsystem: u8) {
         let asker = self.asker();
-        self.tell_subscribers(subsystem, true);
-        let Some(own) = self.own.get(&subsystem) else {
-            return;
-        };
-        let told: BTreeSet<_> = own
-            .subscriptions
-            .values()
-            .map(|s| s.client().subsystem)
-            .collect();
-        let from = own.communicator();
-        let others = self.peers.iter().filter(|(id, _)| !told.contains(id));
-        let managers = others.map(|(_, peer)| RaId {
-            component: RaId::NODE_MANAGER,
-            ..peer.communicator
-        });
-        let managers: Vec<_> = managers.collect();
-        for manager in managers {
-            let nothing = ReportConfiguration::default();
-            if let Ok(goodbye) = Message::with_body(from, manager, &nothing) {
-                self.transmit(&goodbye);
-            }
-        }
+        self.tell_all(subsystem, true);
         self.own.remove(&subsystem);
         self.carrier.set_components(subsystem, []);
-        if asker != self.asker() {
-            for peer in self.peers.values_mut() {
+        if asker == self.asker() {
+            return;
+        }
+        let peers: Vec<_> = self.peers.keys().copied().collect();
+        for id in peers {
+            if let Some(peer) = self.peers.get_mut(&id) {
                 peer.subscribed = false;
-                peer.wonder(now, peer::Question::Subscription);
+                peer.wonder(now, Question::Subscription);
             }
+            self.serve(now, id);
         }
     }
 

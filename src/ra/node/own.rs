@@ -112,7 +112,9 @@ impl Own {
 /// As much of a name as fits 80 octets with a zero behind it, which readers may look for.
 fn short(name: &str) -> &str {
     const LONGEST: usize = 79;
-    &name[..name.floor_char_boundary(LONGEST)]
+    let ends = name.char_indices().map(|(at, c)| at + c.len_utf8());
+    let end = ends.take_while(|&end| end <= LONGEST).last();
+    &name[..end.unwrap_or(0)]
 }
 
 fn listed(node: &Node) -> report_configuration::NodeSeq {

@@ -55,6 +55,8 @@ pub(super) struct Peer {
     questions: BTreeMap<Question, Attempts>,
     next_refresh: Instant,
     next_review: Instant,
+    /// When it is told what we show, if it has not asked for that by then.
+    pub(super) greet: Option<Instant>,
     /// When there is something to do.
     pub(super) next: Instant,
 }
@@ -75,10 +77,20 @@ impl Peer {
             questions: BTreeMap::new(),
             next_refresh: now + settings.refresh,
             next_review: now + settings.review,
+            greet: Some(now + settings.silence),
             next: now,
         };
         peer.wonder(now, Question::Subsystem);
         peer
+    }
+
+    /// Its node manager beside the communicator.
+    pub(super) fn manager(&self) -> RaId {
+        RaId {
+            component: RaId::NODE_MANAGER,
+            instance: 1,
+            ..self.communicator
+        }
     }
 
     /// Puts a question on the list, unless it is there.
@@ -158,13 +170,18 @@ impl Peer {
         }
     }
 
-    /// Sets when there is something to do again.
-    pub(super) fn schedule(&mut self, silence: Duration) {
-        let question = self.questions.values().map(|attempts| attempts.next).min();
-        self.next = (self.heard + silence)
-            .min(self.next_refresh)
-            .min(self.next_review)
-            .min(question.unwrap_or(self.next_refresh));
+    /// Sets when there is something to do again. Questions wait while there is nobody who `asks`.
+    pub(super) fn schedule(&mut self, silence: Duration, asks: bool) {
+        let questions = self.questions.values().map(|attempts| attempts.next);
+        let question = questions.min().filter(|_| asks);
+        let times = [
+            Some(self.next_refresh),
+            Some(self.next_review),
+            question,
+            self.greet,
+        ];
+        let times = times.into_iter().flatten();
+        self.next = times.fold(self.heard + silence, Instant::min);
     }
 
     /// Whether the owner can be told of it: all that it was asked is answered, or was asked in vain.

@@ -1,19 +1,16 @@
-//! Who wants to be told when what we show changes, and telling them.
-//!
-//! OpenJAUS asks each question anew, of every component, for each change that it is told. So
-//! changes that come close together are gathered and told once.
+//! Who wants to be told when what we show changes.
 
 use std::time::Instant;
 
 use super::RaNode;
-use crate::codec::Message as _;
+use crate::codec::{EncodeError, Message as _};
 use crate::messages::ra33::confirm_event_request::ResponseCode;
 use crate::messages::ra33::query_configuration::QueryField;
 use crate::messages::ra33::{
     CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryConfiguration, ReportConfiguration,
 };
-use crate::ra::carrier::SendError;
 use crate::ra::{Counter, Message, RaId};
+use crate::wire::ra::CODE_LEN;
 
 /// Somebody who wants to be told of changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +27,28 @@ pub(super) struct Subscription {
 impl Subscription {
     pub(super) fn client(&self) -> RaId {
         self.client
+    }
+
+    /// The question whose answer it wants to be told, and of whom it was asked.
+    pub(super) fn question(&self) -> (RaId, QueryConfiguration) {
+        let query_field = self.about;
+        (self.at, QueryConfiguration { query_field })
+    }
+
+    /// The event that tells a report.
+    pub(super) fn event(
+        &mut self,
+        event_id: u8,
+        report: &ReportConfiguration,
+    ) -> Result<Message, EncodeError> {
+        let body = Event {
+            event_id,
+            report_code: ReportConfiguration::CODE,
+            sequence_number: self.sequence,
+            report_message: report.encode()?.slice(CODE_LEN..),
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        Message::with_body(self.at, self.client, &body)
     }
 }
 
@@ -166,56 +185,6 @@ impl RaNode {
     /// answers nothing.
     fn is_ours_alone(&self, destination: RaId) -> bool {
         [RaId::NODE_MANAGER, RaId::COMMUNICATOR].contains(&destination.component)
-    }
-
-    /// Tells those who want to know how a subsystem of ours is now; with `gone`, that it is not any
-    /// more.
-    pub(super) fn tell_subscribers(&mut self, subsystem: u8, gone: bool) {
-        let Some(own) = self.own.get_mut(&subsystem) else {
-            return;
-        };
-        let mut unknown = Vec::new();
-        let mut events = Vec::new();
-        let described: Vec<_> = own
-            .subscriptions
-            .iter()
-            .filter_map(|(&event, known)| {
-                let query = QueryConfiguration {
-                    query_field: known.about,
-                };
-                let report = own.configuration(known.at, &query)?;
-                let report = if gone {
-                    ReportConfiguration::default()
-                } else {
-                    report
-                };
-                Some((event, report.encode().ok()?.slice(2..)))
-            })
-            .collect();
-        for (event, report_message) in described {
-            let Some(known) = own.subscriptions.get_mut(&event) else {
-                continue;
-            };
-            let body = Event {
-                event_id: event,
-                report_code: ReportConfiguration::CODE,
-                sequence_number: known.sequence,
-                report_message,
-            };
-            known.sequence = known.sequence.wrapping_add(1);
-            if let Ok(message) = Message::with_body(known.at, known.client, &body) {
-                events.push((event, message));
-            }
-        }
-        for (event, message) in events {
-            if let Err(SendError::Unknown(_)) = self.carrier.send(&message) {
-                unknown.push(event);
-            }
-        }
-        if let Some(own) = self.own.get_mut(&subsystem) {
-            own.subscriptions
-                .retain(|event, _| !unknown.contains(event));
-        }
     }
 
     /// Forgets what a subsystem wanted to be told.

@@ -206,3 +206,38 @@ fn what_cannot_be_shown_says_why() {
         "subsystem 10 is there already, at 10.77.0.1: give ours another number"
     );
 }
+
+#[test]
+fn who_shows_nothing_asks_nothing_and_sleeps() {
+    let mut world = World::of_vehicles(2);
+    world.seconds(3);
+    let node = &mut world.hosts[0].node;
+    node.withdraw(world.now, 10);
+    while node.poll_transmit().is_some() {}
+    world.hosts.truncate(1);
+    let before = world.sent;
+    world.seconds(60);
+    assert_eq!(world.sent, before);
+    assert_eq!(world.hosts[0].node.poll_timeout(), None);
+}
+
+#[test]
+fn questions_go_on_in_the_name_of_the_next_subsystem() {
+    let mut world = World::of_vehicles(2);
+    world.hosts[0]
+        .node
+        .announce(world.now, vehicle(11))
+        .unwrap();
+    world.seconds(3);
+    world.hosts[0].node.withdraw(world.now, 10);
+    world.seconds(1);
+    world.events(0);
+    let mut less = vehicle(20);
+    less.nodes[0].components.pop();
+    world.hosts[1].node.announce(world.now, less).unwrap();
+    world.seconds(1);
+    assert!(
+        matches!(&world.events(0)[..], [Event::Changed(_)]),
+        "told at once"
+    );
+}

@@ -209,3 +209,29 @@ fn events_of_other_kinds_are_refused_by_managers() {
     assert_eq!(rig.count(Counter::Malformed), 1);
     assert_eq!(rig.count(Counter::EventRefused), 3);
 }
+
+#[test]
+fn who_knows_us_from_before_is_told_what_we_show_without_asking() {
+    let mut rig = Rig::new(Settings::default());
+    let mut told = Vec::new();
+    for step in 0..100 {
+        rig.hear(1, THEIR_COMMUNICATOR, EVERYBODY, 0x4202, &[]);
+        if step == 1 {
+            let configuration = [1, 1, 2, 1, 1, 35, 1];
+            rig.hear(1, THEIR_COMMUNICATOR, OUR_MANAGER, 0x4B01, &configuration);
+        }
+        if step == 70 {
+            let mut less = vehicle(30);
+            less.nodes[0].components.clear();
+            rig.node.announce(rig.now, less).unwrap();
+        }
+        rig.now += Duration::from_millis(100);
+        rig.node.handle_timeout(rig.now);
+        told.extend(rig.sent().into_iter().filter(|sent| sent.code == 0x4B01));
+    }
+    let whole = Bytes::from_static(&[1, 1, 4, 1, 1, 35, 1, 33, 1, 38, 1]);
+    let less = Bytes::from_static(&[1, 1, 2, 1, 1, 35, 1]);
+    let expected =
+        [whole, less].map(|data| Message::new(OUR_COMMUNICATOR, THEIR_MANAGER, 0x4B01, data));
+    assert_eq!(told, expected);
+}
