@@ -8,7 +8,8 @@ use crate::address::JausId;
 /// without it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Context<'a> {
-    /// The ids by which components are seen, for messages that name one.
+    /// The ids by which components are seen, for messages that name one: with the subsystems that
+    /// have been [claimed](IdTable::claim), for others are not recognised.
     pub ids: Option<&'a IdTable>,
     /// The type of the RA component that sends or receives the message, or as which one of ours
     /// does.

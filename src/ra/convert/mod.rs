@@ -3,7 +3,57 @@
 //!
 //! [`to_jaus`] and [`to_ra`] convert one message, or refuse it with a [`Refusal`] that names the field.
 //! Values are taken in engineering units and put to the nearest step of the other scale; a value
-//! out of the other's range is refused, not clamped. Nothing is kept between two messages.
+//! out of the other's range is refused, not clamped. Nothing is kept between two messages. A bit of a
+//! presence vector that no field owns is forgiven to RA systems, which set them all.
+//!
+//! ```
+//! use jaus::codec::Message;
+//! use jaus::messages::mobility::SetWrenchEffort;
+//! use jaus::ra::convert::{to_jaus, to_ra};
+//!
+//! // What the vehicle simulator of OpenJAUS is sent while it stands: a brake of 97.6 percent.
+//! let payload = to_jaus(0x0405, &[0x61, 0, 0, 0, 0, 0, 0xF9])?;
+//! let effort = SetWrenchEffort::decode(&payload)?;
+//! assert_eq!(effort.resistive_linear_effort_x_percent().map(f64::round), Some(98.0));
+//! assert_eq!(to_ra(&payload)?.0, 0x0405);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | RA | name | ours | name | what is lost, and what is refused |
+//! |---|---|---|---|---|
+//! | 0001h 2001h 4001h | Set, Query, Report Component Authority | same | Set, Query, Report Authority | |
+//! | 0002h to 0005h | Shutdown, Standby, Resume, Reset | same | same | |
+//! | 0006h 0007h | Set, Clear Emergency | same | same | codes other than 1, stop |
+//! | 2002h 4002h | Query, Report Component Status | same | Query, Report Status | lost: the secondary status code; refused: states above 5 |
+//! | 000Dh 000Eh | Request, Release Component Control | same | Request, Release Control | |
+//! | 000Fh | Confirm Component Control | same | Confirm Control | refused: answers above 2 |
+//! | 0010h | Reject Component Control | same | Reject Control | lost: why; from there it is *control released* |
+//! | 200Dh 400Dh | Query, Report Component Control | same | Query, Report Control | refused: a controller without an id on the other side |
+//! | 0011h 2011h 4011h | Set, Query, Report Time | same | same | |
+//! | 2202h 4202h | Query, Report Heartbeat Pulse | same | same | |
+//! | 0404h | Set Velocity State | 0415h | Set Velocity Command | lost: deviations, time; refused: limits and defaults, more than 65.534 m/s or 32.767 rad/s |
+//! | 0405h 2405h 4405h | Set, Query, Report Wrench Effort | same | same | |
+//! | 0407h 2407h 4407h | Set, Query, Report Global Vector | same | same | refused: speeds above 327.67 m/s; for version 1.0, no speed |
+//! | 0408h 2408h 4408h | Set, Query, Report Local Vector | same | same | lost: Z, roll and pitch of a report; refused: those of a command, no heading, speeds as above |
+//! | 040Ah | Set Travel Speed | same | same | refused: speeds above 327.67 m/s |
+//! | 040Ah | Set Travel Speed of a path segment driver | 041Eh | Execute List | refused: speeds as above, from another element than the first |
+//! | 240Ah 440Ah | Query, Report Travel Speed | same | same | refused: speeds as above |
+//! | 240Bh 440Bh | Query, Report Waypoint Count | 241Ch 441Ch | Query, Report Element Count | |
+//! | 040Ch 040Dh | Set Global, Local Waypoint | same | same | lost: the tolerance of the waypoint; refused: numbers other than 0, a limit of the path, a local Z out of -10 km to 35 km |
+//! | 240Ch 240Dh | Query Global, Local Waypoint | same | same | lost: which fields are wanted; refused: numbers other than 0 |
+//! | 440Ch 440Dh | Report Global, Local Waypoint | same | same | lost: number, tolerances; refused: Z as above |
+//! | 240Eh 440Eh | Query, Report Path Segment Count | 241Ch 441Ch | Query, Report Element Count | |
+//! | 040Fh 0410h | Set Global, Local Path Segment | 041Ah | Set Element | refused: more than one element, one that does not follow the one before it, a limit of the path |
+//! | 240Fh 2410h | Query Global, Local Path Segment | same | same | refused: numbers other than 0 |
+//! | 440Fh 4410h | Report Global, Local Path Segment | same | same | lost: number, limit of the path |
+//! | 2402h 4402h | Query, Report Global Pose | same | same | |
+//! | 2403h 4403h | Query, Report Local Pose | same | same | refused: Z out of -10 km to 35 km |
+//! | 2404h 4404h | Query, Report Velocity State | same | same | refused: more than 65.534 m/s or 32.767 rad/s |
+//! | 0A20h to 4A24h | the twelve of the Vector Knowledge Store | same | same | nothing: they are ours octet by octet |
+//!
+//! What is not in the table has no counterpart: discrete devices, platform specifications, cameras,
+//! manipulators, payloads, missions; and what is no matter of conversion: discovery, service
+//! connections and events, which belong to the node and the connections.
 
 mod carry;
 mod context;

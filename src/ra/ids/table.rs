@@ -161,27 +161,31 @@ impl IdTable {
         (self.ra_of(candidate, RaComponent(id.component))? == id).then_some(candidate)
     }
 
-    /// By which id ours know a component with this RA id, whichever side it is on. Where the number
-    /// of its subsystem could mean either, one that was [claimed](Self::claim) for our side is ours.
+    /// By which id ours know a component with this RA id, whichever side it is on; `None` if its
+    /// subsystem was not [claimed](Self::claim), for the same number may mean one of either side.
     #[must_use]
     pub fn known_to_jaus(&self, id: RaId) -> Option<JausId> {
-        let ours = self.jaus_behind(id);
-        ours.filter(|ours| self.is_claimed(*ours))
-            .or_else(|| self.jaus_of(id))
+        if self.is_home(Side::Ra, id.subsystem.into()) {
+            return self.jaus_of(id);
+        }
+        self.jaus_behind(id)
+            .filter(|ours| self.is_home(Side::Jaus, ours.subsystem()))
     }
 
-    /// By which id RA systems know a component with this JAUS id, whichever side it is on. One of
-    /// ours is named as a subsystem commander, for who is named is a client.
+    /// By which id RA systems know a component with this JAUS id, whichever side it is on; `None` as
+    /// in [`known_to_jaus`](Self::known_to_jaus). One of ours is named as a subsystem commander, for
+    /// who is named is a client.
     #[must_use]
     pub fn known_to_ra(&self, id: JausId) -> Option<RaId> {
-        match self.is_claimed(id) {
-            true => self.ra_of(id, RaComponent::SUBSYSTEM_COMMANDER),
-            false => self.ra_behind(id),
+        if self.is_home(Side::Jaus, id.subsystem()) {
+            return self.ra_of(id, RaComponent::SUBSYSTEM_COMMANDER);
         }
+        self.ra_behind(id)
+            .filter(|theirs| self.is_home(Side::Ra, theirs.subsystem.into()))
     }
 
-    fn is_claimed(&self, id: JausId) -> bool {
-        self.present.contains(&(Side::Jaus, id.subsystem()))
+    fn is_home(&self, side: Side, subsystem: u16) -> bool {
+        self.present.contains(&(side, subsystem))
     }
 
     /// By which number a subsystem of `home` is seen on the other side.

@@ -180,6 +180,24 @@ fn two_subsystems_that_meet_in_a_number_are_told_apart_or_refused() {
     );
 }
 
+#[test]
+fn a_component_on_either_side_is_named_by_the_id_that_the_receiver_knows() {
+    let mut ids = IdTable::new(&Settings {
+        ra_offset: 1000,
+        ..Settings::default()
+    })
+    .unwrap();
+    let (theirs, ours) = ("20.1.33.1", "101.1.9");
+    assert_eq!(ids.known_to_jaus(ra(theirs)), None);
+    assert_eq!(ids.known_to_ra(jaus(ours)), None);
+    ids.claim(Side::Ra, 20).unwrap();
+    ids.claim(Side::Jaus, 101).unwrap();
+    assert_eq!(ids.known_to_jaus(ra(theirs)), Some(jaus("1020.1.33")));
+    assert_eq!(ids.known_to_ra(jaus("1020.1.33")), Some(ra(theirs)));
+    assert_eq!(ids.known_to_ra(jaus(ours)), Some(ra("101.1.32.9")));
+    assert_eq!(ids.known_to_jaus(ra("101.1.32.9")), Some(jaus(ours)));
+}
+
 #[cfg(feature = "serde")]
 #[test]
 fn settings_are_read_from_text_and_unknown_keys_are_refused() {
