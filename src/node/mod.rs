@@ -144,6 +144,15 @@ impl Node {
     /// A number that names no single component, or is attached already.
     pub fn attach(&self, component: u8) -> Result<Port, AttachError> {
         let id = JausId::new(self.config.subsystem, self.config.node, component);
+        self.attach_as(id)
+    }
+
+    /// Takes in a component under any id, also of another subsystem or node: for gateways, which
+    /// stand in for components that are elsewhere.
+    ///
+    /// # Errors
+    /// An id that names no single component, or is attached already.
+    pub fn attach_as(&self, id: JausId) -> Result<Port, AttachError> {
         let mailbox = self.shared().lock().attach(id, None)?;
         Ok(Port::new(id, mailbox, self.guard.clone()))
     }

@@ -121,6 +121,20 @@ impl Stack {
         self.subscribers.len()
     }
 
+    /// What clients are subscribed to at present: the query, and its rate in hertz; no rate for what
+    /// is told on every change.
+    pub fn subscribed(&self) -> impl Iterator<Item = (&Bytes, Option<f64>)> {
+        self.subscribers.wanted()
+    }
+
+    /// A client is gone, as somebody else has found out: what it subscribed to ends, and so does its
+    /// control.
+    pub fn forget(&mut self, now: Instant, client: JausId) {
+        self.control.forget(client, &mut self.out);
+        self.subscribers.forget(client);
+        self.collect(now);
+    }
+
     /// The component's state, and who controls it.
     #[must_use]
     pub const fn standing(&self) -> &Standing {

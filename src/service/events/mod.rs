@@ -391,6 +391,14 @@ impl Events {
     pub(super) fn len(&self) -> usize {
         self.table.len()
     }
+
+    /// The queries of all subscriptions, with their rates in hertz if they are periodic.
+    pub(super) fn wanted(&self) -> impl Iterator<Item = (&Bytes, Option<f64>)> {
+        self.table.iter().map(|it| match it.kind {
+            Kind::Periodic { hertz, .. } => (&it.query, Some(hertz)),
+            Kind::EveryChange { .. } => (&it.query, None),
+        })
+    }
 }
 
 /// What is answered to a number that the client has no event by.

@@ -79,6 +79,11 @@ impl Table {
         self.subscriptions.len()
     }
 
+    /// All of them.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Subscription> {
+        self.subscriptions.values()
+    }
+
     pub(super) const fn load(&self) -> f64 {
         self.load
     }
