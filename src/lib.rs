@@ -24,6 +24,8 @@ pub mod codec;
 #[cfg(feature = "node")]
 pub mod component;
 pub mod endpoint;
+#[cfg(feature = "ra-gateway")]
+pub mod gateway;
 #[cfg(feature = "node")]
 pub mod link;
 pub mod messages;

@@ -66,7 +66,7 @@ struct Program<F: Args> {
 }
 
 /// What is told without `-v`: what parts have to say, and what goes wrong.
-const USUAL: &str = "error,jaus::parts=info,jaus::ocu=info,jaus::cli=info";
+const USUAL: &str = "error,jaus::parts=info,jaus::ocu=info,jaus::gateway=info,jaus::cli=info";
 
 /// Runs a program to its end: reads flags and settings, takes a place on a node, lets the part run
 /// until Ctrl-C or SIGTERM, and takes leave.

@@ -1,0 +1,556 @@
+//! An RA component as JAUS clients see it: a [`Stack`] that answers from what the RA component has
+//! reported, and asks it for what is not known yet.
+//!
+//! | a client | becomes of it |
+//! |---|---|
+//! | asks for a state (pose, velocity, …) | answered from the last report if that is fresh; else the client waits until one has come, and for [patience](super::Settings::patience) at most |
+//! | subscribes to a state | a [service connection](streams) at the greatest rate that is wanted keeps the report fresh; Events tells it at each client's rate, or when it is another |
+//! | asks for anything else | the query is relayed, and the next report that answers it goes to the client |
+//! | asks for control | [`Lease`] asks the RA component, and tells the client what that says |
+//! | commands | converted and passed on, if it is in control |
+//!
+//! The same stack is the RA component's voice among JAUS components: see [`Voice`].
+
+mod lease;
+mod mirror;
+mod streams;
+mod voice;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use self::lease::Lease;
+use self::mirror::{Mirror, Mirrored};
+use self::streams::MOST_HZ;
+use self::streams::Streams;
+pub(super) use self::streams::rate;
+pub(super) use self::voice::{Target, Voice, connection, leading_code};
+use super::convert::{self, Ids, Words};
+use super::counters::{Counter, Tally};
+use super::roles::Role;
+use super::{pairs, roles};
+use crate::address::JausId;
+use crate::codec::Message as _;
+use crate::endpoint::Received;
+use crate::messages::core::{
+    self, CreateEvent, ReleaseControl, RequestControl, SetAuthority, UpdateEvent,
+};
+use crate::ra::RaId;
+use crate::ra::ids::RaComponent;
+use crate::service::{
+    Discovery, Liveness, Profile, Scope, Service, Stack, Timing, Transport, code_of,
+};
+
+/// Report Component Status.
+const STATUS: u16 = 0x4002;
+/// Confirm Service Connection.
+const CONFIRM_CONNECTION: u16 = 0x0009;
+/// Confirm Component Control.
+const CONFIRM_CONTROL: u16 = 0x000F;
+/// Reject Component Control.
+const REJECT_CONTROL: u16 = 0x0010;
+
+/// An RA component among JAUS components.
+pub(super) struct Front {
+    ra: RaId,
+    pub(super) stack: Stack,
+    pub(super) voice: Voice,
+    /// Until when it is kept though no RA system lists it.
+    pub(super) guest_until: Option<Instant>,
+    patience: Duration,
+    words: Words,
+    mirror: Mirror,
+    lease: Lease,
+    streams: Streams,
+    held: Vec<Held>,
+    relayed: VecDeque<Relayed>,
+    to_ra: Vec<(u16, Bytes)>,
+    /// When to look again at what clients subscribe to.
+    review: Option<Instant>,
+}
+
+/// How a front is made.
+pub(super) struct Plan {
+    pub(super) ra: RaId,
+    pub(super) id: JausId,
+    pub(super) profile: Profile,
+    pub(super) ids: Ids,
+    pub(super) patience: Duration,
+    pub(super) authority: u8,
+}
+
+/// A client's message that waits for a report.
+struct Held {
+    message: Received,
+    report: u16,
+    /// The rate of the service connection that it needs, if it needs one.
+    hz: Option<f64>,
+    until: Instant,
+    next: Instant,
+}
+
+/// A client that waits for the answer to a query which was passed on.
+struct Relayed {
+    client: JausId,
+    report: u16,
+    until: Instant,
+}
+
+impl Front {
+    /// The most messages that wait for reports, of each kind.
+    const MOST_WAITING: usize = 64;
+    /// How old a report may be to be told without asking again.
+    const FRESH: Duration = Duration::from_millis(50);
+    /// Between two queries for the same report.
+    const ASK_AGAIN: Duration = Duration::from_millis(250);
+    /// How often a report comes that somebody wants to be told of when it changes.
+    const CHANGES_HZ: f64 = 10.0;
+    /// Between two looks at what clients subscribe to.
+    const REVIEW: Duration = Duration::from_secs(1);
+
+    pub(super) fn new(plan: Plan) -> Self {
+        let mirror = Mirror::default();
+        let role = roles::of_part(RaComponent(plan.ra.component));
+        let seed = plan.id.to_u32().into();
+        let (scope, timing) = (Scope::Subsystem, Timing::default());
+        let discovery = Discovery::new(plan.id, plan.profile, scope, timing, seed);
+        let minor = role.map_or(0, |role| role.service.minor);
+        let words = Words::new(plan.ids.clone(), plan.ra.component, minor);
+        let mirrored = Mirrored {
+            mirror: mirror.clone(),
+            words: words.clone(),
+            offers: offers(plan.ra, role),
+        };
+        let services: Vec<Box<dyn Service>> = vec![
+            Box::new(Transport),
+            Box::new(Liveness::new()),
+            Box::new(mirrored),
+        ];
+        Self {
+            ra: plan.ra,
+            stack: Stack::new(discovery, services),
+            voice: Voice::new(plan.patience, plan.ids),
+            guest_until: None,
+            patience: plan.patience,
+            words,
+            mirror,
+            lease: Lease::new(plan.patience, plan.authority),
+            streams: Streams::default(),
+            held: Vec::new(),
+            relayed: VecDeque::new(),
+            to_ra: Vec::new(),
+            review: None,
+        }
+    }
+
+    /// The RA component.
+    pub(super) const fn ra(&self) -> RaId {
+        self.ra
+    }
+
+    /// A message of a JAUS component has come.
+    pub(super) fn handle_message(&mut self, now: Instant, message: &Received, tally: &mut Tally) {
+        let client = message.source;
+        match code_of(&message.payload) {
+            Some(RequestControl::CODE) => {
+                if let Ok(request) = RequestControl::decode(&message.payload) {
+                    self.lease.request(now, client, request.authority_code);
+                }
+            }
+            Some(SetAuthority::CODE) if self.lease.obeys(client) => {
+                if let Ok(set) = SetAuthority::decode(&message.payload) {
+                    self.lease.request(now, client, set.authority_code);
+                }
+            }
+            Some(ReleaseControl::CODE) => self.lease.release(client),
+            Some(CreateEvent::CODE) => {
+                let created = CreateEvent::decode(&message.payload);
+                let wanted = created.map(|it| (hz_of(&it), it.query_message));
+                self.subscribe(now, message, wanted.ok(), tally);
+            }
+            Some(UpdateEvent::CODE) => {
+                let updated = UpdateEvent::decode(&message.payload);
+                let hz = |it: &UpdateEvent| match it.event_type.0 {
+                    0 => it.requested_periodic_rate_hz(),
+                    _ => Self::CHANGES_HZ,
+                };
+                let wanted = updated.map(|it| (hz(&it), it.query_message));
+                self.subscribe(now, message, wanted.ok(), tally);
+            }
+            Some(code) if crosses(code) => self.cross(now, message, code, tally),
+            _ => self.stack.handle_message(now, message),
+        }
+        self.follow(now, tally);
+    }
+
+    /// A subscription needs a report that can be told at once.
+    fn subscribe(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        wanted: Option<(f64, Bytes)>,
+        tally: &mut Tally,
+    ) {
+        let state = wanted.and_then(|(hz, query)| Some((hz, state_of(&self.words, &query)?)));
+        self.review = Some(now);
+        match state {
+            Some((hz, report)) if !self.is_fresh(now, report) => {
+                self.hold(now, message, report, Some(hz), tally);
+            }
+            _ => self.stack.handle_message(now, message),
+        }
+    }
+
+    /// A message for the RA component.
+    fn cross(&mut self, now: Instant, message: &Received, code: u16, tally: &mut Tally) {
+        let (ra_code, body) = match self.words.to_ra(&message.payload) {
+            Ok(converted) => converted,
+            Err(refusal) => return convert::refuse(now, tally, code, &refusal),
+        };
+        match pairs::report_of(ra_code) {
+            Some(report) if pairs::state(report).is_some() => {
+                if self.is_fresh(now, report) {
+                    self.stack.handle_message(now, message);
+                } else {
+                    self.hold(now, message, report, None, tally);
+                }
+            }
+            Some(report) => self.relay(now, message.source, report, (ra_code, body), tally),
+            None => self.command(now, message.source, (ra_code, body), tally),
+        }
+    }
+
+    fn command(&mut self, now: Instant, client: JausId, words: (u16, Bytes), tally: &mut Tally) {
+        let code = words.0;
+        if needs_control(code) && !self.lease.obeys(client) {
+            return tally.refuse(now, Counter::NotInControl, code, client);
+        }
+        tally.add(Counter::CommandsToRa);
+        self.to_ra.push(words);
+        if is_management(code) {
+            self.mirror.outdate(STATUS);
+            self.ask(STATUS);
+        }
+        if let Some(report) = answer_to_command(code) {
+            self.expect(now, client, report);
+        }
+    }
+
+    fn relay(
+        &mut self,
+        now: Instant,
+        client: JausId,
+        report: u16,
+        query: (u16, Bytes),
+        tally: &mut Tally,
+    ) {
+        if self.relayed.len() >= Self::MOST_WAITING {
+            return tally.refuse(now, Counter::TooManyWaiting, query.0, client);
+        }
+        tally.add(Counter::QueriesToRa);
+        self.to_ra.push(query);
+        self.expect(now, client, report);
+    }
+
+    fn expect(&mut self, now: Instant, client: JausId, report: u16) {
+        if self.relayed.len() < Self::MOST_WAITING {
+            self.relayed.push_back(Relayed {
+                client,
+                report,
+                until: now + self.patience,
+            });
+        }
+    }
+
+    /// Keeps a client's message until the report has come that it needs.
+    fn hold(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        report: u16,
+        hz: Option<f64>,
+        tally: &mut Tally,
+    ) {
+        let until = now + self.patience;
+        let same = |it: &&mut Held| {
+            it.message.source == message.source && it.message.payload == message.payload
+        };
+        if let Some(held) = self.held.iter_mut().find(same) {
+            held.until = until;
+            return tally.add(Counter::Repeated);
+        }
+        if self.held.len() >= Self::MOST_WAITING {
+            let code = code_of(&message.payload).unwrap_or_default();
+            return tally.refuse(now, Counter::TooManyWaiting, code, message.source);
+        }
+        let asked = self.held.iter().any(|it| it.report == report);
+        if !asked {
+            tally.add(Counter::QueriesToRa);
+            self.ask(report);
+        }
+        self.held.push(Held {
+            message: message.clone(),
+            report,
+            hz,
+            until,
+            next: now + Self::ASK_AGAIN,
+        });
+    }
+
+    /// Asks the RA component for the whole of a state.
+    fn ask(&mut self, report: u16) {
+        if let Some(state) = pairs::state(report) {
+            self.to_ra.push((state.query(), state.query_for_all()));
+        }
+    }
+
+    fn is_fresh(&self, now: Instant, report: u16) -> bool {
+        let limit = self.streams.freshness(report).unwrap_or_default();
+        let age = self.mirror.age(now, report);
+        age.is_some_and(|age| age <= limit.max(Self::FRESH))
+    }
+
+    /// A message of the RA component for us has come.
+    pub(super) fn handle_ra(&mut self, now: Instant, code: u16, data: &Bytes, tally: &mut Tally) {
+        match code {
+            CONFIRM_CONTROL => {
+                let response = data.first().copied().unwrap_or_default();
+                self.lease.handle_confirm(now, response);
+            }
+            REJECT_CONTROL => self.lease.handle_reject(),
+            CONFIRM_CONNECTION => self.streams.handle_confirm(now, data),
+            _ if pairs::query_of(code).is_some() => self.handle_report(now, code, data, tally),
+            _ => tally.refuse(now, Counter::NoCounterpart, code, self.ra),
+        }
+        self.follow(now, tally);
+    }
+
+    fn handle_report(&mut self, now: Instant, report: u16, data: &Bytes, tally: &mut Tally) {
+        self.streams.handle_report(now, report);
+        let converted = match self.words.to_jaus(report, data) {
+            Ok(converted) => converted,
+            Err(refusal) => return convert::refuse(now, tally, report, &refusal),
+        };
+        if pairs::state(report).is_some() {
+            tally.add(Counter::ReportsFromRa);
+            self.tell_state(now, report, data.clone(), &converted);
+            return;
+        }
+        let waiting = |it: &Relayed| it.report == report;
+        match self.relayed.iter().position(waiting) {
+            Some(first) => {
+                if let Some(relayed) = self.relayed.remove(first) {
+                    tally.add(Counter::ReportsFromRa);
+                    self.stack.send_octets(relayed.client, converted);
+                }
+            }
+            None => tally.refuse(now, Counter::Unasked, report, self.ra),
+        }
+    }
+
+    fn tell_state(&mut self, now: Instant, report: u16, data: Bytes, converted: &[u8]) {
+        let changed = self.mirror.keep(now, report, data);
+        let (ready, held) = std::mem::take(&mut self.held)
+            .into_iter()
+            .partition::<Vec<_>, _>(|it| it.report == report);
+        self.held = held;
+        for held in ready {
+            self.stack.handle_message(now, &held.message);
+        }
+        let query = code_of(converted).and_then(pairs::query_of);
+        if let Some(query) = query.filter(|_| changed) {
+            self.stack.announce(now, query);
+        }
+    }
+
+    /// A JAUS client is gone.
+    pub(super) fn forget(&mut self, now: Instant, client: JausId, tally: &mut Tally) {
+        self.lease.forget(client);
+        self.stack.forget(now, client);
+        self.held.retain(|it| it.message.source != client);
+        self.relayed.retain(|it| it.client != client);
+        self.review = Some(now);
+        self.follow(now, tally);
+    }
+
+    /// The time of [`poll_timeout`](Self::poll_timeout) has come; earlier does no harm.
+    pub(super) fn handle_timeout(&mut self, now: Instant, tally: &mut Tally) {
+        if self.stack.poll_timeout().is_some_and(|due| due <= now) {
+            self.stack.handle_timeout(now);
+        }
+        self.lease.handle_timeout(now);
+        self.streams.handle_timeout(now);
+        self.ask_again(now, tally);
+        self.relayed.retain(|it| {
+            let waits = now < it.until;
+            if !waits {
+                tally.refuse(now, Counter::Unanswered, it.report, it.client);
+            }
+            waits
+        });
+        self.follow(now, tally);
+    }
+
+    fn ask_again(&mut self, now: Instant, tally: &mut Tally) {
+        let mut reports = Vec::new();
+        let mut need_connection = false;
+        let ra = self.ra;
+        self.held.retain_mut(|it| {
+            if now >= it.until {
+                tally.refuse(now, Counter::Unanswered, it.report, ra);
+                return false;
+            }
+            if now >= it.next {
+                it.next = now + Self::ASK_AGAIN;
+                // Some components tell by service connections alone.
+                need_connection |= it.hz.is_none();
+                it.hz.get_or_insert(Self::CHANGES_HZ);
+                if !reports.contains(&it.report) {
+                    reports.push(it.report);
+                }
+            }
+            true
+        });
+        if need_connection {
+            self.review = Some(now);
+        }
+        for report in reports {
+            self.ask(report);
+        }
+    }
+
+    /// Carries out what has been decided, and looks at what clients want.
+    fn follow(&mut self, now: Instant, tally: &mut Tally) {
+        let said = self.lease.take_said();
+        if said.granted {
+            tally.add(Counter::ControlOfRa);
+        }
+        self.to_ra.extend(said.to_ra);
+        let before = self.mirror.controller_is(self.lease.controller());
+        for (client, payload) in said.to_clients {
+            self.stack.send_octets(client, payload);
+        }
+        if !before {
+            self.stack.announce(now, core::QueryControl::CODE);
+        }
+        if self.review.is_some_and(|due| due <= now) {
+            let wanted = self.wanted();
+            self.streams.want(now, &wanted);
+            self.review = (!wanted.is_empty()).then(|| now + Self::REVIEW);
+        }
+        self.to_ra.extend(self.streams.take_said());
+    }
+
+    /// The rates of all that somebody subscribes to, by the code of the RA report.
+    fn wanted(&self) -> BTreeMap<u16, f64> {
+        let mut wanted = BTreeMap::new();
+        let subscribed = self.stack.subscribed();
+        let subscribed = subscribed.filter_map(|(query, hz)| {
+            let hz = hz.unwrap_or(Self::CHANGES_HZ);
+            Some((state_of(&self.words, query)?, hz))
+        });
+        let held = self.held.iter().filter_map(|it| Some((it.report, it.hz?)));
+        for (report, hz) in subscribed.chain(held) {
+            let most = wanted.entry(report).or_insert(hz);
+            *most = hz.max(*most).min(MOST_HZ);
+        }
+        wanted
+    }
+
+    /// Ends what runs with the RA component, because we stop.
+    pub(super) fn take_leave(&mut self, now: Instant, tally: &mut Tally) {
+        if let Some(controller) = self.lease.controller() {
+            self.lease.release(controller.id);
+        }
+        self.streams.want(now, &BTreeMap::new());
+        self.follow(now, tally);
+        self.stack.take_leave(now);
+    }
+
+    /// What is to be sent to the RA component since this was asked last.
+    pub(super) fn take_to_ra(&mut self) -> Vec<(u16, Bytes)> {
+        std::mem::take(&mut self.to_ra)
+    }
+
+    /// Whether we control the RA component, or ask for it.
+    pub(super) const fn is_engaged(&self) -> bool {
+        self.lease.is_engaged()
+    }
+
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        let held = self.held.iter().map(|it| it.next.min(it.until));
+        let relayed = self.relayed.iter().map(|it| it.until);
+        [
+            self.stack.poll_timeout(),
+            self.lease.poll_timeout(),
+            self.streams.poll_timeout(),
+            self.review,
+            self.guest_until,
+        ]
+        .into_iter()
+        .flatten()
+        .chain(held)
+        .chain(relayed)
+        .min()
+    }
+}
+
+fn hz_of(create: &CreateEvent) -> f64 {
+    match create.event_type.0 {
+        0 => create.requested_periodic_rate_hz(),
+        _ => Front::CHANGES_HZ,
+    }
+}
+
+/// What the counterpart of an RA component offers.
+fn offers(ra: RaId, role: Option<&Role>) -> Vec<crate::codec::ServiceId> {
+    let guarded = !RaComponent(ra.component).is_infrastructure();
+    let guards = [
+        core::access_control::V1_1,
+        core::access_control::V1_0,
+        core::management::V1_1,
+        core::management::V1_0,
+    ];
+    let guards = guards.into_iter().filter(|_| guarded);
+    guards.chain(role.map(|role| role.service)).collect()
+}
+
+/// The RA report that answers a JAUS query, if it tells a state.
+fn state_of(words: &Words, query: &Bytes) -> Option<u16> {
+    let code = code_of(query)?;
+    let (code, _) = crosses(code).then(|| words.to_ra(query).ok())??;
+    let report = pairs::report_of(code)?;
+    pairs::state(report).map(|_| report)
+}
+
+/// Whether a message with this code is the RA component's business; all others are ours: transport,
+/// discovery, liveness, events, and who is in control.
+const fn crosses(code: u16) -> bool {
+    is_management(code)
+        || matches!(
+            code,
+            0x2002 | 0x0400..=0x04FF | 0x0A00..=0x0AFF | 0x2400..=0x24FF | 0x2A00..=0x2AFF
+        )
+}
+
+/// Shutdown, Standby, Resume, Reset, Set Emergency, Clear Emergency.
+const fn is_management(code: u16) -> bool {
+    matches!(code, 0x0002..=0x0007)
+}
+
+/// Whether a command is for the client in control alone. Anybody may stop a vehicle in an emergency,
+/// and knowledge stores are nobody's to drive.
+const fn needs_control(code: u16) -> bool {
+    !matches!(code, 0x0006 | 0x0007 | 0x0A00..=0x0AFF)
+}
+
+/// The report by which a command is answered, of those few that are.
+const fn answer_to_command(code: u16) -> Option<u16> {
+    match code {
+        0x0A20 => Some(0x4A20),
+        0x0A24 => Some(0x4A24),
+        _ => None,
+    }
+}

@@ -1,0 +1,497 @@
+//! An RA component among JAUS components as their client: it asks, is told regularly, and takes
+//! control, all in its own name, so that each JAUS component decides for itself what it may.
+//!
+//! | the RA component | becomes of it |
+//! |---|---|
+//! | sends a query | the JAUS component is asked, and its answer converted; nothing if it says nothing |
+//! | creates a service connection | an event of the JAUS component at that rate; confirmed when that one has confirmed |
+//! | requests control | Request Control with its authority; Confirm or Reject when it is decided |
+//! | sends a command | converted and passed on; the JAUS component obeys if this one is in control |
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use bytes::{BufMut, Bytes, BytesMut};
+
+use super::super::convert::{self, Ids, Words};
+use super::super::counters::{Counter, Tally};
+use super::super::pairs;
+use super::rate;
+use crate::address::JausId;
+use crate::ra::{Message, RaId};
+use crate::service::{
+    CannotSubscribe, ControlId, ControlLost, ControlNews, Inquiry, NoAnswer, Patience, Stack,
+    SubscriptionId, SubscriptionNews, Topic, When, code_of,
+};
+
+/// What an RA component wants of JAUS components.
+#[derive(Debug)]
+pub(in crate::gateway) struct Voice {
+    patience: Patience,
+    ids: Ids,
+    asked: BTreeMap<Inquiry, (Message, Target)>,
+    told: BTreeMap<SubscriptionId, Told>,
+    grips: BTreeMap<ControlId, Grip>,
+    /// Messages for the RA component, from those whom it asked.
+    said: Vec<Message>,
+}
+
+/// A JAUS component as an RA component sees it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::gateway) struct Target {
+    /// Its id.
+    pub(in crate::gateway) id: JausId,
+    /// The minor version of the service that is meant.
+    pub(in crate::gateway) minor: u8,
+}
+
+/// A service connection of the RA component.
+#[derive(Debug)]
+struct Told {
+    peer: Target,
+    /// The message that created it.
+    request: Message,
+    report: u16,
+    hz: f64,
+    presence: u32,
+    /// The rate that was confirmed.
+    confirmed: Option<f64>,
+    suspended: bool,
+}
+
+/// Control of the RA component over a JAUS component.
+#[derive(Debug)]
+struct Grip {
+    request: Message,
+    peer: JausId,
+    held: bool,
+}
+
+/// What a service connection is answered with.
+#[derive(Debug, Clone, Copy)]
+enum Answer {
+    Successful = 0,
+    NotCapable = 1,
+    Refused = 2,
+}
+
+/// Confirm Service Connection.
+const CONFIRM_CONNECTION: u16 = 0x0009;
+/// Confirm Component Control.
+const CONFIRM_CONTROL: u16 = 0x000F;
+/// Reject Component Control.
+const REJECT_CONTROL: u16 = 0x0010;
+
+impl Voice {
+    /// The most questions that wait for an answer.
+    const MOST_ASKED: usize = 64;
+    /// The most service connections.
+    const MOST_TOLD: usize = 64;
+    /// The most components under control.
+    const MOST_GRIPS: usize = 32;
+
+    pub(super) fn new(patience: Duration, ids: Ids) -> Self {
+        const TRIES: u32 = 3;
+        Self {
+            patience: Patience {
+                tries: TRIES,
+                interval: patience / TRIES,
+            },
+            ids,
+            asked: BTreeMap::new(),
+            told: BTreeMap::new(),
+            grips: BTreeMap::new(),
+            said: Vec::new(),
+        }
+    }
+
+    fn words(&self, as_what: RaId, minor: u8) -> Words {
+        Words::new(self.ids.clone(), as_what.component, minor)
+    }
+
+    /// Whether anything is under way.
+    pub(in crate::gateway) fn is_busy(&self) -> bool {
+        !(self.asked.is_empty() && self.told.is_empty() && self.grips.is_empty())
+    }
+
+    /// What is to be sent to the RA component since this was asked last.
+    pub(in crate::gateway) fn take_said(&mut self) -> Vec<Message> {
+        std::mem::take(&mut self.said)
+    }
+
+    /// The RA component sends a message to what it takes for another one, and is a JAUS component.
+    pub(in crate::gateway) fn handle_ra(
+        &mut self,
+        now: Instant,
+        request: &Message,
+        peer: Target,
+        stack: &mut Stack,
+        tally: &mut Tally,
+    ) {
+        match request.code {
+            0x0008 => self.connect(now, request, peer, stack, tally),
+            0x000A => self.suspend(request, false),
+            0x000B => self.suspend(request, true),
+            0x000C => self.disconnect(now, request, stack),
+            0x000D => self.request_control(now, request, peer, stack, tally),
+            0x000E => self.release_control(now, peer.id, stack),
+            // Answers to what JAUS components never ask of RA components.
+            0x0009 | 0x000F | 0x0010 => {
+                tally.refuse(now, Counter::Unasked, request.code, request.source);
+            }
+            _ => self.pass_on(now, request, peer, stack, tally),
+        }
+    }
+
+    fn pass_on(
+        &mut self,
+        now: Instant,
+        request: &Message,
+        peer: Target,
+        stack: &mut Stack,
+        tally: &mut Tally,
+    ) {
+        let words = self.words(request.destination, peer.minor);
+        let payload = match words.to_jaus(request.code, &request.data) {
+            Ok(payload) => payload,
+            Err(refusal) => return convert::refuse(now, tally, request.code, &refusal),
+        };
+        let Some(report) = code_of(&payload).and_then(pairs::report_of) else {
+            tally.add(Counter::CommandsFromRa);
+            return stack.send_octets(peer.id, payload);
+        };
+        let same = |it: &Message| {
+            it.destination == request.destination
+                && it.code == request.code
+                && it.data == request.data
+        };
+        if self.asked.values().any(|(it, _)| same(it)) {
+            return tally.add(Counter::Repeated);
+        }
+        if self.asked.len() >= Self::MOST_ASKED {
+            return tally.refuse(now, Counter::TooManyWaiting, request.code, request.source);
+        }
+        tally.add(Counter::QueriesFromRa);
+        let inquiry = stack.ask(now, peer.id, payload, report, self.patience);
+        self.asked.insert(inquiry, (request.clone(), peer));
+    }
+
+    /// A question has been answered, or nobody will.
+    pub(in crate::gateway) fn handle_answer(
+        &mut self,
+        now: Instant,
+        inquiry: Inquiry,
+        answer: Result<Bytes, NoAnswer>,
+        tally: &mut Tally,
+    ) {
+        let Some((request, peer)) = self.asked.remove(&inquiry) else {
+            return;
+        };
+        match answer {
+            Ok(report) => {
+                let told = self.report(now, (&request, peer.minor), &report, tally);
+                self.said.extend(told);
+            }
+            Err(none) => tally.refuse(now, Counter::Unanswered, request.code, none.peer),
+        }
+    }
+
+    /// A JAUS report as an answer to an RA message.
+    fn report(
+        &self,
+        now: Instant,
+        (request, minor): (&Message, u8),
+        report: &Bytes,
+        tally: &mut Tally,
+    ) -> Option<Message> {
+        match self.words(request.destination, minor).to_ra(report) {
+            Ok((code, data)) => {
+                tally.add(Counter::ReportsToRa);
+                Some(request.answer(code, data))
+            }
+            Err(refusal) => {
+                let code = code_of(report).unwrap_or_default();
+                convert::refuse(now, tally, code, &refusal);
+                None
+            }
+        }
+    }
+
+    /// A JAUS component says something that was not asked for, such as what it made of a command.
+    pub(in crate::gateway) fn handle_report(
+        &mut self,
+        now: Instant,
+        (from, minor): (RaId, u8),
+        to: RaId,
+        report: &Bytes,
+        tally: &mut Tally,
+    ) {
+        let request = Message::new(to, from, 0, Bytes::new());
+        let told = self.report(now, (&request, minor), report, tally);
+        self.said.extend(told);
+    }
+
+    fn connect(
+        &mut self,
+        now: Instant,
+        request: &Message,
+        peer: Target,
+        stack: &mut Stack,
+        tally: &mut Tally,
+    ) {
+        let Some((report, hz, presence)) = connection(&request.data) else {
+            return tally.refuse(now, Counter::NotConverted, request.code, request.source);
+        };
+        let of_it = |it: &Told| it.is(request, report);
+        if let Some((&id, told)) = self.told.iter_mut().find(|(_, it)| of_it(it)) {
+            if told.presence == presence && (told.hz - hz).abs() < 0.02 {
+                told.request = request.clone();
+                told.suspended = false;
+                let confirmed = told.confirmed;
+                if let Some(hz) = confirmed {
+                    self.answer_connection(request, report, hz, Answer::Successful);
+                }
+                return;
+            }
+            self.told.remove(&id);
+            stack.unsubscribe(now, id);
+        }
+        if self.told.len() >= Self::MOST_TOLD {
+            tally.refuse(now, Counter::TooManyConnections, report, request.source);
+            return self.answer_connection(request, report, 0.0, Answer::Refused);
+        }
+        match self.subscribe(now, request, peer, (report, hz, presence), stack) {
+            Some(Ok(id)) => {
+                let told = Told {
+                    peer,
+                    request: request.clone(),
+                    report,
+                    hz,
+                    presence,
+                    confirmed: None,
+                    suspended: false,
+                };
+                self.told.insert(id, told);
+            }
+            Some(Err(why)) => {
+                tally.refuse(now, Counter::NotConverted, report, why);
+                self.answer_connection(request, report, 0.0, Answer::Refused);
+            }
+            None => {
+                tally.refuse(now, Counter::NoCounterpart, report, request.source);
+                self.answer_connection(request, report, 0.0, Answer::NotCapable);
+            }
+        }
+    }
+
+    /// `None` if JAUS has no such report.
+    fn subscribe(
+        &self,
+        now: Instant,
+        request: &Message,
+        peer: Target,
+        (report, hz, presence): (u16, f64, u32),
+        stack: &mut Stack,
+    ) -> Option<Result<SubscriptionId, CannotSubscribe>> {
+        let state = pairs::state(report)?;
+        let words = self.words(request.destination, peer.minor);
+        let query = words.to_jaus(state.query(), &state.query_for(presence));
+        let query = query.ok()?;
+        let topic = Topic {
+            peer: peer.id,
+            report: code_of(&query).and_then(pairs::report_of)?,
+            query,
+            when: When::hz(hz),
+        };
+        Some(stack.subscribe(now, &topic, self.patience))
+    }
+
+    fn answer_connection(&mut self, request: &Message, report: u16, hz: f64, answer: Answer) {
+        let mut body = BytesMut::new();
+        body.put_u16_le(report);
+        // The number of the connection: one for each client and report.
+        body.put_u8(0);
+        body.put_u16_le(if hz > 0.0 { rate(hz) } else { 0 });
+        body.put_u8(answer as u8);
+        let mut confirm = request.answer(CONFIRM_CONNECTION, body.freeze());
+        confirm.connection = true;
+        self.said.push(confirm);
+    }
+
+    fn suspend(&mut self, request: &Message, suspended: bool) {
+        let Some(report) = leading_code(&request.data) else {
+            return;
+        };
+        let of_it = |it: &&mut Told| it.is(request, report);
+        if let Some(told) = self.told.values_mut().find(of_it) {
+            told.suspended = suspended;
+        }
+    }
+
+    fn disconnect(&mut self, now: Instant, request: &Message, stack: &mut Stack) {
+        let Some(report) = leading_code(&request.data) else {
+            return;
+        };
+        let ended = self.told.iter().find(|(_, it)| it.is(request, report));
+        if let Some((&id, _)) = ended {
+            self.told.remove(&id);
+            stack.unsubscribe(now, id);
+        }
+    }
+
+    /// Something has become of an event.
+    pub(in crate::gateway) fn handle_subscription(
+        &mut self,
+        now: Instant,
+        id: SubscriptionId,
+        news: SubscriptionNews,
+        tally: &mut Tally,
+    ) {
+        let Some(told) = self.told.get_mut(&id) else {
+            return;
+        };
+        match news {
+            SubscriptionNews::Up { hz } => {
+                let hz = hz.unwrap_or(told.hz);
+                told.confirmed = Some(hz);
+                let (request, report) = (told.request.clone(), told.report);
+                self.answer_connection(&request, report, hz, Answer::Successful);
+            }
+            SubscriptionNews::Report { report, .. } => {
+                if told.suspended {
+                    return;
+                }
+                let (request, minor) = (told.request.clone(), told.peer.minor);
+                if let Some(mut message) = self.report(now, (&request, minor), &report, tally) {
+                    message.connection = true;
+                    self.said.push(message);
+                }
+            }
+            SubscriptionNews::Down { .. } => {}
+            SubscriptionNews::Ended(end) => {
+                let (request, report) = (told.request.clone(), told.report);
+                self.told.remove(&id);
+                tally.refuse(now, Counter::Unanswered, report, end);
+                self.answer_connection(&request, report, 0.0, Answer::NotCapable);
+            }
+        }
+    }
+
+    fn request_control(
+        &mut self,
+        now: Instant,
+        request: &Message,
+        peer: Target,
+        stack: &mut Stack,
+        tally: &mut Tally,
+    ) {
+        let Some(&authority) = request.data.first() else {
+            return tally.refuse(now, Counter::NotConverted, request.code, request.source);
+        };
+        if let Some(grip) = self.grips.values_mut().find(|it| it.peer == peer.id) {
+            grip.request = request.clone();
+            if grip.held {
+                self.confirm_control(request);
+            }
+            return;
+        }
+        if self.grips.len() >= Self::MOST_GRIPS {
+            tally.refuse(now, Counter::TooManyWaiting, request.code, request.source);
+            return self.reject_control(request);
+        }
+        match stack.request_control(now, peer.id, authority, self.patience) {
+            Ok(id) => {
+                let grip = Grip {
+                    request: request.clone(),
+                    peer: peer.id,
+                    held: false,
+                };
+                self.grips.insert(id, grip);
+            }
+            Err(why) => {
+                tally.refuse(now, Counter::NotInControl, request.code, why);
+                self.reject_control(request);
+            }
+        }
+    }
+
+    fn release_control(&mut self, now: Instant, peer: JausId, stack: &mut Stack) {
+        let held = self.grips.iter().find(|(_, it)| it.peer == peer);
+        if let Some((&id, _)) = held {
+            self.grips.remove(&id);
+            stack.release_control(now, id);
+        }
+    }
+
+    /// Something has become of control.
+    pub(in crate::gateway) fn handle_control(
+        &mut self,
+        now: Instant,
+        id: ControlId,
+        news: ControlNews,
+        stack: &mut Stack,
+        tally: &mut Tally,
+    ) {
+        let Some(grip) = self.grips.get_mut(&id) else {
+            return;
+        };
+        let request = grip.request.clone();
+        match news {
+            ControlNews::Granted => {
+                grip.held = true;
+                tally.add(Counter::ControlFromRa);
+                self.confirm_control(&request);
+            }
+            ControlNews::Refused(why) => {
+                self.grips.remove(&id);
+                tally.refuse(now, Counter::NotInControl, request.code, why);
+                self.reject_control(&request);
+            }
+            ControlNews::Lost(why) => {
+                self.grips.remove(&id);
+                log_loss(&request, why);
+                stack.release_control(now, id);
+                self.reject_control(&request);
+            }
+            ControlNews::Released => drop(self.grips.remove(&id)),
+        }
+    }
+
+    fn confirm_control(&mut self, request: &Message) {
+        let accepted = Bytes::from_static(&[0]);
+        self.said.push(request.answer(CONFIRM_CONTROL, accepted));
+    }
+
+    /// OpenJAUS takes any confirmation for a yes, and says no by rejecting.
+    fn reject_control(&mut self, request: &Message) {
+        self.said.push(request.answer(REJECT_CONTROL, Bytes::new()));
+    }
+}
+
+impl Told {
+    /// Whether it is the connection for this report between these two.
+    fn is(&self, request: &Message, report: u16) -> bool {
+        self.report == report && self.request.destination == request.destination
+    }
+}
+
+fn log_loss(request: &Message, why: ControlLost) {
+    let (client, of) = (request.source, request.destination);
+    tracing::info!(%client, %of, %why, "control lost");
+}
+
+/// Report, rate in hertz and presence vector of a Create Service Connection.
+pub(in crate::gateway) fn connection(body: &[u8]) -> Option<(u16, f64, u32)> {
+    let (report, body) = body.split_first_chunk()?;
+    let (scaled, body) = body.split_first_chunk()?;
+    let presence = body.first_chunk()?;
+    let hz = f64::from(u16::from_le_bytes(*scaled)) / f64::from(u16::MAX) * super::MOST_HZ;
+    let report = u16::from_le_bytes(*report);
+    // What events can say at least.
+    Some((report, hz.max(1.0 / 60.0), u32::from_le_bytes(*presence)))
+}
+
+/// The report that a message about a service connection names.
+pub(in crate::gateway) fn leading_code(body: &[u8]) -> Option<u16> {
+    body.first_chunk().map(|&code| u16::from_le_bytes(code))
+}

@@ -1,0 +1,15 @@
+//! The gateway between RA systems and JAUS in virtual time: an RA vehicle and an RA operator on one
+//! side, JAUS components on the other, and no sockets.
+#![cfg(feature = "ra-gateway")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test in virtual time"
+)]
+
+mod hostile;
+mod jaus_vehicle;
+mod ra_vehicle;
+mod rover;
+mod world;

@@ -1,0 +1,135 @@
+//! `jaus-ra-gateway` on a host of its own: an RA vehicle that is its own operator's on one host, the
+//! gateway with a JAUS vehicle and a JAUS operator on the other.
+//!
+//! Making hosts needs rights, see `tests/namespaces`. By hand the same operator drives a running
+//! OpenJAUS: `JAUS_TEST_ROLE=operator gateway_hosts --exact a_process_that_plays_a_node --nocapture`
+//! beside a gateway.
+#![cfg(all(feature = "cli", target_os = "linux"))]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test with processes"
+)]
+
+#[path = "../namespaces/hosts.rs"]
+#[allow(dead_code, reason = "shared with tests that do more")]
+mod hosts;
+#[path = "../support/networks.rs"]
+#[allow(dead_code, reason = "shared with tests that do more")]
+mod networks;
+mod operator;
+mod ra_vehicle;
+#[path = "../gateway/rover.rs"]
+#[allow(dead_code, reason = "shared with tests that do more")]
+mod rover;
+#[path = "../support/vehicle_process.rs"]
+mod vehicle_process;
+
+use std::process::{Child, Command, Stdio};
+
+use hosts::{LIMIT, ROLE, TwoHosts, on_two_hosts};
+use vehicle_process::VehicleProcess;
+
+/// A running gateway; ended with a word when dropped.
+struct Gateway(Child);
+
+impl Gateway {
+    fn start(hosts: &TwoHosts, flags: &[&str]) -> Self {
+        let child = Command::new("ip")
+            .args(["netns", "exec", &hosts.names[1]])
+            .arg(env!("CARGO_BIN_EXE_jaus-ra-gateway"))
+            .args(["--interface", "jaus0"])
+            .args(flags)
+            .env_remove("JAUS_LOG")
+            .stdout(Stdio::piped())
+            .spawn();
+        Self(child.unwrap())
+    }
+
+    /// Ends it; what it has printed.
+    fn end(mut self) -> String {
+        let id = self.0.id().to_string();
+        let told = Command::new("kill").args(["-TERM", &id]).status();
+        assert!(told.unwrap().success());
+        let mut printed = String::new();
+        let stdout = self.0.stdout.take();
+        std::io::Read::read_to_string(&mut stdout.unwrap(), &mut printed).unwrap();
+        assert!(self.0.wait().unwrap().success());
+        printed
+    }
+}
+
+impl Drop for Gateway {
+    fn drop(&mut self) {
+        // It may have ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn an_ra_vehicle_is_found_watched_and_driven_from_jaus() {
+    let test = "an_ra_vehicle_is_found_watched_and_driven_from_jaus";
+    on_two_hosts(test, |hosts| {
+        let gateway = Gateway::start(hosts, &["--stats", "--json"]);
+        let vehicle = hosts.start(0, "ra-vehicle");
+        vehicle.says("listening on");
+        let operator = hosts.start(1, "operator");
+        assert_eq!(operator.says("found 20.1.38"), "Pose");
+        assert!(operator.says("latitude").starts_with("37.2"));
+        let poses: u32 = operator.says("poses in 3 s").parse().unwrap();
+        assert!((25..=35).contains(&poses), "{poses}");
+        operator.says("in control");
+        vehicle.says("controlled by 250.1.32.1");
+        vehicle.says("driven");
+        operator.says("released");
+        vehicle.says("controlled by nobody");
+        let printed = gateway.end();
+        let report: serde_json::Value = serde_json::from_str(&printed).unwrap();
+        let components = report["ra_components"].as_array().unwrap();
+        let pose = components.iter().find(|it| it["ra"] == "20.1.38.1");
+        assert_eq!(pose.unwrap()["jaus"], "20.1.38", "{printed}");
+    });
+}
+
+#[test]
+fn a_jaus_vehicle_is_listed_asked_and_driven_from_ra() {
+    let test = "a_jaus_vehicle_is_listed_asked_and_driven_from_ra";
+    on_two_hosts(test, |hosts| {
+        let _gateway = Gateway::start(hosts, &[]);
+        let mut jaus = Command::new("ip");
+        jaus.args(["netns", "exec", &hosts.names[1]])
+            .arg(env!("CARGO_BIN_EXE_jaus"))
+            .args(["vehicle", "--id", "101.1.7", "--port", "0"])
+            .env_remove("JAUS_LOG");
+        let _vehicle = VehicleProcess::start(&mut jaus);
+        let operator = hosts.start(0, "ra-vehicle");
+        assert_eq!(operator.says("listed 101"), "Rover");
+        operator.says("101.1.38.7 latitude");
+        operator.says("in control of 101.1.33.7");
+        operator.says("101.1.42.7 moves");
+    });
+}
+
+/// Not a test of its own: does nothing unless another test starts it in a role.
+#[test]
+fn a_process_that_plays_a_node() {
+    let Ok(role) = std::env::var(ROLE) else {
+        return;
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .unwrap();
+    // Not for ever, should the test that waits for this process be killed.
+    let play = async {
+        match role.as_str() {
+            "ra-vehicle" => ra_vehicle::play().await,
+            "operator" => operator::play().await,
+            other => panic!("unknown role {other}"),
+        }
+    };
+    let _ = runtime.block_on(async { tokio::time::timeout(2 * LIMIT, play).await });
+}
