@@ -165,7 +165,10 @@ impl Encounter<'_> {
 
     /// Whether the actor has found out what is to be found.
     fn check(&self, scenario: Scenario, said: &str) -> Result<(), String> {
-        let answerer = self.answerer.party;
+        let (actor, answerer) = (self.actor.party, self.answerer.party);
+        if let Some(words) = actor.finds.get(&scenario.key()) {
+            return find_all(words, said);
+        }
         match scenario {
             Scenario::Discover => {
                 let id = answerer.id.to_string();
@@ -173,14 +176,10 @@ impl Encounter<'_> {
                 let is_found = said.split(between).any(|word| word == id);
                 is_found.then_some(()).ok_or(format!("{id} was not found"))
             }
-            Scenario::Services => {
-                let services = answerer.side.get(&Side::Vehicle).map(|side| &side.services);
-                let mut missing = services.into_iter().flatten();
-                match missing.find(|service| !said.contains(service.as_str())) {
-                    Some(missing) => Err(format!("{missing} is missing from the list of services")),
-                    None => Ok(()),
-                }
-            }
+            Scenario::Services => match answerer.side.get(&Side::Vehicle) {
+                Some(side) => find_all(&side.services, said),
+                None => Ok(()),
+            },
             _ => Ok(()),
         }
     }
@@ -200,8 +199,11 @@ impl Encounter<'_> {
         goes_on(&mut keep)
     }
 
-    fn restart_actor(&self, act: &str) -> Result<(), String> {
-        self.keep(act)?.kill();
+    fn restart_actor(&mut self, act: &str) -> Result<(), String> {
+        let keep = self.keep(act)?;
+        self.actor.crash();
+        drop(keep);
+        self.actor.be(None)?;
         self.keep(act).map(drop)
     }
 
@@ -242,6 +244,14 @@ impl Encounter<'_> {
             }
         }
         goes_on(&mut keep)
+    }
+}
+
+/// Whether all of these words were said.
+fn find_all(words: &[String], said: &str) -> Result<(), String> {
+    match words.iter().find(|word| !said.contains(word.as_str())) {
+        Some(missing) => Err(format!("{missing} is missing from what was found")),
+        None => Ok(()),
     }
 }
 

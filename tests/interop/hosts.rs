@@ -141,6 +141,11 @@ impl Hosts {
         let port = Host::Answerer.port();
         ip(&["-n", &self.switch(), "link", "set", port, state])
     }
+
+    /// Kills all that runs on a host, daemons too.
+    pub(crate) fn cut_power(&self, host: Host) {
+        kill_all(&self.name(host));
+    }
 }
 
 impl Drop for Hosts {
@@ -158,13 +163,15 @@ impl Drop for Hosts {
     }
 }
 
-/// Kills what was started in a namespace and has left its process group.
+/// Kills all processes of a namespace.
 fn kill_all(name: &str) {
     let Ok(output) = Command::new("ip").args(["netns", "pids", name]).output() else {
         return;
     };
-    for pid in String::from_utf8_lossy(&output.stdout).split_whitespace() {
-        // It may have ended in between.
-        let _ = Command::new("kill").args(["-9", pid]).output();
+    let pids = String::from_utf8_lossy(&output.stdout);
+    let pids: Vec<&str> = pids.split_whitespace().collect();
+    if !pids.is_empty() {
+        // They may have ended in between.
+        let _ = Command::new("kill").arg("-9").args(pids).output();
     }
 }

@@ -7,7 +7,7 @@ use jaus::address::JausId;
 
 use crate::hosts::{Host, Hosts, INTERFACE};
 use crate::process::Process;
-use crate::settings::{Party, Side, Start};
+use crate::settings::{Party, Side, Start, with_environment};
 
 /// How long anything that is waited for may take. Reached only when something fails.
 pub(crate) fn patience() -> Duration {
@@ -87,12 +87,11 @@ impl<'a> Place<'a> {
         self.side = None;
     }
 
-    /// Kills what answers, and what it needs, as a power cut would; gives what it was.
+    /// Kills all that it runs, as a power cut would; gives what it was.
     pub(crate) fn crash(&mut self) -> Option<Side> {
-        let (side, process) = self.side.take()?;
-        process.kill();
-        self.background.drain(..).for_each(Process::kill);
-        Some(side)
+        self.hosts.cut_power(self.host);
+        self.background.clear();
+        self.side.take().map(|(side, _)| side)
     }
 
     /// What has happened to what answers, if it has ended by itself.
@@ -135,6 +134,7 @@ impl<'a> Place<'a> {
             Host::Actor => self.other.id,
             Host::Answerer => self.other.actor,
         };
+        let sensor = self.other.sensor.unwrap_or(other);
         let own = std::env::current_exe().map_err(|error| error.to_string())?;
         let places = [
             ("{jaus}", env!("CARGO_BIN_EXE_jaus").to_owned()),
@@ -147,6 +147,7 @@ impl<'a> Place<'a> {
             ("{actor:x}", hexadecimal(self.party.actor)),
             ("{other}", other.to_string()),
             ("{other:x}", hexadecimal(other)),
+            ("{other-sensor}", sensor.to_string()),
             ("{needs}", self.other.needs.clone()),
             ("{address}", self.host.address().to_owned()),
             ("{other-address}", other_host.address().to_owned()),
@@ -187,23 +188,6 @@ fn hexadecimal(id: JausId) -> String {
         id.node(),
         id.component()
     )
-}
-
-/// Puts the values of variables in the place of `${NAME}`.
-fn with_environment(word: &str) -> Result<String, String> {
-    let mut filled = String::new();
-    let mut rest = word;
-    while let Some((before, behind)) = rest.split_once("${") {
-        let (name, behind) = behind
-            .split_once('}')
-            .ok_or_else(|| format!("`{word}`: there is no }} behind ${{"))?;
-        let value = std::env::var(name).map_err(|_| {
-            format!("`{word}`: set the environment variable {name}; README.md tells what to")
-        })?;
-        filled = filled + before + &value;
-        rest = behind;
-    }
-    Ok(filled + rest)
 }
 
 /// What a party says its version is: the first line that it prints.

@@ -125,13 +125,6 @@ impl Process {
         !matches!(self.child.try_wait(), Ok(None))
     }
 
-    /// Ends it as a power cut would.
-    pub(crate) fn kill(mut self) {
-        self.signal(Signal::SIGKILL);
-        // It is dead, or was before.
-        let _ = self.child.wait();
-    }
-
     /// What it has to do with a failure: the last thing it said.
     fn complaint(&self, what: &str) -> String {
         let last = self.said.iter().rev().find(|line| !line.trim().is_empty());

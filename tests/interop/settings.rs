@@ -23,10 +23,14 @@ pub(crate) struct Party {
     /// Whom others speak to.
     #[serde(deserialize_with = "id")]
     pub(crate) id: JausId,
+    /// Who tells the velocity, if that is somebody else.
+    #[serde(default, deserialize_with = "some_id")]
+    pub(crate) sensor: Option<JausId>,
     /// Who speaks to others.
     #[serde(deserialize_with = "id")]
     pub(crate) actor: JausId,
-    /// What others have to be told about it, in their words; `{needs}` in their commands.
+    /// What it needs of others, as a settings file of this project's says it; `{needs}` in their
+    /// commands.
     #[serde(default)]
     pub(crate) needs: String,
     /// A command that prints the version.
@@ -45,6 +49,10 @@ pub(crate) struct Party {
     /// What acts, by the key of what it does.
     #[serde(default)]
     pub(crate) act: BTreeMap<String, Vec<String>>,
+    /// Its words for what it must find, by the key of the scenario, where these are not ids and
+    /// the names of services.
+    #[serde(default)]
+    pub(crate) finds: BTreeMap<String, Vec<String>>,
     /// What it does not answer, by the key of the scenario, and why.
     #[serde(default)]
     pub(crate) not_answering: BTreeMap<String, String>,
@@ -85,6 +93,10 @@ pub(crate) struct Start {
     pub(crate) services: Vec<String>,
 }
 
+fn some_id<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<JausId>, D::Error> {
+    id(deserializer).map(Some)
+}
+
 fn id<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<JausId, D::Error> {
     let text = String::deserialize(deserializer)?;
     text.parse().map_err(serde::de::Error::custom)
@@ -106,11 +118,10 @@ impl Party {
                 path.display()
             )
         })?;
-        let party: Self =
-            toml::from_str(&text).map_err(|error| format!("{}: {error}", path.display()))?;
-        party
-            .check()
-            .map_err(|error| format!("{}: {error}", path.display()))?;
+        let wrong = |error: String| format!("{}: {error}", path.display());
+        let mut party: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        party.name = with_environment(&party.name).map_err(wrong)?;
+        party.check().map_err(wrong)?;
         Ok(party)
     }
 
@@ -120,7 +131,8 @@ impl Party {
             .iter()
             .map(|scenario| scenario.key())
             .collect();
-        for key in self.not_answering.keys().chain(self.not_acting.keys()) {
+        let excuses = self.not_answering.keys().chain(self.not_acting.keys());
+        for key in excuses.chain(self.finds.keys()) {
             // The beginning of keys stands for all of them.
             if !keys.iter().any(|known| known.starts_with(key.as_str())) {
                 return Err(format!(
@@ -147,6 +159,23 @@ impl Party {
     pub(crate) fn excuse_of_actor(&self, scenario: Scenario) -> Option<&str> {
         excuse(&self.not_acting, scenario)
     }
+}
+
+/// Puts the values of variables in the place of `${NAME}`.
+pub(crate) fn with_environment(word: &str) -> Result<String, String> {
+    let mut filled = String::new();
+    let mut rest = word;
+    while let Some((before, behind)) = rest.split_once("${") {
+        let (name, behind) = behind
+            .split_once('}')
+            .ok_or_else(|| format!("`{word}`: there is no }} behind ${{"))?;
+        let value = std::env::var(name).map_err(|_| {
+            format!("`{word}`: set the environment variable {name}; README.md tells what to")
+        })?;
+        filled = filled + before + &value;
+        rest = behind;
+    }
+    Ok(filled + rest)
 }
 
 fn excuse(excuses: &BTreeMap<String, String>, scenario: Scenario) -> Option<&str> {

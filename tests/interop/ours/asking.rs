@@ -16,7 +16,7 @@ const HZ: f64 = 10.0;
 pub(super) async fn periodic(told: &Told) -> Outcome {
     let (_node, component) = told.component()?;
     let mut reports = component
-        .subscribe::<ReportVelocityState, _>(told.other, &FORWARD, When::hz(HZ))
+        .subscribe::<ReportVelocityState, _>(told.sensor(), &FORWARD, When::hz(HZ))
         .await
         .map_err(|error| error.to_string())?;
     for _ in 0..ENOUGH {
@@ -39,7 +39,7 @@ pub(super) async fn keep(told: &Told) -> Outcome {
     loop {
         // One that is not there yet is asked again.
         let subscribed = component
-            .subscribe::<ReportVelocityState, _>(told.other, &FORWARD, When::hz(HZ))
+            .subscribe::<ReportVelocityState, _>(told.sensor(), &FORWARD, When::hz(HZ))
             .await;
         let mut reports = match subscribed {
             Ok(reports) => reports,

@@ -78,7 +78,7 @@ pub(super) async fn drive(told: &Told) -> Outcome {
     push_until(&control, async {
         loop {
             let report: Result<ReportVelocityState, _> =
-                component.query(told.other, &FORWARD).await;
+                component.query(told.sensor(), &FORWARD).await;
             let velocity = report.map_err(in_words)?.velocity_x_m_per_s();
             if velocity.is_some_and(|velocity| velocity > MOTION) {
                 println!("it moves at {velocity:?} m/s");
@@ -95,7 +95,7 @@ pub(super) async fn drive(told: &Told) -> Outcome {
 pub(super) async fn on_change(told: &Told) -> Outcome {
     let (_node, component) = told.component()?;
     let mut reports = component
-        .subscribe::<ReportVelocityState, _>(told.other, &FORWARD, When::OnChange)
+        .subscribe::<ReportVelocityState, _>(told.sensor(), &FORWARD, When::OnChange)
         .await
         .map_err(in_words)?;
     let control = ready(&component, told).await?;

@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use bytes::Bytes;
+use jaus::address::JausId;
 use jaus::endpoint::Outgoing;
 use jaus::node::{Node, Port};
-use tokio::time::{sleep, timeout};
+use tokio::time::{interval, sleep, timeout};
 
 use super::{Outcome, Told};
 
@@ -16,6 +17,9 @@ const TEST: u16 = 0xD7F0;
 const GREETING: usize = 16;
 /// After this long without an answer, what may have been lost is sent again.
 const AGAIN: Duration = Duration::from_secs(3);
+/// Between two calls of everybody, and the words: Query Identification of the subsystem.
+const CALL: Duration = Duration::from_secs(2);
+const WHO: [u8; 3] = [0x00, 0x2B, 2];
 /// Between two messages of [`keep`].
 const BEAT: Duration = Duration::from_millis(200);
 
@@ -68,42 +72,48 @@ pub(super) async fn keep(told: &Told) -> Outcome {
     }
 }
 
-/// Sends every test message back, acknowledged.
+/// Sends every test message back, acknowledged. Calls everybody now and then, as discovery does, so
+/// that who calls nobody knows where we are.
 pub(super) async fn echo(told: &Told) -> Outcome {
     let everywhere = "0.0.0.0".parse().map_err(|error| format!("{error}"))?;
-    let node =
-        Node::start(told.config().tcp_listen(everywhere)).map_err(|error| error.to_string())?;
+    let node = Node::start(told.config()?.tcp_listen(everywhere));
+    let node = node.map_err(|error| error.to_string())?;
     let mut port = node
         .attach(told.id.component())
         .map_err(|error| error.to_string())?;
     println!("listening");
-    while let Some(message) = port.recv().await {
+    let mut calls = interval(CALL);
+    loop {
+        let message = tokio::select! {
+            message = port.recv() => message.ok_or("the node has stopped")?,
+            _ = calls.tick() => {
+                let call = Outgoing::new(port.id(), JausId::EVERYONE, Bytes::from_static(&WHO));
+                port.send(call).map_err(|error| error.to_string())?;
+                continue;
+            }
+        };
         if !message.payload.starts_with(&TEST.to_le_bytes()) {
             continue;
         }
-        let is_right = message.payload == test(message.payload.len());
-        println!(
-            "{} octets from {}, right: {is_right}",
-            message.payload.len(),
-            message.source
-        );
+        let (length, source) = (message.payload.len(), message.source);
+        let is_right = message.payload == test(length);
+        println!("{length} octets from {source}, right: {is_right}");
         let back = Outgoing {
-            acknowledge: told.by != "unacknowledged",
-            ..Outgoing::new(port.id(), message.source, message.payload)
+            acknowledge: true,
+            ..Outgoing::new(port.id(), source, message.payload)
         };
         // An answer that nobody waits for is not missed.
         let _ = port.send(back);
     }
-    Ok(())
 }
 
 fn open(told: &Told) -> Result<Port, String> {
     let config = if told.by == "tcp" {
         let peer = format!("{}@{}:3794", told.other, told.address);
         let peer = peer.parse().map_err(|error| format!("{peer}: {error}"))?;
-        told.config().without_udp().tcp_connect(peer)
+        told.config()?.without_udp().tcp_connect(peer)
     } else {
-        told.config()
+        told.config()?
     };
     let node = Node::start(config).map_err(|error| error.to_string())?;
     node.attach(told.id.component())

@@ -24,6 +24,8 @@ pub(crate) struct Told {
     pub(crate) id: JausId,
     /// Whom to speak to.
     pub(crate) other: JausId,
+    /// Who tells the velocity, if that is somebody else.
+    sensor: Option<JausId>,
     /// An address: of the other for ours, of its own for a scripted peer.
     pub(crate) address: String,
     /// The octets of a message.
@@ -32,7 +34,7 @@ pub(crate) struct Told {
     pub(crate) within: Duration,
     /// How messages go: `udp`, `unacknowledged` or `tcp`.
     pub(crate) by: String,
-    /// What the other needs: `repeated-code` in each fragment, or nothing.
+    /// What the other needs of a node: settings as in a file.
     needs: String,
 }
 
@@ -94,6 +96,7 @@ impl Told {
         let mut told = Self {
             id: JausId::new(42, 1, 1),
             other: JausId::new(101, 1, 1),
+            sensor: None,
             address: String::new(),
             size: 16,
             within: Duration::from_secs(30),
@@ -106,6 +109,7 @@ impl Told {
             match key {
                 "id" => told.id = value.parse().map_err(|_| wrong())?,
                 "other" => told.other = value.parse().map_err(|_| wrong())?,
+                "sensor" => told.sensor = Some(value.parse().map_err(|_| wrong())?),
                 "address" => value.clone_into(&mut told.address),
                 "size" => told.size = value.parse().map_err(|_| wrong())?,
                 "seconds" => {
@@ -125,26 +129,23 @@ impl Told {
         JausId::new(subsystem, node, self.id.component() + 1)
     }
 
+    /// Who tells the velocity.
+    fn sensor(&self) -> JausId {
+        self.sensor.unwrap_or(self.other)
+    }
+
     /// A node as it is by default, but for what the other needs.
-    fn config(&self) -> Config {
-        let mut config = Config::new(self.id.subsystem(), self.id.node()).or_any_free_port();
-        if self.needs == "repeated-code" {
-            config.delivery.repeat_code_to.push(self.other);
-        }
-        config
+    fn config(&self) -> Result<Config, String> {
+        let needed = toml::from_str(&self.needs);
+        let mut config: Config = needed.map_err(|error| format!("{}: {error}", self.needs))?;
+        (config.subsystem, config.node) = (self.id.subsystem(), self.id.node());
+        Ok(config.or_any_free_port())
     }
 
-    /// A component that offers nothing of its own.
+    /// A node with a component that offers nothing of its own.
     fn component(&self) -> Result<(Node, Component), String> {
-        self.component_numbered(self.id.component(), self.config())
-    }
-
-    /// The same with another number.
-    fn component_numbered(&self, number: u8, config: Config) -> Result<(Node, Component), String> {
-        let node = Node::start(config).map_err(|error| error.to_string())?;
-        let component = Component::builder(Kind::OperatorControlUnit, "Interoperability")
-            .attach(&node, number)
-            .map_err(|error| error.to_string())?;
+        let node = Node::start(self.config()?).map_err(|error| error.to_string())?;
+        let component = operator(&node, self.id)?;
         Ok((node, component))
     }
 }
