@@ -14,6 +14,9 @@ use super::large::Transfer;
 use super::seen::{Heard, Seen};
 use super::target::Target;
 
+/// The code of messages that nobody acts on: user-defined (AS5710 leaves D000h and above to users).
+pub(super) const PADDING: u16 = 0xD7F0;
+
 /// Who asks whom, and how.
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
@@ -192,6 +195,21 @@ impl Case {
         let mut frame = self.frame(destination, octets(message));
         frame.flags = frame.flags.with_broadcast(Broadcast::Global);
         frame
+    }
+
+    /// A short message that nobody acts on, and that whoever has the id acknowledges.
+    pub(super) fn to_be_acknowledged(&mut self, id: JausId) -> Frame {
+        let mut frame = self.frame(id, PADDING.to_le_bytes().to_vec().into());
+        frame.flags = frame.flags.with_acknowledgement(Acknowledgement::Request);
+        frame
+    }
+
+    /// The same to everybody, as Junior calls whose address it does not know: who has no Discovery
+    /// acknowledges.
+    pub(super) fn call_alone(&mut self) -> Option<Send> {
+        let mut frame = self.to_be_acknowledged(self.id?);
+        frame.flags = frame.flags.with_broadcast(Broadcast::Global);
+        Some(Send::Group(frame))
     }
 
     /// The same questions once more, with numbers of their own: one that was heard before is taken

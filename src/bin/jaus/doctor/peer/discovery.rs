@@ -8,14 +8,12 @@ use jaus::messages::core::{
     QueryConfiguration, QueryServices, ReportConfiguration, ReportIdentification, ReportServices,
     query_configuration, query_services, report_identification::Type,
 };
-use jaus::wire::{Acknowledgement, Broadcast};
 
-use super::case::{Case, Offer, Question, Send};
+use super::case::{Case, Offer, Question};
 use super::examiner::{Begin, Judgement};
 use super::exchange::{Exchange, Mark, Verdict};
 use super::reach::query_identification;
 use super::seen::{Door, Heard};
-use super::standing::PADDING;
 
 pub(super) fn identification(case: &mut Case) -> Begin {
     if let Some(skip) = case.nobody() {
@@ -91,23 +89,13 @@ pub(super) fn multicast(case: &mut Case) -> Begin {
     }
     let mut sends = vec![case.ask_everybody(&query_identification())];
     if !case.went_well(Exchange::Identification) {
-        sends.extend(call_alone(case));
+        sends.extend(case.call_alone());
     }
     Begin::Ask(Question {
         sends,
         again: Some(Duration::from_millis(700)),
         patience: Duration::from_secs(2),
     })
-}
-
-/// What is for one alone and goes to everybody, as Junior calls whose address it does not know: it
-/// is acknowledged by who has no Discovery.
-fn call_alone(case: &mut Case) -> Option<Send> {
-    let id = case.id?;
-    let mut frame = case.frame(id, PADDING.to_le_bytes().to_vec().into());
-    let flags = frame.flags.with_broadcast(Broadcast::Global);
-    frame.flags = flags.with_acknowledgement(Acknowledgement::Request);
-    Some(Send::Group(frame))
 }
 
 pub(super) fn multicast_answered(case: &mut Case, mark: usize) -> Judgement {

@@ -10,12 +10,11 @@ use jaus::messages::core::{
 };
 use jaus::wire::{Acknowledgement, DataControl, Flags, Frame, Priority, large};
 
-use super::case::{Case, OpenEvent, Question, Send, octets};
+use super::case::{Case, OpenEvent, PADDING, Question, Send, octets};
 use super::discovery::node_seq;
 use super::events::{Reply, cancel_all, create, reply};
 use super::examiner::{Begin, Judgement};
 use super::exchange::{Exchange, Mark, Verdict};
-use super::standing::PADDING;
 
 /// Fragments that may be on their way: what the smallest known receive buffers hold.
 const WINDOW: usize = 8;
@@ -28,6 +27,8 @@ const PATIENCE: Duration = Duration::from_millis(1500);
 #[derive(Debug)]
 pub(super) struct Transfer {
     parts: Vec<Part>,
+    /// How much had been heard when it began.
+    since: usize,
 }
 
 #[derive(Debug)]
@@ -38,7 +39,7 @@ struct Part {
 }
 
 impl Transfer {
-    fn new(frames: Vec<Frame>) -> Self {
+    fn new(frames: Vec<Frame>, since: usize) -> Self {
         let part = |frame| Part {
             frame,
             sent: None,
@@ -46,6 +47,7 @@ impl Transfer {
         };
         Self {
             parts: frames.into_iter().map(part).collect(),
+            since,
         }
     }
 
@@ -93,7 +95,8 @@ pub(super) fn to_peer(case: &mut Case, size: u32, now: Duration) -> Begin {
         let name = smaller.exchange.name();
         return Begin::Over(Verdict::skipped(format!("not after \"{name}\"")));
     }
-    case.transfer = Some(Transfer::new(fragments(case, size as usize)));
+    let frames = fragments(case, size as usize);
+    case.transfer = Some(Transfer::new(frames, case.seen.len()));
     Begin::Ask(question(due(case, now)))
 }
 
@@ -176,7 +179,7 @@ pub(super) fn acknowledged(case: &mut Case, size: u32, mark: usize, now: Duratio
         .collect();
     let done = |transfer: &Transfer| transfer.done() == transfer.parts.len();
     if case.transfer.as_ref().is_some_and(done) {
-        return match is_back(case, size, mark) {
+        return match is_back(case, size) {
             true => Judgement::Over(came_whole(case, size)),
             false => Judgement::Wait,
         };
@@ -195,7 +198,10 @@ pub(super) fn acknowledged(case: &mut Case, size: u32, mark: usize, now: Duratio
     if done < all {
         return Judgement::Ask(question(due(case, now)));
     }
-    // Perhaps somebody there sends back what he gets.
+    // Perhaps somebody there sends back what he gets, and has done so.
+    if is_back(case, size) {
+        return Judgement::Over(came_whole(case, size));
+    }
     let patience = match (whole(size, case), case.echoes) {
         (true, _) => ECHO,
         (false, true) => LONG_ECHO,
@@ -213,8 +219,9 @@ fn whole(size: u32, case: &Case) -> bool {
     size as usize <= case.settings.payload_limit
 }
 
-/// Whether the message has come back since.
-fn is_back(case: &Case, size: u32, mark: usize) -> bool {
+/// Whether the message has come back since it was begun.
+fn is_back(case: &Case, size: u32) -> bool {
+    let mark = case.transfer.as_ref().map_or(0, |transfer| transfer.since);
     let message = padded(size as usize);
     let mut single = case
         .told(mark)

@@ -8,14 +8,13 @@ use jaus::address::JausId;
 use jaus::messages::core::{
     QueryHeartbeatPulse, QueryIdentification, query_identification::QueryType,
 };
-use jaus::wire::{Acknowledgement, Frame, Version, judp};
+use jaus::wire::{Frame, Version, judp};
 
 use super::case::{Case, Question, Send, octets};
 use super::examiner::{Begin, Judgement};
 use super::exchange::Verdict;
 use super::ra;
 use super::seen::{Door, Heard, Refusal};
-use super::standing::PADDING;
 
 pub(super) fn query_identification() -> QueryIdentification {
     QueryIdentification {
@@ -38,11 +37,11 @@ pub(super) fn find(case: &mut Case) -> Begin {
             "name the address too: --peer ID@ADDRESS",
         ));
     }
-    // To everybody, and to it alone as Junior calls those whose address it does not know.
-    let everybody = case.ask_everybody(&query_identification());
-    let alone = Send::Group(case.global(id, &query_identification()));
+    // Who has no Discovery acknowledges, at least.
+    let mut sends = vec![case.ask_everybody(&query_identification())];
+    sends.extend(case.call_alone());
     Begin::Ask(Question {
-        sends: vec![everybody, alone],
+        sends,
         again: Some(Duration::from_secs(1)),
         patience: case.settings.listen,
     })
@@ -186,10 +185,8 @@ pub(super) fn answer(case: &mut Case) -> Begin {
     let query = query_identification();
     let sends = match case.id {
         Some(id) => {
-            // Who has no Discovery acknowledges, at least.
-            let mut padding = case.frame(id, PADDING.to_le_bytes().to_vec().into());
-            padding.flags = padding.flags.with_acknowledgement(Acknowledgement::Request);
             let query = case.frame(id, octets(&query));
+            let padding = case.to_be_acknowledged(id);
             vec![Send::To(address, query), Send::To(address, padding)]
         }
         None => vec![case.ask_all_at(address, &query)],

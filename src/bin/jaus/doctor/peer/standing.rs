@@ -16,9 +16,6 @@ use super::discovery::shown;
 use super::examiner::{Begin, Judgement};
 use super::exchange::{Exchange, Mark, Verdict};
 
-/// The code of messages that nobody acts on: user-defined (AS5710 leaves D000h and above to users).
-pub(super) const PADDING: u16 = 0xD7F0;
-
 fn ask(case: &mut Case, message: &impl jaus::codec::Message) -> Begin {
     match case.ask_peer(message) {
         Some(send) => Begin::Ask(Question::new(send)),
@@ -55,8 +52,7 @@ pub(super) fn acknowledgement(case: &mut Case) -> Begin {
     let (Some(id), Some(address)) = (case.id, case.address) else {
         return Begin::Over(Verdict::skipped("no id is known there"));
     };
-    let mut frame = case.frame(id, Bytes::copy_from_slice(&PADDING.to_le_bytes()));
-    frame.flags = frame.flags.with_acknowledgement(Acknowledgement::Request);
+    let frame = case.to_be_acknowledged(id);
     Begin::Ask(Question::new(Send::To(address, frame)))
 }
 

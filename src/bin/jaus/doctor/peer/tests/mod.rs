@@ -58,20 +58,26 @@ fn words(settings: Settings, peer: &mut dyn air::Scripted) -> (String, Outcome) 
     )
 }
 
-/// Compares what is printed with the text of that name; with `JAUS_BLESS` set, writes it.
+/// Compares what is printed with the text of that name.
 #[track_caller]
 fn check(name: &str, settings: Settings, peer: &mut dyn air::Scripted) -> Outcome {
     let (text, outcome) = printed(settings, peer);
+    check_text(name, &text);
+    outcome
+}
+
+/// With `JAUS_BLESS` set, the text of that name becomes what is printed.
+#[track_caller]
+fn check_text(name: &str, text: &str) {
     let file = format!(
         "{}/src/bin/jaus/doctor/peer/tests/{name}.txt",
         env!("CARGO_MANIFEST_DIR")
     );
     if std::env::var_os("JAUS_BLESS").is_some() {
-        std::fs::write(&file, &text).unwrap();
+        std::fs::write(&file, text).unwrap();
     }
     let expected = std::fs::read_to_string(&file).unwrap_or_default();
     assert_eq!(text, expected, "{file}");
-    outcome
 }
 
 /// The first exchange that fails.
@@ -188,7 +194,7 @@ fn junior_without_services_acknowledges_and_no_more() {
         &mut Vehicle::junior(),
     );
     assert_eq!(outcome, Outcome::Incomplete);
-    // Nobody says an id there.
+    // Nobody there says an id.
     let first = first_failure(settings("10.0.0.2"), &mut Vehicle::junior());
     assert_eq!(first, Some(Exchange::Answer));
 }
@@ -196,8 +202,9 @@ fn junior_without_services_acknowledges_and_no_more() {
 #[test]
 fn each_exchange_that_fails_is_the_first_to_be_named() {
     type Knob = fn(&mut Vehicle);
-    let cases: [(Knob, Exchange); 16] = [
+    let cases: [(Knob, Exchange); 17] = [
         (|v| v.identifies = false, Exchange::Answer),
+        (|v| v.lists_itself = false, Exchange::Configuration),
         (|v| v.beats = false, Exchange::Heartbeat),
         (|v| v.acknowledges = false, Exchange::Acknowledgement),
         (|v| v.configures = false, Exchange::Configuration),
@@ -214,14 +221,18 @@ fn each_exchange_that_fails_is_the_first_to_be_named() {
         (|v| v.most_fragments = 8, Exchange::Large(100 << 10)),
         (|v| v.most_at_once = 20, Exchange::Rate),
     ];
+    let mut told = String::new();
     for (knob, exchange) in cases {
         let mut peer = Vehicle::sound();
         knob(&mut peer);
-        assert_eq!(
-            first_failure(settings("10.0.0.2"), &mut peer),
-            Some(exchange)
-        );
+        let examiner = examine(settings("10.0.0.2"), &mut peer);
+        let mut failed = examiner.case().trials.iter().filter(|t| t.failed());
+        let first = failed.next().unwrap();
+        assert_eq!(first.exchange, exchange);
+        told.push_str(&report::line(first, None, false).unwrap());
+        told.push('\n');
     }
+    check_text("failures", &told);
 }
 
 #[test]

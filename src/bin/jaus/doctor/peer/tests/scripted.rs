@@ -36,6 +36,7 @@ pub(super) struct Vehicle {
     pub(super) beats: bool,
     pub(super) acknowledges: bool,
     pub(super) configures: bool,
+    pub(super) lists_itself: bool,
     pub(super) wildcard: bool,
     pub(super) named: bool,
     pub(super) all: bool,
@@ -80,6 +81,7 @@ impl Vehicle {
             beats: true,
             acknowledges: true,
             configures: true,
+            lists_itself: true,
             wildcard: true,
             named: true,
             all: true,
@@ -220,7 +222,7 @@ impl Vehicle {
 
     fn configuration(&mut self, to: JausId, air: &mut Air) {
         let component = report_configuration::ComponentRec {
-            component_id: self.id.component(),
+            component_id: self.id.component() + u8::from(!self.lists_itself),
             instance_id: 0,
         };
         let node_list = vec![report_configuration::NodeSeq {
