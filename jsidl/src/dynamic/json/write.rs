@@ -122,9 +122,7 @@ fn variant(variant: &Variant, tag: u64, value: Option<&Value>) -> View {
 fn number(scalar: &Scalar, raw: Raw) -> View {
     if let Meaning::Scaled(scale) = &scalar.meaning {
         let shown = Steps::of(scale, scalar.number).and_then(|steps| steps.shown(raw));
-        return shown
-            .map(real)
-            .ok_or_else(|| unfit(raw, scalar.number).into());
+        return shown.map(real).ok_or_else(|| unfit(raw, scalar.number));
     }
     Ok(match (&scalar.meaning, scalar.number, raw) {
         (_, Number::Unsigned(_), Raw::Unsigned(raw)) => raw.into(),
