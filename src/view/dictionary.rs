@@ -95,7 +95,7 @@ impl Default for Dictionary {
 }
 
 impl Dictionary {
-    /// Everything that this crate was generated with.
+    /// Every AS5669A message that this crate was generated with.
     pub fn new() -> Self {
         let mut by_code: BTreeMap<u16, Vec<Definition>> = BTreeMap::new();
         // The registry has the newest of the types with one code first.
@@ -105,15 +105,17 @@ impl Dictionary {
         }
         Self {
             by_code,
-            ra: reference_architecture(),
+            ra: BTreeMap::new(),
             preferred: Vec::new(),
         }
     }
 
     /// Everything that comes with this crate: also the sets whose features are off, read by their
-    /// definitions at run time. It costs some milliseconds and a few MiB.
+    /// definitions at run time, and the messages of the Reference Architecture, which small programs
+    /// need not carry. It costs some milliseconds and a few MiB.
     pub fn complete() -> Self {
         let mut dictionary = Self::new();
+        dictionary.ra = reference_architecture();
         dictionary.load::<&Path>([]);
         dictionary
     }

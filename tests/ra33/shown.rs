@@ -14,7 +14,7 @@ use super::captures::captures;
 fn lines(file: &str) -> Option<Vec<Value>> {
     let path = captures()?.join("..").join(file);
     let mut capture = Capture::new(File::open(path).unwrap()).unwrap();
-    let dictionary = Dictionary::new();
+    let dictionary = Dictionary::complete();
     let mut network = Network::new([judp::PORT]);
     let mut log = MessageLog::new(&dictionary);
     let mut lines = Vec::new();
@@ -82,7 +82,7 @@ fn datagram(code: u16, data: &[u8]) -> Bytes {
 }
 
 fn shown(datagram: &Bytes) -> Value {
-    let dictionary = Dictionary::new();
+    let dictionary = Dictionary::complete();
     let mut log = MessageLog::new(&dictionary);
     let line = log.read(
         None,
