@@ -64,8 +64,7 @@ struct RaNetwork {
     #[arg(long, value_name = "INTERFACE")]
     ra_interface: Option<String>,
 
-    /// How messages are put into datagrams for those who have not been heard yet; answers go the way
-    /// that the peer speaks
+    /// How messages for everybody are put into datagrams; those for one go the way that it speaks
     #[arg(long, value_enum, default_value = "auto")]
     framing: Framing,
 
@@ -84,7 +83,7 @@ struct RaNetwork {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Framing {
-    /// Both, each message for everybody twice
+    /// In all framings that are heard, and nothing before the first is heard
     Auto,
     /// "JAUS01.0", JAUS_OPC_UDP_Interface of OpenJAUS
     Opc,
@@ -140,11 +139,11 @@ where
     let (from, to) = text
         .split_once('=')
         .ok_or("write two numbers or ids with an equals sign between them, such as 20=1200")?;
-    let from = from.trim().parse();
-    let to = to.trim().parse();
+    let from = from.parse();
+    let to = to.parse();
     Ok((
-        from.map_err(|error: A::Err| error.to_string())?,
-        to.map_err(|error: B::Err| error.to_string())?,
+        from.map_err(|error: A::Err| format!("left of the equals sign: {error}"))?,
+        to.map_err(|error: B::Err| format!("right of the equals sign: {error}"))?,
     ))
 }
 
@@ -204,7 +203,8 @@ impl Flags {
             settings.show = Show::Only(self.show.iter().copied().collect());
         }
         settings.ra.carrier.group_dialects = match self.ra.framing {
-            Framing::Auto => vec![Dialect::Opc, Dialect::As5669],
+            // In the framings that are heard; all RA systems tell regularly that they are there.
+            Framing::Auto => Vec::new(),
             Framing::Opc => vec![Dialect::Opc],
             Framing::Judp => vec![Dialect::As5669],
         };

@@ -10,6 +10,12 @@
 
 mod hostile;
 mod jaus_vehicle;
+mod knowledge;
 mod ra_vehicle;
+#[cfg(feature = "view")]
+mod replay;
 mod rover;
+#[cfg(feature = "view")]
+#[path = "../support/shared.rs"]
+mod shared;
 mod world;

@@ -31,7 +31,7 @@ pub(crate) struct World {
     pub(crate) ra: Vec<RaPeer>,
     pub(crate) jaus: Vec<JausPeer>,
     /// RA datagrams that the gateway has sent.
-    pub(crate) datagrams: usize,
+    pub(crate) sent: Vec<Bytes>,
 }
 
 /// An RA system: its node, what its components have received, and perhaps a vehicle.
@@ -79,7 +79,7 @@ impl World {
             attached: BTreeSet::new(),
             ra: Vec::new(),
             jaus: Vec::new(),
-            datagrams: 0,
+            sent: Vec::new(),
         }
     }
 
@@ -162,7 +162,7 @@ impl World {
         let (now, mut moved) = (self.now, false);
         while let Some(transmit) = self.gateway.poll_transmit() {
             moved = true;
-            self.datagrams += 1;
+            self.sent.push(transmit.datagram.clone());
             for peer in &mut self.ra {
                 if transmit.to == To::Group || transmit.to == To::Address(peer.address) {
                     let datagram = transmit.datagram.clone();
