@@ -231,7 +231,7 @@ pub(super) fn not_configured(case: &Case, mark: usize) -> Verdict {
     Verdict::failed(
         format!("{} does not answer Query Configuration", shown(case)),
         "the component does not speak for its subsystem",
-        "ask its node manager; our side lists components that it hears, too",
+        "ask its node manager, or the component itself",
     )
 }
 
@@ -321,7 +321,7 @@ fn empty(way: Exchange) -> Verdict {
         Exchange::ServicesWildcard => Verdict::failed(
             "Query Services with 255 for node and component gets an empty list",
             "the peer takes 255 for a number instead of \"all\" (JAUS++ does)",
-            "ask with numbers, or with an empty list; our clients do",
+            "ask with numbers; our clients do",
         ),
         Exchange::ServicesNamed => Verdict::failed(
             "Query Services with its own numbers gets an empty list",
@@ -358,6 +358,6 @@ pub(super) fn no_services(case: &Case, way: Exchange, mark: usize) -> Verdict {
     Verdict::failed(
         format!("Query Services {how} is not answered"),
         "the component offers no Discovery, or does not take this form of the question",
-        "ask in one of the other two forms; our clients try them",
+        "ask in one of the other two forms",
     )
 }

@@ -112,7 +112,7 @@ fn rejected(case: &Case, reject: &RejectEventRequest, kind: &str) -> Verdict {
     Verdict::failed(
         format!("{} refuses a {kind} event: {why}", shown(case)),
         "the peer has no such events for this query, or no room for more",
-        "ask at intervals instead of subscribing; our clients do where events are refused",
+        "ask at intervals instead of subscribing",
     )
 }
 

@@ -179,23 +179,28 @@ pub(super) fn answer(case: &mut Case) -> Begin {
     if let Some(skip) = case.cut_off() {
         return Begin::Over(skip);
     }
-    let Some(address) = case.address else {
-        return Begin::Over(Verdict::skipped("its address is not known"));
-    };
+    match case.address {
+        Some(address) => Begin::Ask(any_sign(case, address)),
+        None => Begin::Over(Verdict::skipped("its address is not known")),
+    }
+}
+
+fn any_sign(case: &mut Case, address: SocketAddr) -> Question {
     let query = query_identification();
     let sends = match case.id {
         Some(id) => {
+            // Who has no Discovery acknowledges, at least.
             let query = case.frame(id, octets(&query));
             let padding = case.to_be_acknowledged(id);
             vec![Send::To(address, query), Send::To(address, padding)]
         }
         None => vec![case.ask_all_at(address, &query)],
     };
-    Begin::Ask(Question {
+    Question {
         sends,
         again: Some(Duration::from_millis(500)),
         patience: case.settings.listen,
-    })
+    }
 }
 
 pub(super) fn answered(case: &mut Case, mark: usize) -> Judgement {
@@ -208,7 +213,7 @@ pub(super) fn answered(case: &mut Case, mark: usize) -> Judgement {
         of_it && heard.frame.destination == own && heard.door == Door::Unicast
     };
     let Some(heard) = case.seen.since(mark).iter().find(to_us).cloned() else {
-        return older(case, address);
+        return overheard(case, address);
     };
     case.link = Some(heard.link);
     case.id = case.id.or(Some(heard.frame.source));
@@ -218,18 +223,25 @@ pub(super) fn answered(case: &mut Case, mark: usize) -> Judgement {
     )))
 }
 
-/// A peer that beats in an older framing, and does not answer meanwhile, speaks that alone.
-fn older(case: &Case, address: SocketAddr) -> Judgement {
+/// Nothing was said to us. Who speaks to others tells an id by which to ask; and who beats in an
+/// older framing, and does not answer meanwhile, speaks that alone.
+fn overheard(case: &mut Case, address: SocketAddr) -> Judgement {
     const ENOUGH: usize = 3;
-    let versions = case
-        .seen
-        .of_host(address.ip())
-        .map(|heard| heard.frame.version);
-    let (new, old): (Vec<_>, Vec<_>) = versions.partition(|v| *v == Version::As5669a);
+    let there = case.seen.of_host(address.ip());
+    let (new, old): (Vec<_>, Vec<_>) =
+        there.partition(|heard| heard.frame.version == Version::As5669a);
     if new.is_empty() && old.len() >= ENOUGH {
         return Judgement::Over(only_older(address));
     }
-    Judgement::Wait
+    let speaks = |heard: &&&Heard| heard.from == address && heard.frame.source.is_unicast();
+    let source = new.iter().find(speaks).map(|heard| heard.frame.source);
+    match source.filter(|_| case.id.is_none()) {
+        Some(id) => {
+            case.id = Some(id);
+            Judgement::Ask(any_sign(case, address))
+        }
+        None => Judgement::Wait,
+    }
 }
 
 /// What it is, the next trial tells.

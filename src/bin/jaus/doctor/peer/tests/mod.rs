@@ -203,7 +203,7 @@ fn junior_without_services_acknowledges_and_no_more() {
 fn each_exchange_that_fails_is_the_first_to_be_named() {
     type Knob = fn(&mut Vehicle);
     let cases: [(Knob, Exchange); 17] = [
-        (|v| v.identifies = false, Exchange::Answer),
+        (|v| v.identifies = false, Exchange::Identification),
         (|v| v.lists_itself = false, Exchange::Configuration),
         (|v| v.beats = false, Exchange::Heartbeat),
         (|v| v.acknowledges = false, Exchange::Acknowledgement),
