@@ -307,6 +307,20 @@ impl Case {
         })
     }
 
+    /// Why questions to services need not be asked: none was answered so far.
+    pub(super) fn mute(&self) -> Option<Verdict> {
+        const BEFORE: [Exchange; 3] = [
+            Exchange::Identification,
+            Exchange::Heartbeat,
+            Exchange::Configuration,
+        ];
+        let silent = |exchange| self.mark_of(exchange) == Some(Mark::Failed);
+        BEFORE
+            .into_iter()
+            .all(silent)
+            .then(|| Verdict::skipped("it answers no questions: it has no services"))
+    }
+
     /// Why a service need not be asked: the component lists its services, and not this one.
     pub(super) fn lacks(&self, service: &str) -> Option<Verdict> {
         let listed = self.services.as_ref()?;

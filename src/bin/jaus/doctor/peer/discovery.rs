@@ -237,7 +237,7 @@ pub(super) fn not_configured(case: &Case, mark: usize) -> Verdict {
 
 /// Asks for services, by one of the three ways that there are.
 pub(super) fn services(case: &mut Case, way: Exchange) -> Begin {
-    if let Some(skip) = case.nobody() {
+    if let Some(skip) = case.nobody().or_else(|| case.mute()) {
         return Begin::Over(skip);
     }
     let Some(id) = case.id else {

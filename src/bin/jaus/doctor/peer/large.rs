@@ -263,7 +263,7 @@ pub(super) fn unacknowledged(case: &mut Case, size: u32) -> Verdict {
                 "all {all} fragments of {size} octets are acknowledged, but the message is lost"
             ),
             "the peer forgets the first fragments before the last come: Junior keeps \
-             MaxMsgHistory of them (50 as shipped, 71 kB in fragments of 1425 octets)",
+             MaxMsgHistory of them, 50 as shipped",
             "payload_limit = 4079 on our side makes fewer of them; raise MaxMsgHistory there",
         );
     }

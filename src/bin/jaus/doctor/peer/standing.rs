@@ -23,6 +23,12 @@ fn ask(case: &mut Case, message: &impl jaus::codec::Message) -> Begin {
     }
 }
 
+/// Why a service need not be asked.
+fn nobody_with(case: &Case, service: &str) -> Option<Verdict> {
+    let nobody = case.nobody().or_else(|| case.mute());
+    nobody.or_else(|| case.lacks(service))
+}
+
 pub(super) fn heartbeat(case: &mut Case) -> Begin {
     match case.nobody() {
         Some(skip) => Begin::Over(skip),
@@ -88,7 +94,7 @@ pub(super) fn not_acknowledged(case: &Case) -> Verdict {
 }
 
 pub(super) fn authority(case: &mut Case) -> Begin {
-    match case.nobody().or_else(|| case.lacks("AccessControl")) {
+    match nobody_with(case, "AccessControl") {
         Some(skip) => Begin::Over(skip),
         None => ask(case, &QueryAuthority),
     }
@@ -96,13 +102,16 @@ pub(super) fn authority(case: &mut Case) -> Begin {
 
 pub(super) fn has_authority(case: &mut Case, mark: usize) -> Judgement {
     match case.report::<ReportAuthority>(mark) {
-        Some(report) => Judgement::Over(Verdict::ok(format!("{}", report.authority_code))),
+        Some(report) => Judgement::Over(Verdict::ok(format!(
+            "its authority code is {}",
+            report.authority_code
+        ))),
         None => Judgement::Wait,
     }
 }
 
 pub(super) fn status(case: &mut Case) -> Begin {
-    match case.nobody().or_else(|| case.lacks("Management")) {
+    match nobody_with(case, "Management") {
         Some(skip) => Begin::Over(skip),
         None => ask(case, &QueryStatus),
     }
@@ -128,7 +137,7 @@ pub(super) fn has_status(case: &mut Case, mark: usize) -> Judgement {
 }
 
 pub(super) fn control(case: &mut Case) -> Begin {
-    match case.nobody().or_else(|| case.lacks("AccessControl")) {
+    match nobody_with(case, "AccessControl") {
         Some(skip) => Begin::Over(skip),
         None => ask(case, &QueryControl),
     }
@@ -169,7 +178,7 @@ pub(super) fn silent(case: &Case, query: &str, service: &str) -> Verdict {
 
 /// Control is taken if that is wanted, with no more authority than it needs, and from nobody.
 pub(super) fn take_control(case: &mut Case) -> Begin {
-    if let Some(skip) = case.nobody().or_else(|| case.lacks("AccessControl")) {
+    if let Some(skip) = nobody_with(case, "AccessControl") {
         return Begin::Over(skip);
     }
     if !case.settings.control {
