@@ -119,6 +119,8 @@ pub(super) struct Case {
     pub(super) trials: Vec<Trial>,
     /// The services that the component lists, once it has.
     pub(super) services: Option<Vec<Offer>>,
+    /// How many services the first report of a list has.
+    pub(super) listed: usize,
     /// What the component is called.
     pub(super) name: Option<String>,
     /// What has to be undone before we go.
@@ -142,6 +144,7 @@ impl Case {
             seen: Seen::default(),
             trials: Vec::new(),
             services: None,
+            listed: 0,
             name: None,
             open_events: Vec::new(),
             in_control: false,

@@ -270,24 +270,40 @@ pub(super) fn node_seq(node: u8, components: Vec<u8>) -> query_services::NodeSeq
     }
 }
 
-pub(super) fn serves(case: &mut Case, way: Exchange, mark: usize) -> Judgement {
+/// How long the other reports of a list may take, behind the first.
+const MORE: Duration = Duration::from_millis(150);
+
+/// A long list comes in several reports.
+pub(super) fn serves(case: &mut Case, way: Exchange, mark: usize, stage: u8) -> Judgement {
+    if stage > 0 {
+        return Judgement::Wait;
+    }
     let reports: Vec<ReportServices> = case.reports(mark).collect();
     if reports.is_empty() {
         return Judgement::Wait;
     }
-    let listed = |report: &ReportServices| {
-        let components = report
-            .node_list
-            .iter()
-            .flat_map(|node| &node.component_list);
-        components.map(|c| c.service_list.len()).sum::<usize>()
-    };
-    let services: usize = reports.iter().map(listed).sum();
-    if services == 0 {
+    case.listed = services_in(&reports);
+    if case.listed == 0 {
         return Judgement::Over(empty(way));
     }
     note_services(case, &reports);
-    Judgement::Over(Verdict::ok(counted(services, "service")))
+    Judgement::Ask(Question::silence(MORE))
+}
+
+fn services_in(reports: &[ReportServices]) -> usize {
+    let nodes = reports.iter().flat_map(|report| &report.node_list);
+    let components = nodes.flat_map(|node| &node.component_list);
+    components.map(|c| c.service_list.len()).sum()
+}
+
+/// The time for the list, or for its first report, is over.
+pub(super) fn all_listed(case: &mut Case, way: Exchange, mark: usize, stage: u8) -> Verdict {
+    if stage == 0 {
+        return no_services(case, way, mark);
+    }
+    let more: Vec<ReportServices> = case.reports(mark).collect();
+    note_services(case, &more);
+    Verdict::ok(counted(case.listed + services_in(&more), "service"))
 }
 
 /// Keeps what the component itself offers.
@@ -311,8 +327,14 @@ fn note_services(case: &mut Case, reports: &[ReportServices]) {
             minor: service.minor_version_number,
         })
         .collect();
-    if !offers.is_empty() {
-        case.services = Some(offers);
+    if offers.is_empty() {
+        return;
+    }
+    let known = case.services.get_or_insert_default();
+    for offer in offers {
+        if !known.contains(&offer) {
+            known.push(offer);
+        }
     }
 }
 
@@ -336,7 +358,7 @@ fn empty(way: Exchange) -> Verdict {
     }
 }
 
-pub(super) fn no_services(case: &Case, way: Exchange, mark: usize) -> Verdict {
+fn no_services(case: &Case, way: Exchange, mark: usize) -> Verdict {
     if let Some(error) = case.unreadable::<ReportServices>(mark) {
         return malformed("Report Services", &error);
     }

@@ -252,7 +252,7 @@ fn judge(exchange: Exchange, case: &mut Case, mark: usize, stage: u8, now: Durat
         Exchange::Acknowledgement => standing::acknowledged(case, mark),
         Exchange::Configuration => discovery::configured(case, mark),
         Exchange::ServicesWildcard | Exchange::ServicesNamed | Exchange::ServicesAll => {
-            discovery::serves(case, exchange, mark)
+            discovery::serves(case, exchange, mark, stage)
         }
         Exchange::Authority => standing::has_authority(case, mark),
         Exchange::Status => standing::has_status(case, mark),
@@ -288,7 +288,7 @@ fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Ve
         Exchange::Acknowledgement => standing::not_acknowledged(case),
         Exchange::Configuration => discovery::not_configured(case, mark),
         Exchange::ServicesWildcard | Exchange::ServicesNamed | Exchange::ServicesAll => {
-            discovery::no_services(case, exchange, mark)
+            discovery::all_listed(case, exchange, mark, stage)
         }
         Exchange::Authority => standing::silent(case, "Query Authority", "AccessControl"),
         Exchange::Status => standing::silent(case, "Query Status", "Management"),

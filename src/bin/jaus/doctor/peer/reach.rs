@@ -209,7 +209,10 @@ pub(super) fn answered(case: &mut Case, mark: usize) -> Judgement {
     };
     let own = case.settings.own;
     let to_us = |heard: &&Heard| {
-        let of_it = heard.from.ip() == address.ip() || Some(heard.frame.source) == case.id;
+        let of_it = match case.id {
+            Some(id) => heard.frame.source == id,
+            None => heard.from.ip() == address.ip(),
+        };
         of_it && heard.frame.destination == own && heard.door == Door::Unicast
     };
     let Some(heard) = case.seen.since(mark).iter().find(to_us).cloned() else {
@@ -282,8 +285,15 @@ pub(super) fn unanswered(case: &mut Case) -> Verdict {
 
 /// It speaks to everybody, and does not answer us.
 fn heard_only(case: &mut Case, address: SocketAddr, heard: &Heard) -> Verdict {
-    case.id = case.id.or(Some(heard.frame.source));
     let (id, from) = (heard.frame.source, heard.from);
+    if let Some(named) = case.settings.target.id.filter(|named| *named != id) {
+        return Verdict::failed(
+            format!("{named} does not answer there, but {id} speaks from {from}"),
+            "the peer has another id",
+            format!("name that: --peer {id}@{from}"),
+        );
+    }
+    case.id = case.id.or(Some(id));
     if from.port() != address.port() {
         return Verdict::failed(
             format!("{id} speaks from {from}, and nobody answers at {address}"),

@@ -164,6 +164,16 @@ fn a_wrong_port_is_told_with_the_right_one() {
 }
 
 #[test]
+fn a_wrong_id_is_told_with_the_right_one() {
+    let (text, outcome) = words(settings("78.1.1@10.0.0.2"), &mut Vehicle::sound());
+    assert_eq!(outcome, Outcome::Broken);
+    assert!(
+        text.contains("name that: --peer 77.1.1@10.0.0.2:3794"),
+        "{text}"
+    );
+}
+
+#[test]
 fn a_firewall_before_a_peer_that_speaks_is_suspected() {
     let mut peer = Vehicle::sound();
     peer.hears_unicast = false;
