@@ -23,6 +23,7 @@ pub mod cli;
 pub mod codec;
 #[cfg(feature = "node")]
 pub mod component;
+mod counters;
 pub mod endpoint;
 #[cfg(feature = "ra-gateway")]
 pub mod gateway;

@@ -1,32 +1,11 @@
 //! What an endpoint has seen, done and thrown away: one number for each, for people and for tests.
 
-use std::fmt;
-
-macro_rules! counters {
-    ($($(#[doc = $doc:literal])+ $name:ident = $text:literal,)+) => {
-        /// What is counted.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        #[non_exhaustive]
-        pub enum Counter {
-            $($(#[doc = $doc])+ $name,)+
-        }
-
-        impl Counter {
-            /// Every counter, in the order of their listing.
-            pub const ALL: &[Self] = &[$(Self::$name,)+];
-
-            /// What is counted, in a few words.
-            #[must_use]
-            pub const fn name(self) -> &'static str {
-                match self {
-                    $(Self::$name => $text,)+
-                }
-            }
-        }
-    };
-}
+use crate::counters::counters;
 
 counters! {
+    /// The numbers of an endpoint. They only grow.
+    pub struct Counters;
+
     /// Datagrams handed in.
     DatagramsReceived = "datagrams received",
     /// Datagrams handed out.
@@ -117,56 +96,4 @@ counters! {
     TransmitQueueFull = "dropped: transmit queue full",
     /// Dropped: an event that is not a message, because too many wait.
     NewsQueueFull = "dropped: event queue full",
-}
-
-/// The numbers of an endpoint. They only grow.
-///
-/// `Display` lists those that are not zero, one a line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Counters {
-    values: [u64; Counter::ALL.len()],
-}
-
-impl Default for Counters {
-    fn default() -> Self {
-        Self {
-            values: [0; Counter::ALL.len()],
-        }
-    }
-}
-
-impl Counters {
-    /// The number of one counter.
-    #[must_use]
-    pub fn get(&self, counter: Counter) -> u64 {
-        self.values[counter as usize]
-    }
-
-    /// All counters with their numbers.
-    pub fn iter(&self) -> impl Iterator<Item = (Counter, u64)> + '_ {
-        Counter::ALL.iter().copied().zip(self.values)
-    }
-
-    pub(super) fn add(&mut self, counter: Counter) {
-        self.add_many(counter, 1);
-    }
-
-    pub(super) fn add_many(&mut self, counter: Counter, number: u64) {
-        self.values[counter as usize] += number;
-    }
-}
-
-impl fmt::Display for Counters {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (counter, number) in self.iter().filter(|&(_, number)| number != 0) {
-            writeln!(f, "{number:>10}  {}", counter.name())?;
-        }
-        Ok(())
-    }
-}
-
-impl fmt::Display for Counter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }

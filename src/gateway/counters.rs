@@ -5,31 +5,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::{Duration, Instant};
 
-macro_rules! counters {
-    ($($(#[doc = $doc:literal])+ $name:ident = $text:literal,)+) => {
-        /// What is counted.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        #[non_exhaustive]
-        pub enum Counter {
-            $($(#[doc = $doc])+ $name,)+
-        }
-
-        impl Counter {
-            /// Every counter, in the order of their listing.
-            pub const ALL: &[Self] = &[$(Self::$name,)+];
-
-            /// What is counted, in a few words.
-            #[must_use]
-            pub const fn name(self) -> &'static str {
-                match self {
-                    $(Self::$name => $text,)+
-                }
-            }
-        }
-    };
-}
+use crate::counters::counters;
 
 counters! {
+    /// The numbers of a gateway. They only grow.
+    pub struct Counters;
+
     /// Queries of JAUS clients that were asked of RA components.
     QueriesToRa = "queries to RA",
     /// Commands of JAUS clients that were given to RA components.
@@ -70,48 +51,6 @@ counters! {
     TooManyComponents = "not shown: too many components",
     /// Not sent: the network of RA systems did not take it.
     NotSent = "not sent to RA",
-}
-
-/// The numbers of a gateway. They only grow.
-///
-/// `Display` lists those that are not zero, one a line.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Counters {
-    values: [u64; Counter::ALL.len()],
-}
-
-impl Default for Counters {
-    fn default() -> Self {
-        Self {
-            values: [0; Counter::ALL.len()],
-        }
-    }
-}
-
-impl Counters {
-    /// The number of one counter.
-    #[must_use]
-    pub fn get(&self, counter: Counter) -> u64 {
-        self.values[counter as usize]
-    }
-
-    /// All counters with their numbers.
-    pub fn iter(&self) -> impl Iterator<Item = (Counter, u64)> + '_ {
-        Counter::ALL.iter().copied().zip(self.values)
-    }
-
-    fn add(&mut self, counter: Counter) {
-        self.values[counter as usize] += 1;
-    }
-}
-
-impl fmt::Display for Counters {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (counter, number) in self.iter().filter(|&(_, number)| number != 0) {
-            writeln!(f, "{number:>10}  {}", counter.name())?;
-        }
-        Ok(())
-    }
 }
 
 /// Counts, and says in the log what is refused: once for each kind and message code, and again
