@@ -2,6 +2,8 @@
 //! other: for every generated message they accept the same octets, refuse the same, show the same
 //! JSON text and write the same octets.
 //!
+//! The messages of the Reference Architecture are compared in `roundtrip` and `ra33`.
+//!
 //! `JAUS_CASES=500` tries so many inputs for each message in place of a few.
 
 #![cfg(feature = "view")]
@@ -139,7 +141,7 @@ fn both_codecs_agree_on_every_generated_message() {
     let wanted = std::env::var("JAUS_CASES").ok();
     let wanted = wanted.map_or(24, |cases| cases.parse().unwrap());
     let mut types = 0;
-    for info in every_message() {
+    for info in messages::registry().iter() {
         for service in info.services {
             let message = definition(&library, service, info);
             let cases = if *service == info.services[0] {

@@ -5,14 +5,18 @@ use std::fmt;
 
 use super::exact::Expansion;
 
-/// A range of real numbers spread evenly over all values of an integer, counted from its least one.
+/// A range of real numbers spread evenly over all values of an integer, which are counted from its
+/// least one.
 ///
 /// `value = raw * (upper - lower) / (2^n - 1) + lower`, both limits inclusive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     lower: f64,
     upper: f64,
+    /// Steps from the lower limit to the upper one.
     max: u64,
+    /// Steps below the lower limit that the integer has too.
+    below: u64,
     step: f64,
     rounding: Rounding,
 }
@@ -36,6 +40,7 @@ impl Scale {
             lower,
             upper,
             max,
+            below: 0,
             step,
             rounding,
         }
@@ -43,8 +48,8 @@ impl Scale {
 
     /// The range for a type of integers with the limits `least` and `greatest`.
     ///
-    /// A signed type has 0 in the centre of the range, and its least integer is one step below the
-    /// range, as the Reference Architecture has it; this is where the range given here begins.
+    /// A signed type has 0 in the centre of the range, as the Reference Architecture has it: its
+    /// least integer is one step below the range.
     pub const fn of_integer(
         lower: f64,
         upper: f64,
@@ -52,13 +57,9 @@ impl Scale {
         greatest: i64,
         rounding: Rounding,
     ) -> Self {
-        let max = greatest.abs_diff(least);
-        let lower = if least < 0 {
-            lower - (upper - lower) / (max - 1) as f64
-        } else {
-            lower
-        };
-        Self::new(lower, upper, max, rounding)
+        let below = (least < 0) as u64;
+        let scale = Self::new(lower, upper, greatest.abs_diff(least) - below, rounding);
+        Self { below, ..scale }
     }
 
     /// The least real number.
@@ -79,12 +80,20 @@ impl Scale {
     /// The real number that an integer stands for.
     #[inline]
     pub fn value(&self, raw: u64) -> f64 {
-        (raw as f64 * self.step + self.lower).min(self.upper)
+        self.unbounded(raw).min(self.upper)
+    }
+
+    #[inline]
+    fn unbounded(&self, raw: u64) -> f64 {
+        (raw as f64 - self.below as f64) * self.step + self.lower
     }
 
     /// The integer for a real number, exactly rounded; `None` for what is outside the range or not
-    /// a number.
+    /// a number. An integer below the range may be written by its value.
     pub fn raw(&self, value: f64) -> Option<u64> {
+        if self.below > 0 && value < self.lower && value >= self.lower - 1.5 * self.step {
+            return Some(u64::from(self.reaches(value, 0)));
+        }
         if !(self.lower <= value && value <= self.upper) {
             return None;
         }
@@ -99,13 +108,13 @@ impl Scale {
         let below = shifted as u64;
         let fraction = shifted - below as f64;
         if fraction > doubt && fraction < 1.0 - doubt {
-            Some(below.min(self.max))
+            Some(below.min(self.max) + self.below)
         } else {
-            Some(self.raw_exactly(value))
+            Some(self.raw_exactly(value) + self.below)
         }
     }
 
-    /// The integer for a number in the range, by bisection with exact comparisons.
+    /// Steps from the lower limit to a number in the range, by bisection with exact comparisons.
     #[cold]
     #[inline(never)]
     fn raw_exactly(&self, value: f64) -> u64 {
@@ -121,7 +130,7 @@ impl Scale {
         least
     }
 
-    /// Whether a number in the range is rounded to `raw` (at least 1) or higher.
+    /// Whether a number is rounded to so many steps above the lower limit or higher.
     fn reaches(&self, value: f64, raw: u64) -> bool {
         let twice = 2 * i128::from(raw);
         let boundary = match self.rounding {
@@ -146,7 +155,7 @@ impl Scale {
         if stands_for_raw(&0.0) {
             return 0.0;
         }
-        let value = raw as f64 * self.step + self.lower;
+        let value = self.unbounded(raw);
         // Halfway to where another integer begins, away from doubts of rounding.
         let inside = match self.rounding {
             Rounding::Round => value,

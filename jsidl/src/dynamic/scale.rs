@@ -13,9 +13,11 @@ use crate::model::{Number, Rounding, Scale, Signed, Unsigned};
 /// The values of a scaled integer of any type, counted from its least one.
 #[derive(Debug, Clone, Copy)]
 pub struct Steps {
-    /// From the value of the least integer.
     scale: Scale,
-    width: Unsigned,
+    /// Steps from the lower limit to the upper one.
+    max: u64,
+    /// Steps below the lower limit that the type has too.
+    below: u64,
     /// The least integer, if the type is signed.
     least: Option<i64>,
 }
@@ -24,33 +26,32 @@ impl Steps {
     /// `None` if such numbers cannot be scaled.
     pub fn of(scale: &Scale, number: Number) -> Option<Self> {
         let width = match number {
-            Number::Unsigned(width) => width,
+            Number::Unsigned(width) => return Some(Self::of_unsigned(scale, width)),
             Number::Signed(Signed::I8) => Unsigned::U8,
             Number::Signed(Signed::I16) => Unsigned::U16,
             Number::Signed(Signed::I32) => Unsigned::U32,
             Number::Signed(Signed::I64) | Number::F32 | Number::F64 => return None,
         };
-        let Number::Signed(_) = number else {
-            return Some(Self {
-                scale: *scale,
-                width,
-                least: None,
-            });
-        };
-        let step = (scale.upper - scale.lower) / (width.max() - 1) as f64;
         Some(Self {
-            scale: Scale {
-                lower: scale.lower - step,
-                ..*scale
-            },
-            width,
+            scale: *scale,
+            max: width.max() - 1,
+            below: 1,
             least: Some(-(1 << (width.size() * 8 - 1))),
         })
     }
 
+    const fn of_unsigned(scale: &Scale, width: Unsigned) -> Self {
+        Self {
+            scale: *scale,
+            max: width.max(),
+            below: 0,
+            least: None,
+        }
+    }
+
     /// The distance between neighbouring values.
     pub fn step(&self) -> f64 {
-        (self.scale.upper - self.scale.lower) / self.width.max() as f64
+        (self.scale.upper - self.scale.lower) / self.max as f64
     }
 
     /// What people are shown: see [`shortest_real`]. `None` if the integer is of another type.
@@ -60,73 +61,125 @@ impl Steps {
             (Raw::Signed(raw), Some(least)) => raw.checked_sub(least)?.try_into().ok()?,
             _ => return None,
         };
-        Some(shortest_real(&self.scale, self.width, count))
+        Some(self.shortest(count))
     }
 
-    /// The integer that stands for a real number: see [`raw_from_real`].
+    /// The integer that stands for a real number: see [`raw_from_real`]. Of the values below the
+    /// range it takes those that stand for the least integer, so that this can be written too.
     pub fn raw(&self, real: f64) -> Option<Raw> {
-        let count = raw_from_real(&self.scale, self.width, real)?;
+        let count = self.count(real)?;
         Some(match self.least {
             None => Raw::Unsigned(count),
             // A signed type has at most 32 bits.
             Some(least) => Raw::Signed(count as i64 + least),
         })
     }
+
+    /// The real number that so many steps from the least integer stand for.
+    fn real(&self, count: u64) -> f64 {
+        (count as f64 - self.below as f64) * self.step() + self.scale.lower
+    }
+
+    /// Steps from the least integer to the one for a real number.
+    fn count(&self, real: f64) -> Option<u64> {
+        let (lower, upper) = (self.scale.lower, self.scale.upper);
+        if self.below > 0 && real < lower && real >= lower - 1.5 * self.step() {
+            return Some(u64::from(self.reaches(real, 0)));
+        }
+        if !(lower..=upper).contains(&real) {
+            return None;
+        }
+        let reaches = |raw| raw == 0 || self.reaches(real, raw);
+        // A conversion to an integer saturates, so that this is a number of the type or above it.
+        let guess = ((real - lower) / self.step()) as u64;
+        let mut least = guess.min(self.max).saturating_sub(2);
+        let mut greatest = guess.saturating_add(2).min(self.max);
+        if !reaches(least) {
+            least = 0;
+        }
+        if greatest < self.max && reaches(greatest + 1) {
+            greatest = self.max;
+        }
+        while least < greatest {
+            let middle = greatest - (greatest - least) / 2;
+            if reaches(middle) {
+                least = middle;
+            } else {
+                greatest = middle - 1;
+            }
+        }
+        Some(least + self.below)
+    }
+
+    /// Whether the integer for `real` is `raw` steps above the lower limit or more, exactly.
+    ///
+    /// That is so if `real` is at least (for `ceiling`: above) the threshold
+    /// `lower + k/2 * (upper - lower) / max`, where `k` counts half steps. Multiplied by `2 * max`,
+    /// both sides are sums of integer multiples of the three numbers.
+    fn reaches(&self, real: f64, raw: u64) -> bool {
+        let (raw, max) = (i128::from(raw), i128::from(self.max));
+        let (half_steps, admitted) = match self.scale.rounding {
+            Rounding::Round => (2 * raw - 1, Ordering::Equal),
+            Rounding::Floor => (2 * raw, Ordering::Equal),
+            Rounding::Ceiling => (2 * raw - 2, Ordering::Greater),
+        };
+        let terms = [
+            (2 * max, real),
+            (half_steps - 2 * max, self.scale.lower),
+            (-half_steps, self.scale.upper),
+        ];
+        sign_of_sum(terms) >= admitted
+    }
+
+    fn shortest(&self, count: u64) -> f64 {
+        let exact = self.real(count);
+        if !exact.is_finite() {
+            return exact;
+        }
+        let encodes_back = |real: &f64| self.count(*real) == Some(count);
+        if encodes_back(&0.0) {
+            return 0.0;
+        }
+        // With `floor` and `ceiling` the exact value is the edge of what encodes back, and the
+        // rounding error of its computation may put it beyond.
+        let step = self.step();
+        let inside = match self.scale.rounding {
+            Rounding::Round => exact,
+            Rounding::Floor => exact + step / 2.0,
+            Rounding::Ceiling => exact - step / 2.0,
+        };
+        // Most candidates are so far away that they need no exact look.
+        let near = |real: &f64| (real - exact).abs() <= 2.0 * step;
+        let around = |number| {
+            (1..=17)
+                .flat_map(move |digits| neighbours(number, digits))
+                .filter(near)
+        };
+        around(exact)
+            .chain(around(inside))
+            .find(encodes_back)
+            .unwrap_or(exact)
+    }
 }
 
 /// The real number that an integer stands for: `raw * (upper - lower) / (2^n - 1) + lower`.
 pub fn real_from_raw(scale: &Scale, width: Unsigned, raw: u64) -> f64 {
-    let step = (scale.upper - scale.lower) / width.max() as f64;
-    raw as f64 * step + scale.lower
+    Steps::of_unsigned(scale, width).real(raw)
 }
 
 /// The integer that stands for a real number, or `None` if the number lies outside of the range
 /// (its limits belong to it) or is not a number.
 pub fn raw_from_real(scale: &Scale, width: Unsigned, real: f64) -> Option<u64> {
-    if !(scale.lower..=scale.upper).contains(&real) {
-        return None;
-    }
-    let reaches = |raw| raw == 0 || reaches(scale, width, real, raw);
-    let step = (scale.upper - scale.lower) / width.max() as f64;
-    // A conversion to an integer saturates, so that this is a number of the type or above it.
-    let guess = ((real - scale.lower) / step) as u64;
-    let mut least = guess.min(width.max()).saturating_sub(2);
-    let mut greatest = guess.saturating_add(2).min(width.max());
-    if !reaches(least) {
-        least = 0;
-    }
-    if greatest < width.max() && reaches(greatest + 1) {
-        greatest = width.max();
-    }
-    while least < greatest {
-        let middle = greatest - (greatest - least) / 2;
-        if reaches(middle) {
-            least = middle;
-        } else {
-            greatest = middle - 1;
-        }
-    }
-    Some(least)
+    Steps::of_unsigned(scale, width).count(real)
 }
 
-/// Whether the integer for `real` is `raw` or greater, exactly.
+/// The decimal with the fewest significant digits that encodes back to `raw`.
 ///
-/// That is so if `real` is at least (for `ceiling`: above) the threshold
-/// `lower + k/2 * (upper - lower) / max`, where `k` counts half steps. Multiplied by `2 * max`, both
-/// sides are sums of integer multiples of the three numbers.
-fn reaches(scale: &Scale, width: Unsigned, real: f64, raw: u64) -> bool {
-    let (raw, max) = (i128::from(raw), i128::from(width.max()));
-    let (half_steps, admitted) = match scale.rounding {
-        Rounding::Round => (2 * raw - 1, Ordering::Equal),
-        Rounding::Floor => (2 * raw, Ordering::Equal),
-        Rounding::Ceiling => (2 * raw - 2, Ordering::Greater),
-    };
-    let terms = [
-        (2 * max, real),
-        (half_steps - 2 * max, scale.lower),
-        (-half_steps, scale.upper),
-    ];
-    sign_of_sum(terms) >= admitted
+/// Zero counts as a number without digits, so that the middle of a symmetric range reads 0. Among
+/// decimals of equally many digits the one nearest to [`real_from_raw`] is taken. Where steps are
+/// finer than `f64` can express and no decimal encodes back, it is [`real_from_raw`] itself.
+pub fn shortest_real(scale: &Scale, width: Unsigned, raw: u64) -> f64 {
+    Steps::of_unsigned(scale, width).shortest(raw)
 }
 
 /// The sign of a sum of products, without rounding. Factors are below 2^66.
@@ -169,41 +222,6 @@ fn parts(number: f64) -> (i64, i32) {
         },
         exponent,
     )
-}
-
-/// The decimal with the fewest significant digits that encodes back to `raw`.
-///
-/// Zero counts as a number without digits, so that the middle of a symmetric range reads 0. Among
-/// decimals of equally many digits the one nearest to [`real_from_raw`] is taken. Where steps are
-/// finer than `f64` can express and no decimal encodes back, it is [`real_from_raw`] itself.
-pub fn shortest_real(scale: &Scale, width: Unsigned, raw: u64) -> f64 {
-    let exact = real_from_raw(scale, width, raw);
-    if !exact.is_finite() {
-        return exact;
-    }
-    let encodes_back = |real: &f64| raw_from_real(scale, width, *real) == Some(raw);
-    if encodes_back(&0.0) {
-        return 0.0;
-    }
-    // With `floor` and `ceiling` the exact value is the edge of what encodes back, and the rounding
-    // error of its computation may put it beyond.
-    let step = (scale.upper - scale.lower) / width.max() as f64;
-    let inside = match scale.rounding {
-        Rounding::Round => exact,
-        Rounding::Floor => exact + step / 2.0,
-        Rounding::Ceiling => exact - step / 2.0,
-    };
-    // Most candidates are so far away that they need no exact look.
-    let near = |real: &f64| (real - exact).abs() <= 2.0 * step;
-    let around = |number| {
-        (1..=17)
-            .flat_map(move |digits| neighbours(number, digits))
-            .filter(near)
-    };
-    around(exact)
-        .chain(around(inside))
-        .find(encodes_back)
-        .unwrap_or(exact)
 }
 
 /// The two decimals of so many significant digits around a number other than 0, the nearer first.
@@ -340,6 +358,10 @@ mod tests {
             assert_eq!(height.raw(real), Some(Raw::Signed(raw)));
         }
         assert_eq!(height.raw(35000.1), None);
+        // Halves go up, exactly.
+        let percent = steps(-100.0, 100.0, Signed::I16);
+        assert_eq!(percent.raw(50.0), Some(Raw::Signed(16384)));
+        assert_eq!(percent.raw(-50.0), Some(Raw::Signed(-16383)));
         let octet = steps(-127.0, 127.0, Signed::I8);
         for raw in -128..=127 {
             let real = octet.shown(Raw::Signed(raw)).unwrap();

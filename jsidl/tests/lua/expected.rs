@@ -1,7 +1,7 @@
 //! What tshark must print for a message: our own value, field by field in wire order.
 
-use jsidl::dynamic::{Raw, Value, shortest_real};
-use jsidl::model::{Item, Meaning, Message, Number, Scalar, Shape};
+use jsidl::dynamic::{Raw, Steps, Value};
+use jsidl::model::{Item, Meaning, Message, Scalar, Shape};
 use roxmltree::Node;
 
 use crate::tshark::name;
@@ -125,8 +125,9 @@ impl Walk {
 
 fn number(scalar: &Scalar, raw: Raw) -> Content {
     match (&scalar.meaning, scalar.number, raw) {
-        (Meaning::Scaled(scale), Number::Unsigned(width), Raw::Unsigned(raw)) => {
-            Content::Real(shortest_real(scale, width, raw))
+        (Meaning::Scaled(scale), number, raw) => {
+            let shown = Steps::of(scale, number).and_then(|steps| steps.shown(raw));
+            Content::Real(shown.unwrap())
         }
         (_, _, Raw::Unsigned(integer)) => Content::Integer(integer.into()),
         (_, _, Raw::Signed(integer)) => Content::Integer(integer.into()),

@@ -1,6 +1,7 @@
 //! Random messages of every type that comes with the crate: tshark prints the values that our own
 //! codec reads.
 
+use jsidl::Loader;
 use jsidl::dynamic::{arbitrary, encode};
 
 use crate::golden::check_source;
@@ -20,18 +21,28 @@ fn entropy(seed: u64) -> Vec<u8> {
 
 #[test]
 fn tshark_prints_the_values_of_random_messages_of_every_built_in_type() {
+    check_random("random", Loader::catalogue, 200);
+}
+
+#[test]
+fn tshark_prints_the_values_of_random_messages_of_the_reference_architecture() {
+    check_random("random_ra", Loader::reference_architecture, 100);
+}
+
+/// Messages of every type that is loaded, more than `least`.
+fn check_random(name: &str, load: fn(&mut Loader) -> &mut Loader, least: usize) {
     if !tshark::is_there() {
         return;
     }
-    let mut loader = jsidl::Loader::new();
-    loader.catalogue();
+    let mut loader = Loader::new();
+    load(&mut loader);
     let library = loader.load().library;
     let messages = library.services().flat_map(|service| service.messages());
     let vectors: Vec<_> = (0..)
         .zip(messages)
         .filter_map(|(seed, message)| encode(message, &arbitrary(message, &entropy(seed))).ok())
         .collect();
-    assert!(vectors.len() > 200, "{} messages", vectors.len());
-    let checked = check_source(&library, "random", &vectors);
+    assert!(vectors.len() > least, "{} messages", vectors.len());
+    let checked = check_source(&library, name, &vectors);
     assert_eq!(checked, vectors.len());
 }

@@ -83,26 +83,28 @@ local to_integer = {
 local function unscaled(raw, kind, lower, upper, rounding)
     local size = tonumber(kind:sub(2))
     local most = 2 ^ (8 * size) - 1
-    if kind:sub(1, 1) == "i" then
+    local signed = kind:sub(1, 1) == "i"
+    if signed then
         -- 0 is the centre, and the least integer is one step below the range.
-        raw = raw + 2 ^ (8 * size - 1)
-        lower = lower - (upper - lower) / (most - 1)
+        most = most - 1
+        raw = raw + most / 2
     end
     local step = (upper - lower) / most
+    local least = signed and lower - 1.5 * step or lower
     local convert = to_integer[rounding or "round"]
     local function is_same(real)
-        return real >= lower and real <= upper and convert((real - lower) / step) == raw
+        return real >= least and real <= upper and convert((real - lower) / step) == raw
     end
     if is_same(0) then
         return 0
     end
     local exact = raw * step + lower
     return shortest(exact, function(real, digits)
-        if real < lower or real > upper then
+        if real < least or real > upper then
             -- The nearest of so many digits lies beyond the range: its neighbour may be inside.
             local exponent = tonumber(string.format("%.0e", real):match("e(.*)$"))
             local unit = 10 ^ (exponent - digits + 1)
-            local text = string.format("%." .. digits .. "g", real + (real < lower and unit or -unit))
+            local text = string.format("%." .. digits .. "g", real + (real < least and unit or -unit))
             real = tonumber(text)
         end
         return is_same(real) and real
