@@ -7,8 +7,8 @@
 //! as it is whole. What does not pass is counted.
 //!
 //! Everything is sent to the port of [`Settings::port`], as OpenJAUS expects. What is for everybody
-//! goes to the group, in the framings of [`Settings::group_dialects`] and those that somebody was
-//! heard to use.
+//! goes to the group, in the framings that somebody was heard to use and, more rarely then, in the
+//! others of [`Settings::group_dialects`].
 
 mod addresses;
 mod packet;
@@ -18,7 +18,7 @@ mod settings;
 mod tests;
 mod transmit;
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{IpAddr, SocketAddr};
 use std::time::Instant;
 
@@ -46,6 +46,8 @@ pub struct Carrier {
     messages: Option<Buckets<IpAddr>>,
     parts: Parts,
     transmits: VecDeque<Transmit>,
+    /// How much each subsystem here has sent to everybody.
+    group_sent: BTreeMap<u8, u32>,
     counters: Counters,
 }
 
@@ -60,6 +62,7 @@ impl Carrier {
             messages: settings.messages.map(buckets),
             parts: Parts::new(&settings),
             transmits: VecDeque::new(),
+            group_sent: BTreeMap::new(),
             counters: Counters::default(),
             settings,
         }

@@ -22,9 +22,9 @@ pub struct Settings {
     /// The UDP port to which everything is sent, whichever port the other side sends from: 3794.
     /// OpenJAUS does the same.
     pub port: u16,
-    /// The framings in which is sent to the group, and to whom has not been heard yet. With both,
-    /// each such message is sent twice; a
-    /// framing that somebody is heard to use is added by itself. Answers go in the framing of what was heard last.
+    /// The framings of what goes to the group, and so to those who have not been heard yet. A framing
+    /// that somebody is heard to use is added by itself; where others are used, one that nobody
+    /// uses is left out nine times of ten. Answers go in the framing of what was heard last.
     pub group_dialects: Vec<Dialect>,
     /// The header versions that are accepted, of 0 (RA 2.x), 1 (3.0 and 3.1) and 2 (3.2 and 3.3).
     pub versions: Vec<u8>,

@@ -351,7 +351,7 @@ fn nobody_can_invent_subsystems_without_end() {
 }
 
 #[test]
-fn everybody_is_told_in_every_framing_that_is_spoken() {
+fn everybody_is_told_in_the_framing_that_is_spoken() {
     let mut carrier = carrier(Settings::default());
     let all = RaId::new(255, 255, 1, 1);
     let heartbeat = Message::new(US, all, 0x4202, Bytes::new());
@@ -365,7 +365,7 @@ fn everybody_is_told_in_every_framing_that_is_spoken() {
     let first: Vec<_> = std::iter::from_fn(|| carrier.poll_transmit())
         .map(|sent| sent.datagram[0])
         .collect();
-    assert_eq!(first, [b'J', 1]);
+    assert_eq!(first, [1], "whoever speaks the other would have been heard");
 }
 
 #[test]
@@ -393,4 +393,26 @@ fn what_cannot_be_sent_says_why() {
     ));
     assert_eq!(carrier.send(&message), Ok(()));
     assert_eq!(carrier.send(&message), Err(SendError::QueueFull));
+}
+
+#[test]
+fn a_framing_that_nobody_speaks_is_used_rarely_where_another_is() {
+    let mut carrier = carrier(Settings {
+        group_dialects: vec![Dialect::Opc, Dialect::As5669],
+        ..Settings::default()
+    });
+    let heartbeat = Message::new(US, RaId::new(255, 255, 1, 1), 0x4202, Bytes::new());
+    let sent = |carrier: &mut Carrier| {
+        for _ in 0..20 {
+            carrier.send(&heartbeat).unwrap();
+        }
+        let all = std::iter::from_fn(|| carrier.poll_transmit());
+        let all: Vec<_> = all.map(|sent| sent.datagram[0]).collect();
+        [b'J', 1].map(|first| all.iter().filter(|octet| **octet == first).count())
+    };
+    assert_eq!(sent(&mut carrier), [20, 20], "nobody was heard");
+    hear(&mut carrier, start(), 1, &packet(fields(), &[]));
+    assert_eq!(sent(&mut carrier), [20, 2]);
+    carrier.forget(PEER.subsystem);
+    assert_eq!(sent(&mut carrier), [20, 20]);
 }

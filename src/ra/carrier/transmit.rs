@@ -77,7 +77,7 @@ impl Carrier {
         if length > limit {
             return Err(SendError::TooLong { length, limit });
         }
-        let ways = self.ways(message.destination.subsystem)?;
+        let ways = self.ways(message.source.subsystem, message.destination.subsystem)?;
         let packets = length.div_ceil(crate::wire::ra::MAX_DATA).max(1) * ways.len();
         if self.transmits.len() + packets > self.settings.queue_limit {
             self.counters.add(Counter::TransmitQueueFull);
@@ -94,17 +94,31 @@ impl Carrier {
     }
 
     /// Where what is for a subsystem goes, and how.
-    fn ways(&self, subsystem: u8) -> Result<Vec<(To, Dialect)>, SendError> {
-        if subsystem == RaId::ALL {
-            let wanted = |&dialect: &Dialect| {
-                self.settings.group_dialects.contains(&dialect) || self.addresses.speaks(dialect)
-            };
-            let dialects = [Dialect::Opc, Dialect::As5669].into_iter().filter(wanted);
+    fn ways(&mut self, from: u8, to: u8) -> Result<Vec<(To, Dialect)>, SendError> {
+        if to == RaId::ALL {
+            let dialects = self.group_dialects(from);
             return Ok(dialects.map(|dialect| (To::Group, dialect)).collect());
         }
-        let known = self.addresses.of(subsystem);
-        let (address, dialect) = known.ok_or(SendError::Unknown(subsystem))?;
+        let known = self.addresses.of(to);
+        let (address, dialect) = known.ok_or(SendError::Unknown(to))?;
         Ok(vec![(To::Address(address), dialect)])
+    }
+
+    /// The framings of what a subsystem sends to everybody: those that are spoken, and those that are
+    /// configured. OpenJAUS reports each datagram of a framing that is not its own as an error; so
+    /// where others are spoken, one that nobody speaks is used each tenth time only. Who does speak
+    /// it is heard by then.
+    fn group_dialects(&mut self, from: u8) -> impl Iterator<Item = Dialect> + '_ {
+        const RARELY: u32 = 10;
+        let sent = self.group_sent.entry(from).or_default();
+        let is_turn = sent.is_multiple_of(RARELY);
+        *sent = sent.wrapping_add(1);
+        let all = [Dialect::Opc, Dialect::As5669].into_iter();
+        let is_quiet = !all.clone().any(|dialect| self.addresses.speaks(dialect));
+        all.filter(move |&dialect| {
+            let configured = self.settings.group_dialects.contains(&dialect);
+            self.addresses.speaks(dialect) || (configured && (is_quiet || is_turn))
+        })
     }
 
     /// Puts a datagram behind those that wait.
