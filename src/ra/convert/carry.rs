@@ -117,7 +117,7 @@ macro_rules! same_presence {
 pub(super) use same_presence;
 
 /// Refuses a field that is set and has no place on the other side.
-pub(super) fn refuse<T>(field: Option<T>, name: &'static str) -> Result<(), Refusal> {
+pub(super) fn refuse<T: Copy>(field: Option<T>, name: &'static str) -> Result<(), Refusal> {
     match field {
         None => Ok(()),
         Some(_) => Err(Refusal::Inexpressible { field: name }),

@@ -14,7 +14,7 @@ pub struct Context<'a> {
     /// The type of the RA component that sends or receives the message, or as which one of ours
     /// does.
     pub part: Option<RaComponent>,
-    /// The minor version of our service, 0 or 1, where the layout depends on it: that of the vector
+    /// The minor version of our service, where the layout depends on it: that of the vector
     /// drivers does. Without it, 1.
     pub minor: Option<u8>,
 }

@@ -36,7 +36,7 @@
 //! | 0407h 2407h 4407h | Set, Query, Report Global Vector | same | same | refused: speeds above 327.67 m/s; for version 1.0, no speed |
 //! | 0408h 2408h 4408h | Set, Query, Report Local Vector | same | same | lost: Z, roll and pitch of a report; refused: those of a command, no heading, speeds as above |
 //! | 040Ah | Set Travel Speed | same | same | refused: speeds above 327.67 m/s |
-//! | 040Ah | Set Travel Speed of a path segment driver | 041Eh | Execute List | refused: speeds as above, from another element than the first |
+//! | 040Ah | Set Travel Speed of a path segment driver | 041Eh | Execute List | refused: speeds as above, from another element than the first; each speed above zero begins with the first |
 //! | 240Ah 440Ah | Query, Report Travel Speed | same | same | refused: speeds as above |
 //! | 240Bh 440Bh | Query, Report Waypoint Count | 241Ch 441Ch | Query, Report Element Count | |
 //! | 040Ch 040Dh | Set Global, Local Waypoint | same | same | lost: the tolerance of the waypoint; refused: numbers other than 0, a limit of the path, a local Z out of -10 km to 35 km |

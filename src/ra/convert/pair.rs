@@ -11,7 +11,7 @@ use crate::ra::ids::RaComponent;
 const CODE_LEN: usize = 2;
 
 /// A message of the Reference Architecture and its counterpart among ours.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Pair {
     /// The code of the RA message.
     pub ra: u16,
@@ -35,7 +35,7 @@ enum When {
     Always,
     /// The type of the RA component is one of these.
     Part(&'static [RaComponent]),
-    /// Our service has this minor version; 1 if nothing is known.
+    /// Our service has this minor version, where 1 stands for later ones and for what is not known.
     Minor(u8),
 }
 
@@ -87,7 +87,7 @@ impl Pair {
         match self.when {
             When::Always => true,
             When::Part(parts) => context.part.is_some_and(|part| parts.contains(&part)),
-            When::Minor(minor) => context.minor.unwrap_or(1) == minor,
+            When::Minor(minor) => context.minor.map_or(1, |known| known.min(1)) == minor,
         }
     }
 

@@ -4,8 +4,10 @@
 //! segment driver of the Reference Architecture is sent its segments by number and sets out when it
 //! is given a speed of travel. Ours has a list: a segment comes as an element that follows the one
 //! before it, and the list is executed at a speed. So the segment with the number n is the element
-//! n + 1, which follows the element n, and for these drivers Set Travel Speed is Execute List from
-//! the first element on.
+//! n + 1, which follows the element n, and for these drivers Set Travel Speed is Execute List: from
+//! the first element on at a speed above zero, whether or not the vehicle is under way, and without
+//! an element, which only changes the speed, at zero. Our list takes no second first element: another
+//! path is set after a Reset.
 //!
 //! The segment that ours reports is the one that is driven along; it is asked for and reported under
 //! the number 0. A limit of the path is refused in a command and left out in a report.
@@ -55,9 +57,10 @@ same_fields! {
 
 impl Counterpart<mobility::ExecuteList> for ra33::SetTravelSpeed {
     fn counterpart(self, _: Context<'_>) -> Result<mobility::ExecuteList, Refusal> {
+        let sets_out = self.speed_m_per_s() > 0.0;
         Ok(mobility::ExecuteList {
             speed: self.speed.carry()?,
-            element_uid: None,
+            element_uid: sets_out.then_some(FROM_THE_FIRST),
         })
     }
 }

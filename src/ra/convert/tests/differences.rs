@@ -216,11 +216,29 @@ fn a_path_segment_is_an_element_behind_the_one_before_it() {
 }
 
 #[test]
+fn segments_that_come_in_the_order_of_their_numbers_make_a_list() {
+    let mut list = crate::service::ElementList::default();
+    for path_segment_number in 0..3 {
+        let theirs = ra33::SetLocalPathSegment {
+            path_segment_number,
+            ..Default::default()
+        };
+        let ours: core::SetElement = into_ours_with(LOCAL_PATH, &theirs).unwrap();
+        list.set(&ours.element_list).unwrap();
+    }
+    assert_eq!(list.uids().collect::<Vec<_>>(), [1, 2, 3]);
+}
+
+#[test]
 fn a_speed_sets_a_path_segment_driver_off_and_a_waypoint_driver_its_speed() {
     let mut theirs = ra33::SetTravelSpeed::default();
     theirs.set_speed_m_per_s(100.0).unwrap();
     let ours: mobility::ExecuteList = into_ours_with(LOCAL_PATH, &theirs).unwrap();
     near(Some(ours.speed_m_per_s()), 100.0, 0.08);
+    assert_eq!(ours.element_uid, Some(0), "from the first element on");
+    let stop: mobility::ExecuteList =
+        into_ours_with(LOCAL_PATH, &ra33::SetTravelSpeed::default()).unwrap();
+    assert_eq!((stop.speed_m_per_s(), stop.element_uid), (0.0, None));
     let from_the_third = mobility::ExecuteList {
         element_uid: Some(3),
         ..ours
