@@ -10,11 +10,14 @@
     reason = "a test and its helpers"
 )]
 
+#[path = "support/asked.rs"]
+mod asked;
 #[path = "support/drivable.rs"]
 mod drivable;
 #[path = "support/recorded.rs"]
 mod recorded;
 #[path = "support/seat.rs"]
+#[allow(dead_code, reason = "connections are replayed elsewhere")]
 mod seat;
 #[path = "support/shared.rs"]
 mod shared;
@@ -23,6 +26,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use asked::answers_to;
 use bytes::{Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::codec::Message;
@@ -294,18 +298,6 @@ fn check_services(question: &Frame, octets: &Bytes) {
     for name in ["Events", "Discovery", "Liveness", "Transport"] {
         let urn = format!("urn:jaus:jss:core:{name}");
         assert!(names.contains(&urn), "{urn} 1.0 is not in {names:?}");
-    }
-}
-
-/// The codes of what must come back.
-fn answers_to(code: u16) -> Vec<u16> {
-    match code {
-        CreateEvent::CODE | CancelEvent::CODE => vec![ConfirmEventRequest::CODE],
-        RequestControl::CODE => vec![ConfirmControl::CODE],
-        ReleaseControl::CODE => vec![RejectControl::CODE],
-        SetElement::CODE => vec![ConfirmElementRequest::CODE],
-        query if query >> 12 == 2 => vec![query + 0x2000],
-        _ => Vec::new(),
     }
 }
 

@@ -11,7 +11,9 @@ use super::recent::{Class, Fingerprint};
 use super::{Counter, Endpoint, Event, Path, Received};
 use crate::address::JausId;
 use crate::peer;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Version, as5669a, judp};
+use crate::wire::{
+    Acknowledgement, Broadcast, DataControl, Flags, Frame, Framing, Version, as5669a, judp,
+};
 
 /// Octets of IPv4 and UDP around a datagram.
 const DATAGRAM_OVERHEAD: usize = 28;
@@ -315,6 +317,7 @@ impl Endpoint {
     /// Learns where a sender is, if there is room for it.
     fn learn(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
         let (id, version) = (frame.source, frame.version);
+        let from = self.where_it_reads(id, from);
         match self.peers.learn(now, from, frame) {
             Learned::Known => {}
             Learned::New { evicted } => {
@@ -340,6 +343,17 @@ impl Endpoint {
             Learned::NoRoom => return Err(Counter::PeersFull),
         }
         Ok(())
+    }
+
+    /// Where a sender is to be answered: where it was heard, unless it does not read there. Then
+    /// where it was heard before by datagram, if it was.
+    fn where_it_reads(&self, id: JausId, from: Path) -> Path {
+        let is_datagram = |path: &Path| self.framing(path.link) == Framing::Judp;
+        if is_datagram(&from) || !self.peers.profile(id).is_deaf_on_its_connections() {
+            return from;
+        }
+        let before = self.peers.last_heard(id).map(|(path, _)| path);
+        before.filter(is_datagram).unwrap_or(from)
     }
 
     /// How a message stands to what was heard lately.

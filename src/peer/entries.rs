@@ -221,6 +221,19 @@ departures! {
         place: "src/wire/jtcp/decoder.rs",
         test: "a_version_octet_before_each_message_is_read",
     };
+    /// TCP connections of one direction.
+    OneWayConnections = Entry {
+        name: "one-way connections",
+        peers: &[JausPlusPlus],
+        does: "opens a TCP connection to whoever it hears by UDP, writes on it, and reads only those \
+               that others opened",
+        source: Source::Recorded,
+        told: Told::By(&[Sign::RegistersAcrossSubsystems, Sign::StaleOctets]),
+        ours: "whoever is known by UDP is answered by UDP; where there is TCP alone, give its id \
+               with `tcp.connect`, so that we open a connection of our own",
+        place: "src/endpoint/receive.rs",
+        test: "jauspp_that_connects_is_answered_where_it_reads",
+    };
     /// A unicast message as a broadcast.
     CallsUnknownIds = Entry {
         name: "calls unknown ids",

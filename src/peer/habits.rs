@@ -47,6 +47,12 @@ impl Peer {
         matches!(self, Self::Iop | Self::Jts)
     }
 
+    /// Whether it reads nothing on the TCP connections that it opened, and is to be answered by UDP.
+    #[must_use]
+    pub const fn is_deaf_on_its_connections(self) -> bool {
+        matches!(self, Self::JausPlusPlus)
+    }
+
     /// Whether it cannot keep two components apart, and delivers to one what is for the other.
     ///
     /// ```

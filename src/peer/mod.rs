@@ -9,7 +9,8 @@
 //! Most of what we do suits everybody and is done for everybody: what strict peers get is never
 //! less for a peer that is not strict. What would not suit everybody hangs on the [`Peer`] that
 //! somebody is known to be, and is a method of it: [`Peer::large_style`],
-//! [`Peer::payload_limit`], [`Peer::reads_zero_as_wildcard`].
+//! [`Peer::payload_limit`], [`Peer::reads_zero_as_wildcard`],
+//! [`Peer::is_deaf_on_its_connections`].
 //!
 //! A [`Recogniser`] is fed with what one peer sends and says who that is, how sure that is, and
 //! why. It does no I/O and keeps a few octets.

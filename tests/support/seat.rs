@@ -11,9 +11,11 @@ use jaus::endpoint::{
     Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path, Received, Remote, To, Transmit,
 };
 use jaus::service::Stack;
-use jaus::wire::{Frame, judp};
+use jaus::wire::jtcp::Decoder;
+use jaus::wire::{Frame, Framing, judp};
 
-const LINK: LinkId = LinkId(0);
+const UDP: LinkId = LinkId(0);
+const TCP: LinkId = LinkId(1);
 
 /// A node of ours.
 pub(crate) struct Seat {
@@ -34,6 +36,7 @@ pub(crate) struct Seat {
 pub(crate) struct Said {
     /// Since the beginning.
     pub(crate) at: Duration,
+    pub(crate) by_udp: bool,
     pub(crate) to: To,
     pub(crate) frame: Frame,
     pub(crate) datagram: Bytes,
@@ -57,7 +60,7 @@ impl Seat {
     )]
     pub(crate) fn new(address: SocketAddr, config: Config) -> Self {
         let mut endpoint = Endpoint::new(config);
-        endpoint.add_link(LINK, LinkProfile::judp([address]));
+        endpoint.add_link(UDP, LinkProfile::judp([address]));
         let now = Instant::now();
         Self {
             endpoint,
@@ -109,10 +112,29 @@ impl Seat {
     /// A datagram arrives.
     pub(crate) fn hear(&mut self, from: SocketAddr, payload: Bytes) {
         let path = Path {
-            link: LINK,
+            link: UDP,
             peer: from.into(),
         };
         self.endpoint.handle_datagram(self.now, path, payload);
+        self.pump();
+    }
+
+    /// Takes TCP connections too.
+    pub(crate) fn listen(&mut self) {
+        let profile = LinkProfile {
+            framing: Framing::Jtcp,
+            ..LinkProfile::default()
+        };
+        self.endpoint.add_link(TCP, profile);
+    }
+
+    /// A message arrives on the TCP connection with this remote address.
+    pub(crate) fn hear_frame(&mut self, from: SocketAddr, frame: &Frame) {
+        let path = Path {
+            link: TCP,
+            peer: from.into(),
+        };
+        self.endpoint.handle_frame(self.now, path, frame);
         self.pump();
     }
 
@@ -152,10 +174,18 @@ impl Seat {
     }
 
     fn note(&mut self, transmit: &Transmit) {
-        let frames = judp::frames(transmit.payload.clone()).expect("a datagram of ours");
-        for frame in frames.map_while(Result::ok) {
+        let frames: Vec<_> = if transmit.link == UDP {
+            let frames = judp::frames(transmit.payload.clone()).expect("a datagram of ours");
+            frames.map_while(Result::ok).collect()
+        } else {
+            let mut decoder = Decoder::new();
+            decoder.input().extend_from_slice(&transmit.payload);
+            std::iter::from_fn(|| decoder.next_frame().expect("a message of ours")).collect()
+        };
+        for frame in frames {
             self.said.push(Said {
                 at: self.at(),
+                by_udp: transmit.link == UDP,
                 to: transmit.to,
                 frame,
                 datagram: transmit.payload.clone(),

@@ -179,6 +179,33 @@ fn who_is_configured_is_what_it_is_said_to_be() {
 }
 
 #[test]
+fn jauspp_that_connects_is_answered_where_it_reads() {
+    const CONNECTIONS: LinkId = LinkId(1);
+    for (profile, expected) in [
+        (Known::JausPlusPlus, WIRE),
+        (Known::Junior, CONNECTIONS),
+        (Known::Standard, CONNECTIONS),
+    ] {
+        let mut rig = Rig::with(assigned(profile));
+        let stream = LinkProfile {
+            framing: crate::wire::Framing::Jtcp,
+            ..LinkProfile::default()
+        };
+        rig.endpoint.add_link(CONNECTIONS, stream);
+        rig.meet_peer();
+        let connection = Path {
+            link: CONNECTIONS,
+            peer: SocketAddr::from(([10, 0, 0, PEER_HOST], 33_918)).into(),
+        };
+        let frame = from_peer(QUERY_IDENTIFICATION);
+        rig.endpoint.handle_frame(rig.now, connection, &frame);
+        rig.send(to_peer()).unwrap();
+        let links: Vec<_> = rig.transmits().iter().map(|it| it.link).collect();
+        assert_eq!(links, [expected], "{profile}");
+    }
+}
+
+#[test]
 fn a_call_of_junior_is_acknowledged_by_the_one_alone_from_its_own_address() {
     let mut rig = Rig::new();
     rig.endpoint.attach(SIBLING).unwrap();

@@ -535,6 +535,25 @@ mod toml_tests {
     }
 
     #[test]
+    fn a_file_says_what_peers_are_that_cannot_be_recognised() {
+        let text = "[[profile]]\nid = \"7.255.255\"\nprofile = \"jaus++\"\n\
+                    [[profile]]\nid = \"8.1.1\"\nprofile = \"iop\"\n\
+                    [delivery]\nrepeat_code_to = [\"9.255.255\"]";
+        let config: Config = toml::from_str(text).unwrap();
+        let endpoint = config.endpoint(0);
+        let found = |id: &str| Assignment::find(&endpoint.profiles, id.parse().unwrap());
+        assert_eq!(found("7.1.33"), Some(crate::peer::Peer::JausPlusPlus));
+        assert_eq!(found("8.1.1"), Some(crate::peer::Peer::Iop));
+        assert_eq!(found("8.1.2"), None);
+        assert_eq!(found("9.1.1"), Some(crate::peer::Peer::JausPlusPlus));
+        let wrong = error("[[profile]]\nid = \"7.1.1\"\nprofile = \"jauspp\"");
+        assert!(
+            wrong.contains("line 3") && wrong.contains("\"jaus++\""),
+            "{wrong}"
+        );
+    }
+
+    #[test]
     fn versions_of_ip_and_broadcasts_are_chosen_by_words() {
         let text = "ip = \"both\"\ngroup6 = \"ff15::efff:1\"\nbroadcast = \"off\"\n\
                     peers = [\"[fe80::2%eth0]:9\"]";

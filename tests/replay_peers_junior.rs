@@ -1,0 +1,206 @@
+//! Junior's sides of the captures, replayed to a node of ours in the place of the other, in virtual
+//! time: what we say is, octet for octet, what Junior's own node said there.
+
+#![cfg(all(feature = "view", feature = "mobility"))]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test and its helpers"
+)]
+
+#[path = "support/recorded.rs"]
+#[allow(dead_code, reason = "where it went is told by the file")]
+mod recorded;
+#[path = "support/seat.rs"]
+#[allow(dead_code, reason = "connections are replayed elsewhere")]
+mod seat;
+#[path = "support/shared.rs"]
+mod shared;
+
+use std::net::SocketAddr;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::endpoint::{Config, Counter, Event, Outgoing, To};
+use jaus::peer::Peer;
+use jaus::wire::DataControl;
+use recorded::Recorded;
+use seat::Seat;
+
+const A: JausId = JausId::new(1, 1, 1);
+const B: JausId = JausId::new(2, 1, 1);
+/// Junior's longest payload.
+const PAYLOAD: usize = 4079;
+
+fn address(host: &str) -> SocketAddr {
+    format!("10.77.0.{host}:3794").parse().unwrap()
+}
+
+/// What each of the two nodes said.
+fn said(file: &str) -> Option<(Vec<Recorded>, Vec<Recorded>)> {
+    let file = shared::captures()?.join(format!("junior/{file}.pcap"));
+    let all = recorded::datagrams(&file).into_iter();
+    Some(all.partition(|datagram| datagram.source == address("1")))
+}
+
+/// A node of ours with one component, whose numbers begin with 1 as Junior's do.
+fn node(id: JausId, host: &str) -> Seat {
+    let config = Config {
+        payload_limit: PAYLOAD,
+        ..Config::default()
+    };
+    let mut seat = Seat::new(address(host), config);
+    seat.endpoint.attach(id).unwrap();
+    seat
+}
+
+fn octets(datagrams: &[Recorded]) -> Vec<Bytes> {
+    datagrams.iter().map(|it| it.payload.clone()).collect()
+}
+
+#[test]
+fn a_node_in_the_place_of_b_answers_with_b_s_very_octets() {
+    // In 01 node B sends back all that it gets, in the others nothing.
+    for (file, echoes) in [
+        ("01-discovery-then-unicast", true),
+        ("02-acked-small", false),
+        ("03-acked-100KB", false),
+        ("04-unacked-100KB-bigbuf", false),
+        ("06-global-broadcast", false),
+        ("07-subsystem-wildcard", false),
+        ("09-as5669-v1-msgid", false),
+        ("10-opc-JAUS01.0", false),
+        ("12-priority15", false),
+    ] {
+        let Some((of_a, of_b)) = said(file) else {
+            return;
+        };
+        let mut seat = node(B, "2");
+        for datagram in &of_a {
+            seat.run_until(datagram.at);
+            seat.hear(datagram.source, datagram.payload.clone());
+            for heard in std::mem::take(&mut seat.heard) {
+                if echoes {
+                    seat.say(Outgoing::new(B, heard.source, heard.payload));
+                }
+            }
+        }
+        assert!(seat.said.iter().all(|it| it.is_to(address("1"))), "{file}");
+        let ours: Vec<_> = seat.said.iter().map(|it| it.datagram.clone()).collect();
+        assert_eq!(ours, octets(&of_b), "{file}");
+    }
+}
+
+#[test]
+fn what_junior_repeats_without_an_answer_is_acknowledged_each_time_and_taken_once() {
+    let Some((of_a, _)) = said("08-ack-timeout-no-peer") else {
+        return;
+    };
+    let mut seat = node(B, "2");
+    for datagram in &of_a {
+        seat.run_until(datagram.at);
+        seat.hear(datagram.source, datagram.payload.clone());
+    }
+    assert_eq!((of_a.len(), seat.heard.len(), seat.said.len()), (4, 1, 4));
+    assert!(
+        seat.said
+            .iter()
+            .all(|it| it.frame.is_acknowledgement() && it.frame.sequence == 1)
+    );
+}
+
+#[test]
+fn the_priority_fault_is_counted_and_names_junior() {
+    let Some((of_a, _)) = said("11-priority0-bug") else {
+        return;
+    };
+    let mut seat = node(B, "2");
+    for datagram in &of_a {
+        seat.hear(datagram.source, datagram.payload.clone());
+    }
+    assert_eq!(seat.heard.len(), 1, "the one before it");
+    assert_eq!(seat.endpoint.counters().get(Counter::PriorityFault), 1);
+    assert_eq!(seat.endpoint.peers().next().unwrap().profile, Peer::Junior);
+}
+
+/// The first messages go to the group, as Junior's do, and Junior's acknowledgement teaches us
+/// where it is.
+#[test]
+fn a_node_in_the_place_of_a_calls_as_a_does_and_understands_the_answer() {
+    for (file, acknowledge) in [
+        ("01-discovery-then-unicast", false),
+        ("02-acked-small", true),
+    ] {
+        let Some((of_a, of_b)) = said(file) else {
+            return;
+        };
+        let payload = of_a[0].frames().0[0].payload.clone();
+        let mut seat = node(A, "1");
+        seat.say(Outgoing {
+            acknowledge,
+            ..Outgoing::new(A, B, payload)
+        });
+        let [call] = &seat.said[..] else {
+            panic!("one call: {:?}", seat.said)
+        };
+        assert_eq!(
+            (call.to, &call.datagram),
+            (To::Group, &of_a[0].payload),
+            "{file}"
+        );
+        seat.run_until(of_b[0].at);
+        seat.hear(of_b[0].source, of_b[0].payload.clone());
+        let told = |event: &Event| matches!(event, Event::Acknowledged { by: B, .. });
+        assert_eq!(seat.news.iter().any(told), acknowledge, "{file}");
+        // From now on it is spoken to alone, with the octets that A used.
+        for next in &of_a[1..] {
+            let before = seat.said.len();
+            let payload = next.frames().0[0].payload.clone();
+            seat.say(Outgoing::new(A, B, payload));
+            assert!(seat.said[before].is_to(address("2")), "{file}");
+            assert_eq!(seat.said[before].datagram, next.payload, "{file}");
+        }
+    }
+}
+
+/// 100 kB are cut as Junior cuts them, and Junior's acknowledgements end the delivery.
+#[test]
+fn a_large_acknowledged_message_goes_to_junior_as_juniors_own() {
+    let Some((of_a, of_b)) = said("03-acked-100KB") else {
+        return;
+    };
+    let mut seat = node(A, "1");
+    let first = of_a[0].frames().0[0].payload.clone();
+    let reliable = |payload| Outgoing {
+        acknowledge: true,
+        ..Outgoing::new(A, B, payload)
+    };
+    seat.say(reliable(first));
+    seat.hear(of_b[0].source, of_b[0].payload.clone());
+    seat.say(reliable(
+        [&[0x01, 0x4B][..], &[b'x'; 99_998]].concat().into(),
+    ));
+    for acknowledgement in &of_b[1..] {
+        let at = seat.at().max(acknowledgement.at);
+        // Junior answers what it has got.
+        let number = acknowledgement.frames().0[0].sequence;
+        assert!(
+            seat.said.iter().any(|it| it.frame.sequence == number),
+            "{number} was sent"
+        );
+        seat.hear(acknowledgement.source, acknowledgement.payload.clone());
+        seat.run_until(at);
+    }
+    let acknowledged = |event: &&Event| matches!(event, Event::Acknowledged { .. });
+    assert_eq!(seat.news.iter().filter(acknowledged).count(), 2);
+    for (number, fragment) in (1_u16..).zip(&of_a) {
+        let ours = seat.said.iter().find(|it| it.frame.sequence == number);
+        assert_eq!(ours.unwrap().datagram, fragment.payload, "number {number}");
+    }
+    let last = seat
+        .said
+        .iter()
+        .filter(|it| it.frame.flags.data() == DataControl::Last);
+    assert!(last.count() >= 1);
+}

@@ -1,0 +1,19 @@
+//! What must come back to a request.
+
+use jaus::codec::Message;
+use jaus::messages::core::{
+    CancelEvent, ConfirmControl, ConfirmElementRequest, ConfirmEventRequest, CreateEvent,
+    RejectControl, ReleaseControl, RequestControl, SetElement,
+};
+
+/// The codes of what must come back.
+pub(crate) fn answers_to(code: u16) -> Vec<u16> {
+    match code {
+        CreateEvent::CODE | CancelEvent::CODE => vec![ConfirmEventRequest::CODE],
+        RequestControl::CODE => vec![ConfirmControl::CODE],
+        ReleaseControl::CODE => vec![RejectControl::CODE],
+        SetElement::CODE => vec![ConfirmElementRequest::CODE],
+        query if query >> 12 == 2 => vec![query + 0x2000],
+        _ => Vec::new(),
+    }
+}
