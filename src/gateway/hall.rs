@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::counters::{Counter, Tally};
-use super::front::{Front, Plan, Target};
+use super::front::{self, Front, Plan, Target};
 use super::{Action, Gateway, roles};
 use crate::address::JausId;
 use crate::endpoint::Received;
@@ -12,6 +12,10 @@ use crate::ra::ids::{RaComponent, Side};
 use crate::ra::{Message, RaId, node};
 use crate::service::{Event, Kind, Profile, code_of};
 
+/// Query Component Status.
+const QUERY_STATUS: u16 = 0x2002;
+/// Report Component Status.
+const STATUS: u16 = 0x4002;
 /// The most JAUS components that one RA message is given to.
 const MOST_RECIPIENTS: usize = 64;
 
@@ -75,6 +79,7 @@ impl Gateway {
         }
         let mut front = Front::new(Plan {
             ra,
+            own: self.own,
             id,
             profile,
             ids: self.known.clone(),
@@ -101,7 +106,6 @@ impl Gateway {
         for id in gone {
             self.dismiss(now, id);
         }
-        self.beacon.forget(subsystem);
         self.release(Side::Ra, subsystem.into());
     }
 
@@ -150,31 +154,18 @@ impl Gateway {
         };
         act(&mut front, &mut self.tally);
         while let Some(event) = front.stack.poll_event() {
-            self.handle_front_event(now, &mut front, event);
+            match event {
+                Event::Message(message) => self.handle_unasked(now, &mut front, &message),
+                event => front.handle_event(now, event, &mut self.tally),
+            }
         }
         while let Some(message) = front.stack.poll_transmit() {
             self.actions.push_back(Action::Send(message));
         }
-        let ra = front.ra();
-        for (code, data) in front.take_to_ra() {
-            self.send_ra(now, Message::new(self.own, ra, code, data));
-        }
-        for message in front.voice.take_said() {
+        for message in front.take_said() {
             self.send_ra(now, message);
         }
         self.fronts.insert(id, front);
-    }
-
-    fn handle_front_event(&mut self, now: Instant, front: &mut Front, event: Event) {
-        let Front { voice, stack, .. } = front;
-        let tally = &mut self.tally;
-        match event {
-            Event::Answer(inquiry, answer) => voice.handle_answer(now, inquiry, answer, tally),
-            Event::Subscription(id, news) => voice.handle_subscription(now, id, news, tally),
-            Event::Control(id, news) => voice.handle_control(now, id, news, stack, tally),
-            Event::Message(message) => self.handle_unasked(now, front, &message),
-            Event::Change(_) | Event::Standing(_) => {}
-        }
     }
 
     /// A JAUS component says something to an RA component that is no answer to a query.
@@ -220,15 +211,14 @@ impl Gateway {
             let mut request = message.clone();
             request.destination = id;
             self.with_front(now, client, |front, tally| {
-                let Front { voice, stack, .. } = front;
-                voice.handle_ra(now, &request, peer, stack, tally);
+                front.handle_ra(now, &request, Some(peer), tally);
             });
         }
     }
 
     fn handle_for_us(&mut self, now: Instant, message: &Message) {
-        if self.beacon.handle_message(now, message) {
-            return;
+        if message.code == QUERY_STATUS {
+            return self.send_ra(now, message.answer(STATUS, front::ready()));
         }
         let front = self.ids.jaus_of(message.source);
         let front = front.filter(|id| self.fronts.contains_key(id));
@@ -239,7 +229,7 @@ impl Gateway {
                 .refuse(now, Counter::Unasked, message.code, source);
         };
         self.with_front(now, id, |front, tally| {
-            front.handle_ra(now, message.code, &message.data, tally);
+            front.handle_ra(now, message, None, tally);
         });
     }
 

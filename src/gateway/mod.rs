@@ -16,7 +16,6 @@
 //! it asks, connects and takes control in their place, and each RA component's counterpart decides
 //! among them. Towards JAUS each RA component speaks for itself.
 
-mod beacon;
 mod convert;
 mod counters;
 mod front;
@@ -39,7 +38,6 @@ pub use self::report::Report;
 pub use self::running::RaGateway;
 pub use self::settings::{Settings, Show};
 
-use self::beacon::Beacon;
 use self::convert::Ids;
 use self::counters::Tally;
 use self::front::{Front, Target};
@@ -65,7 +63,6 @@ pub struct Gateway {
     desk: Stack,
     /// The same component as RA systems see it.
     own: RaId,
-    beacon: Beacon,
     fronts: BTreeMap<JausId, Front>,
     /// How each listed RA component presents itself.
     listed: BTreeMap<JausId, Profile>,
@@ -138,7 +135,6 @@ impl Gateway {
             ids,
             desk,
             own,
-            beacon: Beacon::default(),
             fronts: BTreeMap::new(),
             listed: BTreeMap::new(),
             changed: BTreeMap::new(),
@@ -204,7 +200,6 @@ impl Gateway {
     /// The time of [`poll_timeout`](Self::poll_timeout) has come; earlier does no harm.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.ra.handle_timeout(now);
-        self.beacon.handle_timeout(now);
         if self.desk.poll_timeout().is_some_and(|due| due <= now) {
             self.desk.handle_timeout(now);
         }
@@ -247,7 +242,6 @@ impl Gateway {
         let own = [
             self.ra.poll_timeout(),
             self.desk.poll_timeout(),
-            self.beacon.poll_timeout(),
             self.changed.values().min().copied(),
         ];
         let fronts = self.fronts.values().filter_map(Front::poll_timeout);
@@ -271,9 +265,6 @@ impl Gateway {
         self.collect_desk(now);
         while let Some(event) = self.ra.poll_event() {
             self.handle_ra_event(now, event);
-        }
-        for message in self.beacon.take_said() {
-            self.send_ra(now, message);
         }
     }
 

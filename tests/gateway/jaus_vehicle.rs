@@ -135,7 +135,7 @@ fn a_service_connection_for_what_is_not_there_is_refused() {
     let (mut world, ra, _) = world();
     world.ra_says(ra, says(RA_POSE, 0x0008, "00405802ff000000"));
     let told = world.ra_heard(ra, 0x0009);
-    assert_eq!(told[0].data[5], 1, "not capable");
+    assert_eq!(told[0].data[5], 2, "the component is not capable");
 }
 
 #[test]

@@ -23,10 +23,8 @@ use bytes::Bytes;
 
 use self::lease::Lease;
 use self::mirror::{Mirror, Mirrored};
-use self::streams::MOST_HZ;
 use self::streams::Streams;
-pub(super) use self::streams::rate;
-pub(super) use self::voice::{Target, Voice, connection, leading_code};
+pub(super) use self::voice::{Target, Voice};
 use super::convert::{self, Ids, Words};
 use super::counters::{Counter, Tally};
 use super::roles::Role;
@@ -37,16 +35,15 @@ use crate::endpoint::Received;
 use crate::messages::core::{
     self, CreateEvent, ReleaseControl, RequestControl, SetAuthority, UpdateEvent,
 };
-use crate::ra::RaId;
+use crate::ra::connection::{self, Connections, ResponseCode};
 use crate::ra::ids::RaComponent;
+use crate::ra::{Message, RaId};
 use crate::service::{
-    Discovery, Liveness, Profile, Scope, Service, Stack, Timing, Transport, code_of,
+    Discovery, Event, Liveness, Profile, Scope, Service, Stack, Timing, Transport, code_of,
 };
 
 /// Report Component Status.
 const STATUS: u16 = 0x4002;
-/// Confirm Service Connection.
-const CONFIRM_CONNECTION: u16 = 0x0009;
 /// Confirm Component Control.
 const CONFIRM_CONTROL: u16 = 0x000F;
 /// Reject Component Control.
@@ -66,6 +63,10 @@ pub(super) struct Front {
     streams: Streams,
     held: Vec<Held>,
     relayed: VecDeque<Relayed>,
+    /// Service connections of both kinds with the RA component.
+    connections: Connections,
+    /// The gateway as the RA component sees it.
+    own: RaId,
     to_ra: Vec<(u16, Bytes)>,
     /// When to look again at what clients subscribe to.
     review: Option<Instant>,
@@ -74,6 +75,8 @@ pub(super) struct Front {
 /// How a front is made.
 pub(super) struct Plan {
     pub(super) ra: RaId,
+    /// The gateway among RA systems.
+    pub(super) own: RaId,
     pub(super) id: JausId,
     pub(super) profile: Profile,
     pub(super) ids: Ids,
@@ -137,9 +140,15 @@ impl Front {
             words,
             mirror,
             lease: Lease::new(plan.patience, plan.authority),
-            streams: Streams::default(),
+            streams: Streams::new(plan.ra, plan.own),
             held: Vec::new(),
             relayed: VecDeque::new(),
+            connections: Connections::new(connection::Settings {
+                max_provided: Self::MOST_WAITING,
+                max_wanted: Self::MOST_WAITING,
+                ..connection::Settings::default()
+            }),
+            own: plan.own,
             to_ra: Vec::new(),
             review: None,
         }
@@ -312,23 +321,110 @@ impl Front {
         age.is_some_and(|age| age <= limit.max(Self::FRESH))
     }
 
-    /// A message of the RA component for us has come.
-    pub(super) fn handle_ra(&mut self, now: Instant, code: u16, data: &Bytes, tally: &mut Tally) {
+    /// A message of the RA component has come: for us, or for the JAUS component that it sees under
+    /// the id which the message is for.
+    pub(super) fn handle_ra(
+        &mut self,
+        now: Instant,
+        message: &Message,
+        target: Option<Target>,
+        tally: &mut Tally,
+    ) {
+        if self.connections.handle_message(now, message) {
+            self.follow_connections(now, target, tally);
+        } else if let Some(target) = target {
+            let Self { voice, stack, .. } = self;
+            voice.handle_ra(now, message, target, stack, tally);
+        } else {
+            self.handle_for_us(now, message, tally);
+        }
+        self.follow(now, tally);
+    }
+
+    fn handle_for_us(&mut self, now: Instant, message: &Message, tally: &mut Tally) {
+        let (code, data) = (message.code, &message.data);
         match code {
             CONFIRM_CONTROL => {
                 let response = data.first().copied().unwrap_or_default();
                 self.lease.handle_confirm(now, response);
             }
             REJECT_CONTROL => self.lease.handle_reject(),
-            CONFIRM_CONNECTION => self.streams.handle_confirm(now, data),
             _ if pairs::query_of(code).is_some() => self.handle_report(now, code, data, tally),
             _ => tally.refuse(now, Counter::NoCounterpart, code, self.ra),
         }
-        self.follow(now, tally);
+    }
+
+    /// Looks after what has become of service connections. `target` is who a new one is to.
+    fn follow_connections(&mut self, now: Instant, target: Option<Target>, tally: &mut Tally) {
+        while let Some(event) = self.connections.poll_event() {
+            match event {
+                connection::Event::Wanted(id, request) => {
+                    self.provide(now, (id, request), target, tally);
+                }
+                connection::Event::Ended(id) => {
+                    if !self.streams.handle_end(now, id) {
+                        self.voice.disconnect(now, id, &mut self.stack);
+                    }
+                }
+                connection::Event::Established(id, hz) => self.streams.handle_established(id, hz),
+                connection::Event::Refused(id, _) => drop(self.streams.handle_end(now, id)),
+                connection::Event::Silent(id) => self.streams.handle_silence(now, id),
+                connection::Event::Report(_, message) => {
+                    self.handle_report(now, message.code, &message.data, tally);
+                }
+            }
+        }
+    }
+
+    /// The RA component wants to be told something: of a JAUS component, or that we are ready, for it
+    /// stands still for a controller that does not say so.
+    fn provide(
+        &mut self,
+        now: Instant,
+        (id, request): (connection::ConnectionId, connection::Request),
+        target: Option<Target>,
+        tally: &mut Tally,
+    ) {
+        let Self {
+            voice,
+            stack,
+            connections,
+            ..
+        } = self;
+        match target {
+            Some(target) => {
+                let common = voice::Common { stack, connections };
+                voice.connect(now, (id, request), target, common, tally);
+            }
+            None if request.provider == self.own && request.code == STATUS => {
+                self.connections.accept(now, id);
+                self.connections.set_report(now, id, ready());
+            }
+            None => self
+                .connections
+                .refuse(id, ResponseCode::COMPONENT_NOT_CAPABLE),
+        }
+    }
+
+    /// Something has happened to the stack.
+    pub(super) fn handle_event(&mut self, now: Instant, event: Event, tally: &mut Tally) {
+        let Self {
+            voice,
+            stack,
+            connections,
+            ..
+        } = self;
+        match event {
+            Event::Answer(inquiry, answer) => voice.handle_answer(now, inquiry, answer, tally),
+            Event::Subscription(id, news) => {
+                voice.handle_subscription(now, (id, news), connections, tally);
+            }
+            Event::Control(id, news) => voice.handle_control(now, id, news, stack, tally),
+            Event::Message(_) | Event::Change(_) | Event::Standing(_) => {}
+        }
     }
 
     fn handle_report(&mut self, now: Instant, report: u16, data: &Bytes, tally: &mut Tally) {
-        self.streams.handle_report(now, report);
         let converted = match self.words.to_jaus(report, data) {
             Ok(converted) => converted,
             Err(refusal) => return convert::refuse(now, tally, report, &refusal),
@@ -381,7 +477,9 @@ impl Front {
             self.stack.handle_timeout(now);
         }
         self.lease.handle_timeout(now);
-        self.streams.handle_timeout(now);
+        self.connections.handle_timeout(now);
+        self.follow_connections(now, None, tally);
+        self.to_ra.extend(self.streams.take_queries(now));
         self.ask_again(now, tally);
         self.relayed.retain(|it| {
             let waits = now < it.until;
@@ -437,10 +535,9 @@ impl Front {
         }
         if self.review.is_some_and(|due| due <= now) {
             let wanted = self.wanted();
-            self.streams.want(now, &wanted);
+            self.streams.want(now, &wanted, &mut self.connections);
             self.review = (!wanted.is_empty()).then(|| now + Self::REVIEW);
         }
-        self.to_ra.extend(self.streams.take_said());
     }
 
     /// The rates of all that somebody subscribes to, by the code of the RA report.
@@ -454,7 +551,7 @@ impl Front {
         let held = self.held.iter().filter_map(|it| Some((it.report, it.hz?)));
         for (report, hz) in subscribed.chain(held) {
             let most = wanted.entry(report).or_insert(hz);
-            *most = hz.max(*most).min(MOST_HZ);
+            *most = hz.max(*most).min(Connections::MAX_RATE);
         }
         wanted
     }
@@ -464,14 +561,20 @@ impl Front {
         if let Some(controller) = self.lease.controller() {
             self.lease.release(controller.id);
         }
-        self.streams.want(now, &BTreeMap::new());
+        let nothing = BTreeMap::new();
+        self.streams.want(now, &nothing, &mut self.connections);
         self.follow(now, tally);
         self.stack.take_leave(now);
     }
 
     /// What is to be sent to the RA component since this was asked last.
-    pub(super) fn take_to_ra(&mut self) -> Vec<(u16, Bytes)> {
-        std::mem::take(&mut self.to_ra)
+    pub(super) fn take_said(&mut self) -> Vec<Message> {
+        let (own, ra) = (self.own, self.ra);
+        let ours = std::mem::take(&mut self.to_ra).into_iter();
+        let ours = ours.map(|(code, data)| Message::new(own, ra, code, data));
+        let connections = std::iter::from_fn(|| self.connections.poll_transmit());
+        let voice = self.voice.take_said();
+        ours.chain(connections).chain(voice).collect()
     }
 
     /// Whether we control the RA component, or ask for it.
@@ -486,6 +589,7 @@ impl Front {
             self.stack.poll_timeout(),
             self.lease.poll_timeout(),
             self.streams.poll_timeout(),
+            self.connections.poll_timeout(),
             self.review,
             self.guest_until,
         ]
@@ -553,4 +657,9 @@ const fn answer_to_command(code: u16) -> Option<u16> {
         0x0A24 => Some(0x4A24),
         _ => None,
     }
+}
+
+/// Report Component Status of one that is ready, without further words.
+pub(super) fn ready() -> Bytes {
+    Bytes::from_static(&[1, 0, 0, 0, 0])
 }

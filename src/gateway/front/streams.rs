@@ -1,216 +1,147 @@
-//! The service connections by which an RA component keeps us told of what somebody subscribes to.
-//!
-//! One connection for each report, at the greatest rate that anybody wants. A component that does
-//! not confirm one, or refuses it, is asked with queries instead.
+//! How an RA component keeps us told of what somebody subscribes to: one service connection for each
+//! report, at the greatest rate that anybody wants. A component that does not confirm one, or refuses
+//! it, is asked with queries instead.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use bytes::{BufMut, Bytes, BytesMut};
+use bytes::Bytes;
 
 use super::super::pairs;
+use crate::ra::RaId;
+use crate::ra::connection::{ConnectionId, Connections, Request};
 
-/// Create Service Connection.
-const CREATE: u16 = 0x0008;
-/// Terminate Service Connection.
-const TERMINATE: u16 = 0x000C;
-/// What a rate's 16 bits are scaled to, in hertz.
-pub(in crate::gateway) const MOST_HZ: f64 = 1092.0;
-
-/// The connections with one RA component, by the code of their reports.
-#[derive(Debug, Default)]
+/// What one RA component keeps us told of, by the code of the report.
+#[derive(Debug)]
 pub(super) struct Streams {
+    /// The RA component and we.
+    between: (RaId, RaId),
     all: BTreeMap<u16, Stream>,
-    said: Vec<(u16, Bytes)>,
 }
 
 #[derive(Debug)]
 struct Stream {
     state: pairs::State,
     hz: f64,
-    course: Course,
-    /// When to do something next.
-    next: Instant,
-    heard: Instant,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Course {
-    Asking {
-        tries: u32,
-    },
-    Up {
-        instance: u8,
-    },
-    /// There is no connection: queries do.
-    Polling {
-        left: u32,
-    },
+    /// Its connection, unless that was refused.
+    connection: Option<ConnectionId>,
+    /// The rate that was confirmed, while reports come.
+    confirmed: Option<f64>,
+    /// When the next query stands in for the connection.
+    query: Option<Instant>,
 }
 
 impl Streams {
-    const RETRY: Duration = Duration::from_millis(500);
-    const TRIES: u32 = 3;
     /// The most queries in a second that stand in for a connection.
     const MOST_QUERIES: f64 = 10.0;
-    /// After so many queries a connection is tried again.
-    const POLLS: u32 = 100;
-    /// A connection is down when so many periods have brought nothing, and not sooner than
-    const SILENT_PERIODS: f64 = 4.0;
-    /// this after its last report.
-    const LEAST_SILENCE: Duration = Duration::from_secs(2);
+
+    pub(super) const fn new(provider: RaId, client: RaId) -> Self {
+        Self {
+            between: (provider, client),
+            all: BTreeMap::new(),
+        }
+    }
 
     /// What is wanted now: the rates, by the code of the report.
-    pub(super) fn want(&mut self, now: Instant, wanted: &BTreeMap<u16, f64>) {
-        let gone = |code: &u16| !wanted.contains_key(code);
-        let ended: Vec<u16> = self.all.keys().copied().filter(gone).collect();
-        for report in ended {
-            self.end(report);
-        }
+    pub(super) fn want(
+        &mut self,
+        now: Instant,
+        wanted: &BTreeMap<u16, f64>,
+        connections: &mut Connections,
+    ) {
+        let same = |stream: &Stream, hz: f64| (stream.hz - hz).abs() <= 0.01 * hz;
+        self.all.retain(|report, stream| {
+            let stays = wanted.get(report).is_some_and(|&hz| same(stream, hz));
+            if let Some(connection) = stream.connection.filter(|_| !stays) {
+                connections.end(connection);
+            }
+            stays
+        });
         for (&report, &hz) in wanted {
-            match self.all.get_mut(&report) {
-                Some(stream) if (stream.hz - hz).abs() <= 0.01 * stream.hz => {}
-                Some(stream) => {
-                    stream.hz = hz;
-                    stream.course = Course::Asking { tries: 0 };
-                    self.ask(now, report);
-                }
-                None => self.begin(now, report, hz),
+            if let Some(state) = pairs::state(report).filter(|_| !self.all.contains_key(&report)) {
+                let stream = self.begin(now, state, hz, connections);
+                self.all.insert(report, stream);
             }
         }
     }
 
-    fn begin(&mut self, now: Instant, report: u16, hz: f64) {
-        let Some(state) = pairs::state(report) else {
-            return;
+    fn begin(
+        &self,
+        now: Instant,
+        state: pairs::State,
+        hz: f64,
+        connections: &mut Connections,
+    ) -> Stream {
+        let (provider, client) = self.between;
+        let request = Request {
+            provider,
+            client,
+            code: state.report,
+            presence: state.all(),
+            rate: hz,
         };
-        let stream = Stream {
+        let connection = connections.create(now, request).ok();
+        Stream {
             state,
             hz,
-            course: Course::Asking { tries: 0 },
-            next: now,
-            heard: now,
-        };
-        self.all.insert(report, stream);
-        self.ask(now, report);
-    }
-
-    fn end(&mut self, report: u16) {
-        let Some(stream) = self.all.remove(&report) else {
-            return;
-        };
-        let instance = match stream.course {
-            Course::Up { instance } => instance,
-            Course::Asking { .. } => 0,
-            Course::Polling { .. } => return,
-        };
-        let mut body = BytesMut::new();
-        body.put_u16_le(report);
-        body.put_u8(instance);
-        self.said.push((TERMINATE, body.freeze()));
-    }
-
-    fn ask(&mut self, now: Instant, report: u16) {
-        let Some(stream) = self.all.get_mut(&report) else {
-            return;
-        };
-        let Course::Asking { tries } = &mut stream.course else {
-            return;
-        };
-        *tries += 1;
-        stream.next = now + Self::RETRY;
-        let mut body = BytesMut::new();
-        body.put_u16_le(report);
-        body.put_u16_le(rate(stream.hz));
-        body.put_u32_le(stream.state.all());
-        self.said.push((CREATE, body.freeze()));
-    }
-
-    /// The RA component has confirmed a connection, or refused it.
-    pub(super) fn handle_confirm(&mut self, now: Instant, body: &[u8]) {
-        let [low, high, instance, _, _, response, ..] = *body else {
-            return;
-        };
-        let Some(stream) = self.all.get_mut(&u16::from_le_bytes([low, high])) else {
-            return;
-        };
-        stream.heard = now;
-        if response == 0 {
-            stream.course = Course::Up { instance };
-            stream.next = now + stream.silence();
-        } else {
-            stream.course = Course::Polling { left: Self::POLLS };
-            stream.next = now;
+            connection,
+            confirmed: None,
+            query: connection.is_none().then_some(now),
         }
     }
 
-    /// A report has come.
-    pub(super) fn handle_report(&mut self, now: Instant, report: u16) {
-        if let Some(stream) = self.all.get_mut(&report) {
-            stream.heard = now;
+    fn of(&mut self, connection: ConnectionId) -> Option<&mut Stream> {
+        let mut all = self.all.values_mut();
+        all.find(|stream| stream.connection == Some(connection))
+    }
+
+    /// A connection is confirmed at this rate.
+    pub(super) fn handle_established(&mut self, connection: ConnectionId, hz: f64) {
+        if let Some(stream) = self.of(connection) {
+            stream.confirmed = Some(hz);
+            stream.query = None;
         }
+    }
+
+    /// Nothing comes over a connection, which is asked for again.
+    pub(super) fn handle_silence(&mut self, now: Instant, connection: ConnectionId) {
+        if let Some(stream) = self.of(connection) {
+            stream.confirmed = None;
+            stream.query = Some(now);
+        }
+    }
+
+    /// A connection is refused, or ended by the RA component; says whether it was one of these.
+    pub(super) fn handle_end(&mut self, now: Instant, connection: ConnectionId) -> bool {
+        let Some(stream) = self.of(connection) else {
+            return false;
+        };
+        stream.connection = None;
+        stream.confirmed = None;
+        stream.query = Some(now);
+        true
     }
 
     /// How old a report may be while its connection stands; `None` without one.
     pub(super) fn freshness(&self, report: u16) -> Option<Duration> {
-        let stream = self.all.get(&report)?;
-        let stands = matches!(stream.course, Course::Up { .. });
-        stands.then(|| Duration::from_secs_f64(2.0 / stream.hz))
+        let hz = self.all.get(&report)?.confirmed?;
+        Some(Duration::from_secs_f64(2.0 / hz.max(0.01)))
     }
 
-    pub(super) fn handle_timeout(&mut self, now: Instant) {
-        let due = |it: &(&u16, &Stream)| it.1.next <= now;
-        let due: Vec<u16> = self.all.iter().filter(due).map(|(&it, _)| it).collect();
-        for report in due {
-            self.go_on(now, report);
-        }
-    }
-
-    fn go_on(&mut self, now: Instant, report: u16) {
-        let Some(stream) = self.all.get_mut(&report) else {
-            return;
-        };
-        let silent = stream.heard + stream.silence();
-        match &mut stream.course {
-            Course::Asking { tries } if *tries >= Self::TRIES => {
-                stream.course = Course::Polling { left: Self::POLLS };
-            }
-            Course::Asking { .. } => self.ask(now, report),
-            Course::Up { .. } if now < silent => stream.next = silent,
-            Course::Up { .. } | Course::Polling { left: 0 } => {
-                stream.course = Course::Asking { tries: 0 };
-                self.ask(now, report);
-            }
-            Course::Polling { left } => {
-                *left -= 1;
+    /// The queries that are due in place of connections.
+    pub(super) fn take_queries(&mut self, now: Instant) -> Vec<(u16, Bytes)> {
+        let mut queries = Vec::new();
+        for stream in self.all.values_mut() {
+            if stream.query.is_some_and(|due| due <= now) {
                 let hz = stream.hz.min(Self::MOST_QUERIES);
-                stream.next = now + Duration::from_secs_f64(1.0 / hz);
-                let query = (stream.state.query(), stream.state.query_for_all());
-                self.said.push(query);
+                stream.query = Some(now + Duration::from_secs_f64(1.0 / hz));
+                queries.push((stream.state.query(), stream.state.query_for_all()));
             }
         }
+        queries
     }
 
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
-        self.all.values().map(|stream| stream.next).min()
+        self.all.values().filter_map(|stream| stream.query).min()
     }
-
-    /// What is to be told to the RA component since this was asked last.
-    pub(super) fn take_said(&mut self) -> Vec<(u16, Bytes)> {
-        std::mem::take(&mut self.said)
-    }
-}
-
-impl Stream {
-    fn silence(&self) -> Duration {
-        let periods = Duration::from_secs_f64(Streams::SILENT_PERIODS / self.hz);
-        periods.max(Streams::LEAST_SILENCE)
-    }
-}
-
-/// A rate as service connections say it.
-pub(in crate::gateway) fn rate(hz: f64) -> u16 {
-    let scaled = hz / MOST_HZ * f64::from(u16::MAX);
-    // At least the smallest step; the cast saturates.
-    scaled.round().max(1.0) as u16
 }

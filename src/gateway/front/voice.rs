@@ -11,17 +11,17 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use bytes::{BufMut, Bytes, BytesMut};
+use bytes::Bytes;
 
 use super::super::convert::{self, Ids, Words};
 use super::super::counters::{Counter, Tally};
 use super::super::pairs;
-use super::rate;
 use crate::address::JausId;
+use crate::ra::connection::{ConnectionId, Connections, Request, ResponseCode};
 use crate::ra::{Message, RaId};
 use crate::service::{
-    CannotSubscribe, ControlId, ControlLost, ControlNews, Inquiry, NoAnswer, Patience, Stack,
-    SubscriptionId, SubscriptionNews, Topic, When, code_of,
+    ControlId, ControlLost, ControlNews, Inquiry, NoAnswer, Patience, Stack, SubscriptionId,
+    SubscriptionNews, Topic, When, code_of,
 };
 
 /// What an RA component wants of JAUS components.
@@ -48,15 +48,16 @@ pub(in crate::gateway) struct Target {
 /// A service connection of the RA component.
 #[derive(Debug)]
 struct Told {
-    peer: Target,
-    /// The message that created it.
-    request: Message,
-    report: u16,
-    hz: f64,
-    presence: u32,
-    /// The rate that was confirmed.
-    confirmed: Option<f64>,
-    suspended: bool,
+    connection: ConnectionId,
+    words: Words,
+    /// Whether the JAUS component has confirmed its event.
+    confirmed: bool,
+}
+
+/// What the voice has in common with the rest of its component.
+pub(super) struct Common<'a> {
+    pub(super) stack: &'a mut Stack,
+    pub(super) connections: &'a mut Connections,
 }
 
 /// Control of the RA component over a JAUS component.
@@ -67,16 +68,8 @@ struct Grip {
     held: bool,
 }
 
-/// What a service connection is answered with.
-#[derive(Debug, Clone, Copy)]
-enum Answer {
-    Successful = 0,
-    NotCapable = 1,
-    Refused = 2,
-}
-
-/// Confirm Service Connection.
-const CONFIRM_CONNECTION: u16 = 0x0009;
+/// Create Service Connection.
+const CREATE_CONNECTION: u16 = 0x0008;
 /// Confirm Component Control.
 const CONFIRM_CONTROL: u16 = 0x000F;
 /// Reject Component Control.
@@ -115,12 +108,12 @@ impl Voice {
     }
 
     /// What is to be sent to the RA component since this was asked last.
-    pub(in crate::gateway) fn take_said(&mut self) -> Vec<Message> {
+    pub(super) fn take_said(&mut self) -> Vec<Message> {
         std::mem::take(&mut self.said)
     }
 
     /// The RA component sends a message to what it takes for another one, and is a JAUS component.
-    pub(in crate::gateway) fn handle_ra(
+    pub(super) fn handle_ra(
         &mut self,
         now: Instant,
         request: &Message,
@@ -129,14 +122,10 @@ impl Voice {
         tally: &mut Tally,
     ) {
         match request.code {
-            0x0008 => self.connect(now, request, peer, stack, tally),
-            0x000A => self.suspend(request, false),
-            0x000B => self.suspend(request, true),
-            0x000C => self.disconnect(now, request, stack),
             0x000D => self.request_control(now, request, peer, stack, tally),
             0x000E => self.release_control(now, peer.id, stack),
             // Answers to what JAUS components never ask of RA components.
-            0x0009 | 0x000F | 0x0010 => {
+            0x000F | 0x0010 => {
                 tally.refuse(now, Counter::Unasked, request.code, request.source);
             }
             _ => self.pass_on(now, request, peer, stack, tally),
@@ -177,7 +166,7 @@ impl Voice {
     }
 
     /// A question has been answered, or nobody will.
-    pub(in crate::gateway) fn handle_answer(
+    pub(super) fn handle_answer(
         &mut self,
         now: Instant,
         inquiry: Inquiry,
@@ -231,148 +220,89 @@ impl Voice {
         self.said.extend(told);
     }
 
-    fn connect(
+    /// The RA component wants to be told a report regularly.
+    pub(super) fn connect(
         &mut self,
         now: Instant,
-        request: &Message,
+        (id, request): (ConnectionId, Request),
         peer: Target,
-        stack: &mut Stack,
+        Common { stack, connections }: Common<'_>,
         tally: &mut Tally,
     ) {
-        let Some((report, hz, presence)) = connection(&request.data) else {
-            return tally.refuse(now, Counter::NotConverted, request.code, request.source);
-        };
-        let of_it = |it: &Told| it.is(request, report);
-        if let Some((&id, told)) = self.told.iter_mut().find(|(_, it)| of_it(it)) {
-            if told.presence == presence && (told.hz - hz).abs() < 0.02 {
-                told.request = request.clone();
-                told.suspended = false;
-                let confirmed = told.confirmed;
-                if let Some(hz) = confirmed {
-                    self.answer_connection(request, report, hz, Answer::Successful);
-                }
-                return;
-            }
-            self.told.remove(&id);
-            stack.unsubscribe(now, id);
-        }
+        // At another rate than before, perhaps.
+        self.disconnect(now, id, stack);
+        let report = request.code;
         if self.told.len() >= Self::MOST_TOLD {
-            tally.refuse(now, Counter::TooManyConnections, report, request.source);
-            return self.answer_connection(request, report, 0.0, Answer::Refused);
+            tally.refuse(now, Counter::TooManyConnections, report, request.client);
+            return connections.refuse(id, ResponseCode::CONNECTION_REFUSED);
         }
-        match self.subscribe(now, request, peer, (report, hz, presence), stack) {
-            Some(Ok(id)) => {
+        let words = self.words(request.provider, peer.minor);
+        let Some(topic) = topic(&request, peer.id, &words) else {
+            tally.refuse(now, Counter::NoCounterpart, report, request.client);
+            return connections.refuse(id, ResponseCode::COMPONENT_NOT_CAPABLE);
+        };
+        match stack.subscribe(now, &topic, self.patience) {
+            Ok(subscription) => {
                 let told = Told {
-                    peer,
-                    request: request.clone(),
-                    report,
-                    hz,
-                    presence,
-                    confirmed: None,
-                    suspended: false,
+                    connection: id,
+                    words,
+                    confirmed: false,
                 };
-                self.told.insert(id, told);
+                self.told.insert(subscription, told);
             }
-            Some(Err(why)) => {
+            Err(why) => {
                 tally.refuse(now, Counter::NotConverted, report, why);
-                self.answer_connection(request, report, 0.0, Answer::Refused);
-            }
-            None => {
-                tally.refuse(now, Counter::NoCounterpart, report, request.source);
-                self.answer_connection(request, report, 0.0, Answer::NotCapable);
+                connections.refuse(id, ResponseCode::CONNECTION_REFUSED);
             }
         }
     }
 
-    /// `None` if JAUS has no such report.
-    fn subscribe(
-        &self,
-        now: Instant,
-        request: &Message,
-        peer: Target,
-        (report, hz, presence): (u16, f64, u32),
-        stack: &mut Stack,
-    ) -> Option<Result<SubscriptionId, CannotSubscribe>> {
-        let state = pairs::state(report)?;
-        let words = self.words(request.destination, peer.minor);
-        let query = words.to_jaus(state.query(), &state.query_for(presence));
-        let query = query.ok()?;
-        let topic = Topic {
-            peer: peer.id,
-            report: code_of(&query).and_then(pairs::report_of)?,
-            query,
-            when: When::hz(hz),
-        };
-        Some(stack.subscribe(now, &topic, self.patience))
-    }
-
-    fn answer_connection(&mut self, request: &Message, report: u16, hz: f64, answer: Answer) {
-        let mut body = BytesMut::new();
-        body.put_u16_le(report);
-        // The number of the connection: one for each client and report.
-        body.put_u8(0);
-        body.put_u16_le(if hz > 0.0 { rate(hz) } else { 0 });
-        body.put_u8(answer as u8);
-        let mut confirm = request.answer(CONFIRM_CONNECTION, body.freeze());
-        confirm.connection = true;
-        self.said.push(confirm);
-    }
-
-    fn suspend(&mut self, request: &Message, suspended: bool) {
-        let Some(report) = leading_code(&request.data) else {
-            return;
-        };
-        let of_it = |it: &&mut Told| it.is(request, report);
-        if let Some(told) = self.told.values_mut().find(of_it) {
-            told.suspended = suspended;
-        }
-    }
-
-    fn disconnect(&mut self, now: Instant, request: &Message, stack: &mut Stack) {
-        let Some(report) = leading_code(&request.data) else {
-            return;
-        };
-        let ended = self.told.iter().find(|(_, it)| it.is(request, report));
-        if let Some((&id, _)) = ended {
-            self.told.remove(&id);
-            stack.unsubscribe(now, id);
+    /// The RA component does not want to be told any more.
+    pub(super) fn disconnect(&mut self, now: Instant, id: ConnectionId, stack: &mut Stack) {
+        let ended = self.told.iter().find(|(_, it)| it.connection == id);
+        if let Some((&subscription, _)) = ended {
+            self.told.remove(&subscription);
+            stack.unsubscribe(now, subscription);
         }
     }
 
     /// Something has become of an event.
-    pub(in crate::gateway) fn handle_subscription(
+    pub(super) fn handle_subscription(
         &mut self,
         now: Instant,
-        id: SubscriptionId,
-        news: SubscriptionNews,
+        (id, news): (SubscriptionId, SubscriptionNews),
+        connections: &mut Connections,
         tally: &mut Tally,
     ) {
         let Some(told) = self.told.get_mut(&id) else {
             return;
         };
+        let connection = told.connection;
         match news {
-            SubscriptionNews::Up { hz } => {
-                let hz = hz.unwrap_or(told.hz);
-                told.confirmed = Some(hz);
-                let (request, report) = (told.request.clone(), told.report);
-                self.answer_connection(&request, report, hz, Answer::Successful);
-            }
-            SubscriptionNews::Report { report, .. } => {
-                if told.suspended {
-                    return;
-                }
-                let (request, minor) = (told.request.clone(), told.peer.minor);
-                if let Some(mut message) = self.report(now, (&request, minor), &report, tally) {
-                    message.connection = true;
-                    self.said.push(message);
+            SubscriptionNews::Up { .. } => {
+                if !std::mem::replace(&mut told.confirmed, true) {
+                    connections.accept(now, connection);
                 }
             }
-            SubscriptionNews::Down { .. } => {}
-            SubscriptionNews::Ended(end) => {
-                let (request, report) = (told.request.clone(), told.report);
+            SubscriptionNews::Report { report, .. } => match told.words.to_ra(&report) {
+                Ok((_, data)) => {
+                    tally.add(Counter::ReportsToRa);
+                    connections.set_report(now, connection, data);
+                }
+                Err(refusal) => {
+                    let code = code_of(&report).unwrap_or_default();
+                    convert::refuse(now, tally, code, &refusal);
+                }
+            },
+            SubscriptionNews::Down { .. } => connections.clear_report(connection),
+            SubscriptionNews::Ended(why) => {
+                let confirmed = told.confirmed;
                 self.told.remove(&id);
-                tally.refuse(now, Counter::Unanswered, report, end);
-                self.answer_connection(&request, report, 0.0, Answer::NotCapable);
+                tally.refuse(now, Counter::Unanswered, CREATE_CONNECTION, why);
+                match confirmed {
+                    true => connections.end(connection),
+                    false => connections.refuse(connection, ResponseCode::COMPONENT_NOT_CAPABLE),
+                }
             }
         }
     }
@@ -424,7 +354,7 @@ impl Voice {
     }
 
     /// Something has become of control.
-    pub(in crate::gateway) fn handle_control(
+    pub(super) fn handle_control(
         &mut self,
         now: Instant,
         id: ControlId,
@@ -468,30 +398,21 @@ impl Voice {
     }
 }
 
-impl Told {
-    /// Whether it is the connection for this report between these two.
-    fn is(&self, request: &Message, report: u16) -> bool {
-        self.report == report && self.request.destination == request.destination
-    }
+/// What stands for a report among JAUS components; `None` if there is no such report.
+fn topic(request: &Request, peer: JausId, words: &Words) -> Option<Topic> {
+    let state = pairs::state(request.code)?;
+    let query = words.to_jaus(state.query(), &state.query_for(request.presence));
+    let query = query.ok()?;
+    Some(Topic {
+        peer,
+        report: code_of(&query).and_then(pairs::report_of)?,
+        query,
+        // What events can say at least.
+        when: When::hz(request.rate.max(1.0 / 60.0)),
+    })
 }
 
 fn log_loss(request: &Message, why: ControlLost) {
     let (client, of) = (request.source, request.destination);
     tracing::info!(%client, %of, %why, "control lost");
-}
-
-/// Report, rate in hertz and presence vector of a Create Service Connection.
-pub(in crate::gateway) fn connection(body: &[u8]) -> Option<(u16, f64, u32)> {
-    let (report, body) = body.split_first_chunk()?;
-    let (scaled, body) = body.split_first_chunk()?;
-    let presence = body.first_chunk()?;
-    let hz = f64::from(u16::from_le_bytes(*scaled)) / f64::from(u16::MAX) * super::MOST_HZ;
-    let report = u16::from_le_bytes(*report);
-    // What events can say at least.
-    Some((report, hz.max(1.0 / 60.0), u32::from_le_bytes(*presence)))
-}
-
-/// The report that a message about a service connection names.
-pub(in crate::gateway) fn leading_code(body: &[u8]) -> Option<u16> {
-    body.first_chunk().map(|&code| u16::from_le_bytes(code))
 }
