@@ -45,6 +45,16 @@ impl Default for Pacing {
 }
 
 impl Pacing {
+    /// The same for a receiver with a small buffer that it empties slowly. Measured with Junior as
+    /// it is shipped: its 140000 octets must hold what comes while its run-time engine sleeps, and
+    /// that hands over to an application ten datagrams in a turn.
+    pub(super) fn gentle(self) -> Self {
+        Self {
+            burst: self.burst.min(64_000),
+            rate: self.rate.min(10_000_000),
+        }
+    }
+
     /// How long it takes to make room for so much.
     fn time_for(&self, octets: u64) -> Duration {
         Duration::from_nanos(octets.saturating_mul(1_000_000_000) / self.rate.max(1))
@@ -71,6 +81,8 @@ pub(super) struct Stretch {
     pub(super) cut: Cut,
     /// The serial number of the first fragment.
     pub(super) first: u64,
+    /// How fast its fragments may leave; `None` for as fast as the link takes them.
+    pub(super) pacing: Option<Pacing>,
 }
 
 impl Stretch {
@@ -201,8 +213,9 @@ impl Pacer {
                 self.list(lane);
                 continue;
             }
-            if let Some(pacing) = &self.pacing {
-                bucket.empty_by(now, pacing);
+            let next = bucket.waiting[level].front();
+            if let Some(pacing) = next.and_then(|(stretch, _)| stretch.pacing) {
+                bucket.empty_by(now, &pacing);
                 if let Some(excess) = bucket.filled.checked_sub(pacing.burst as u64) {
                     // Not for each datagram: timers are coarse.
                     let wait = pacing.time_for(excess + pacing.burst as u64 / 4);

@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use tracing::{debug, trace};
 
-use super::large::Cut;
-use super::pacing::Stretch;
+use super::large::{Cut, Cutting};
+use super::pacing::{Pacing, Stretch};
 use super::{
     Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To, Transmit,
 };
@@ -193,7 +193,7 @@ impl Endpoint {
         let version = route.map_or(Version::As5669a, |(_, version)| version);
         let length = message.payload.len();
         self.check_length(length, destination, version)?;
-        let cut = self.cut(length, destination, version);
+        let cut = self.cutting(destination, version).cut(length);
         // What is large goes to everybody only until the address is known.
         let seeks = scope == Broadcast::None && route.is_none();
         if message.acknowledge || cut.count() > 1 && seeks {
@@ -244,6 +244,7 @@ impl Endpoint {
                 payload: message.payload.clone(),
                 cut,
                 first,
+                pacing: self.pacing(message.destination),
             };
             self.pacer.push(now, (link, to), stretch);
         }
@@ -268,23 +269,23 @@ impl Endpoint {
         }
     }
 
-    /// How a message to `destination` is cut.
-    fn cut(&self, length: usize, destination: JausId, version: Version) -> Cut {
-        let (limit, repeat_code) = self.limits_of(destination, version);
-        Cut::new(length, limit, repeat_code)
+    /// How messages to `destination` are cut.
+    pub(super) fn cutting(&self, destination: JausId, version: Version) -> Cutting {
+        let profile = self.peers.profile(destination);
+        let (longest, limit) = (profile.payload_limit(), self.config.payload_limit);
+        Cutting {
+            limit: longest.map_or(limit, |longest| longest.min(limit)),
+            repeat_code: version != Version::As5669a
+                || self.peers.large_style(destination) == Some(LargeStyle::RepeatedCode),
+            kept: profile.fragments_kept().zip(longest),
+        }
     }
 
-    /// The longest payload of a packet to `destination`, and whether each fragment names the message
-    /// code.
-    pub(super) fn limits_of(&self, destination: JausId, version: Version) -> (usize, bool) {
-        let longest = self.peers.profile(destination).payload_limit();
-        let limit = self.config.payload_limit;
-        let repeat_code = version != Version::As5669a
-            || self.peers.large_style(destination) == Some(LargeStyle::RepeatedCode);
-        (
-            longest.map_or(limit, |longest| longest.min(limit)),
-            repeat_code,
-        )
+    /// How fast the fragments of a large message may leave for `destination`.
+    fn pacing(&self, destination: JausId) -> Option<Pacing> {
+        let usual = self.config.pacing?;
+        let is_slow = self.peers.profile(destination).overflows_early();
+        Some(if is_slow { usual.gentle() } else { usual })
     }
 
     fn check_length(
@@ -293,8 +294,7 @@ impl Endpoint {
         destination: JausId,
         version: Version,
     ) -> Result<(), SendError> {
-        let (limit, repeat_code) = self.limits_of(destination, version);
-        let longest = Cut::longest(limit, repeat_code);
+        let longest = self.cutting(destination, version).longest();
         let limit = self.config.max_message.min(longest);
         if length > limit {
             return Err(SendError::TooLong { length, limit });

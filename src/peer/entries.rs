@@ -305,11 +305,18 @@ departures! {
         does: "takes ten datagrams in a turn and keeps the latest 50 or 100 fragments of all \
                senders",
         source: Source::Recorded,
-        told: Told::NeedNotBe,
-        ours: "an acknowledged message goes no faster than its receiver takes it; messages above \
-               200 kB need a larger `MaxMsgHistory` there",
-        place: "src/endpoint/delivery/window.rs",
-        test: "the_window_finds_out_what_the_receiver_can_take",
+        told: Told::By(&[
+            Sign::PriorityFault,
+            Sign::LongFragments,
+            Sign::CallsUnknownIds,
+            Sign::BeginsWithOne,
+        ]),
+        ours: "what would be more than 50 fragments (71 kB) is cut in its longest, of 4079 octets, \
+               and leaves more slowly if it is not acknowledged; what is acknowledged goes no \
+               faster than its receiver takes it anyway. Messages above 200 kB need a larger \
+               `MaxMsgHistory` there",
+        place: "src/endpoint/send.rs",
+        test: "to_junior_large_messages_have_no_more_fragments_than_it_keeps",
     };
     /// Zero octets that stand for all.
     AliasedIds = Entry {

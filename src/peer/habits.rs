@@ -41,6 +41,23 @@ impl Peer {
         }
     }
 
+    /// The most fragments that it keeps, of all messages that are not whole together, if that is
+    /// less than those of a large message can be. It forgets the oldest for a new one, and
+    /// acknowledges each.
+    #[must_use]
+    pub const fn fragments_kept(self) -> Option<usize> {
+        match self {
+            Self::Junior | Self::Jts | Self::Fkie => Some(JUNIOR_FRAGMENTS),
+            Self::Standard | Self::JausPlusPlus | Self::OpenJausSdk | Self::Iop => None,
+        }
+    }
+
+    /// Whether its receive buffer, as it is shipped, is too small for the bursts that others take.
+    #[must_use]
+    pub const fn overflows_early(self) -> bool {
+        matches!(self, Self::Junior | Self::Jts | Self::Fkie)
+    }
+
     /// Whether a 0 in its destinations stands for "all of them", as 65535 and 255 do with others.
     #[must_use]
     pub const fn reads_zero_as_wildcard(self) -> bool {
@@ -82,3 +99,5 @@ pub(crate) const JAUSPP_FRAGMENT: usize = 1573;
 const JAUSPP_PAYLOAD: usize = 1425;
 /// The payload of Junior's fragments but for the last, in octets, unless `MTU_Size` is set lower.
 pub(crate) const JUNIOR_PAYLOAD: usize = 4079;
+/// The fragments that Junior keeps with the `MaxMsgHistory` that it is shipped with.
+const JUNIOR_FRAGMENTS: usize = 50;

@@ -24,7 +24,6 @@ use std::time::{Duration, Instant};
 
 use tracing::debug;
 
-use super::large::Cut;
 use super::{
     Config, Counter, Endpoint, Event, MessageHandle, Outgoing, SendError, Transmit, Unacknowledged,
 };
@@ -291,10 +290,10 @@ impl Endpoint {
     ) -> Option<Transmit> {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
-        let (limit, repeat) = self.limits_of(destination, version);
+        let cutting = self.cutting(destination, version);
         let flow = self.deliveries.flows.get_mut(&destination)?;
         flow.known = route.is_some();
-        let begin = |length| (Cut::new(length, limit, repeat), version);
+        let begin = |length| (cutting.cut(length), version);
         let (mut frame, tries) = flow.take(now, priority, &mut self.numbers, begin)?;
         frame.destination = destination;
         if tries > 1 {

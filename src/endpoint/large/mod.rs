@@ -10,4 +10,4 @@ mod split;
 mod style;
 
 pub(super) use reassembly::Reassembly;
-pub(super) use split::{Cut, Numbers};
+pub(super) use split::{Cut, Cutting, Numbers};

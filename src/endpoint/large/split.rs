@@ -7,6 +7,36 @@ use crate::wire::{DataControl, ra};
 /// The most fragments of a message: sequence numbers are 16 bits wide and 0 is left out.
 const MOST: usize = u16::MAX as usize;
 
+/// How messages to one destination are cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::endpoint) struct Cutting {
+    /// The longest payload of a packet.
+    pub(in crate::endpoint) limit: usize,
+    /// Whether each fragment begins with the message code, or the first alone.
+    pub(in crate::endpoint) repeat_code: bool,
+    /// The most fragments that the destination keeps, and the longest payload for what would be
+    /// more of them.
+    pub(in crate::endpoint) kept: Option<(usize, usize)>,
+}
+
+impl Cutting {
+    /// How a message of `length` octets is cut.
+    pub(in crate::endpoint) fn cut(self, length: usize) -> Cut {
+        let cut = Cut::new(length, self.limit, self.repeat_code);
+        match self.kept {
+            Some((most, longest)) if cut.count() > most => {
+                Cut::new(length, longest.max(self.limit), self.repeat_code)
+            }
+            _ => cut,
+        }
+    }
+
+    /// The longest message that can be cut like that.
+    pub(in crate::endpoint) fn longest(self) -> usize {
+        Cut::longest(self.limit, self.repeat_code)
+    }
+}
+
 /// How a message is cut: which of its octets go into which fragment. Costs nothing to keep; the
 /// fragments are made one by one, when they are sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +68,7 @@ impl Cut {
     }
 
     /// The longest message that can be cut into payloads of `limit` octets.
-    pub(in crate::endpoint) fn longest(limit: usize, repeat_code: bool) -> usize {
+    fn longest(limit: usize, repeat_code: bool) -> usize {
         let repeated = if repeat_code { ra::CODE_LEN } else { 0 };
         limit.saturating_sub(repeated).saturating_mul(MOST)
     }

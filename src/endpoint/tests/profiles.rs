@@ -331,3 +331,69 @@ fn numbers_that_count_for_each_destination_are_no_duplicates() {
     }
     assert_eq!(payloads(&mut rig), [vec![1; 150], vec![2; 150]]);
 }
+
+/// The fragments in which a message of 100 KiB leaves, acknowledged packet by packet if it wants
+/// that, and how long it takes.
+fn fragments_to(profile: Known, acknowledge: bool) -> (Vec<usize>, Duration) {
+    let mut rig = Rig::with(assigned(profile));
+    rig.meet_peer();
+    let begin = rig.now;
+    rig.send(Outgoing {
+        payload: message(102_400),
+        acknowledge,
+        ..to_peer()
+    })
+    .unwrap();
+    let mut lengths = Vec::new();
+    while lengths.iter().sum::<usize>() < 102_400 {
+        for (_, frame) in rig.sent() {
+            lengths.push(frame.payload.len());
+            if acknowledge {
+                let flags = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+                let sequence = frame.sequence;
+                rig.hear(&Frame {
+                    flags,
+                    sequence,
+                    ..from_peer(b"")
+                });
+            }
+        }
+        rig.pass(Duration::from_millis(1));
+    }
+    (lengths, rig.now - begin)
+}
+
+#[test]
+fn to_junior_large_messages_have_no_more_fragments_than_it_keeps() {
+    for acknowledge in [false, true] {
+        for profile in [Known::Junior, Known::Jts, Known::Fkie] {
+            let (lengths, _) = fragments_to(profile, acknowledge);
+            assert_eq!((lengths[0], lengths.len()), (4079, 26), "{profile}");
+        }
+        let (lengths, _) = fragments_to(Known::Standard, acknowledge);
+        assert_eq!(
+            (lengths[0], lengths.len()),
+            (1425, 72),
+            "others need none of that"
+        );
+    }
+    // What it keeps goes in packets that no router needs to cut.
+    let mut rig = Rig::with(assigned(Known::Junior));
+    rig.meet_peer();
+    let payload = message(50 * 1425);
+    rig.send(Outgoing {
+        payload,
+        ..to_peer()
+    })
+    .unwrap();
+    assert_eq!(rig.sent()[0].1.payload.len(), 1425);
+}
+
+#[test]
+fn to_junior_large_messages_leave_no_faster_than_its_buffer_is_emptied() {
+    let (_, usual) = fragments_to(Known::Standard, false);
+    let (_, gentle) = fragments_to(Known::Junior, false);
+    assert!(usual < Duration::from_millis(3), "{usual:?}");
+    let expected = Duration::from_millis(10)..Duration::from_millis(40);
+    assert!(expected.contains(&gentle), "{gentle:?}");
+}
