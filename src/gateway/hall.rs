@@ -24,7 +24,7 @@ impl Gateway {
     pub(super) fn list(&mut self, now: Instant, subsystem: &node::Subsystem) {
         let number = subsystem.id;
         if let Err(collision) = self.claim(Side::Ra, number.into()) {
-            return self.tally.refuse(now, Counter::Collision, 0, &collision);
+            return self.tally.refuse(now, Counter::Collision, 0, collision);
         }
         let mut listed = BTreeMap::new();
         for (ra, component) in subsystem.components() {
@@ -163,7 +163,7 @@ impl Gateway {
             self.actions.push_back(Action::Send(message));
         }
         for message in front.take_said() {
-            self.send_ra(now, message);
+            self.send_ra(now, &message);
         }
         self.fronts.insert(id, front);
     }
@@ -218,7 +218,7 @@ impl Gateway {
 
     fn handle_for_us(&mut self, now: Instant, message: &Message) {
         if message.code == QUERY_STATUS {
-            return self.send_ra(now, message.answer(STATUS, front::ready()));
+            return self.send_ra(now, &message.answer(STATUS, front::ready()));
         }
         let front = self.ids.jaus_of(message.source);
         let front = front.filter(|id| self.fronts.contains_key(id));
@@ -250,7 +250,7 @@ impl Gateway {
             return Some(id);
         }
         if let Err(collision) = self.claim(Side::Ra, source.subsystem.into()) {
-            self.tally.refuse(now, Counter::Collision, 0, &collision);
+            self.tally.refuse(now, Counter::Collision, 0, collision);
             return None;
         }
         let name = RaComponent(source.component).to_string();

@@ -343,7 +343,7 @@ impl Gateway {
             );
         }
         if let Err(collision) = self.claim(Side::Jaus, subsystem) {
-            self.tally.refuse(now, Counter::Collision, 0, &collision);
+            self.tally.refuse(now, Counter::Collision, 0, collision);
             return self.hide(now, subsystem);
         }
         let number = picture.subsystem.id;
@@ -376,9 +376,9 @@ impl Gateway {
         self.known.set(self.ids.clone());
     }
 
-    fn send_ra(&mut self, now: Instant, message: Message) {
+    fn send_ra(&mut self, now: Instant, message: &Message) {
         let (code, to) = (message.code, message.destination);
-        if let Err(why) = self.ra.send(now, &message) {
+        if let Err(why) = self.ra.send(now, message) {
             let why = format_args!("to {to}: {why}");
             self.tally.refuse(now, Counter::NotSent, code, why);
         }
