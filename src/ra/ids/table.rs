@@ -17,14 +17,16 @@ const STRIDE: u8 = 64;
 /// The ids by which the components of each side are seen on the other.
 ///
 /// ```
+/// use jaus::address::JausId;
+/// use jaus::ra::RaId;
 /// use jaus::ra::ids::{IdTable, RaComponent, Settings};
 ///
 /// let ids = IdTable::new(&Settings::default())?;
-/// let second_driver = "20.1.33.2".parse()?;
-/// assert_eq!(ids.jaus_of(second_driver), Some("20.1.97".parse()?));
-/// assert_eq!(ids.ra_behind("20.1.97".parse()?), Some(second_driver));
+/// let second_driver: RaId = "20.1.33.2".parse()?;
+/// assert_eq!(ids.jaus_of(second_driver), Some(JausId::new(20, 1, 97)));
+/// assert_eq!(ids.ra_behind(JausId::new(20, 1, 97)), Some(second_driver));
 ///
-/// let ours = "101.1.7".parse()?;
+/// let ours = JausId::new(101, 1, 7);
 /// let shown = ids.ra_of(ours, RaComponent::PRIMITIVE_DRIVER).ok_or("shown")?;
 /// assert_eq!(shown.to_string(), "101.1.33.7");
 /// assert_eq!(ids.jaus_behind(shown), Some(ours));
