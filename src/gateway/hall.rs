@@ -7,10 +7,13 @@ use super::counters::{Counter, Tally};
 use super::front::{self, Front, Plan, Target};
 use super::{Action, Gateway, roles};
 use crate::address::JausId;
-use crate::endpoint::Received;
+use crate::codec::Message as _;
+use crate::endpoint::{Outgoing, Received};
+use crate::messages::core::QueryIdentification;
 use crate::ra::ids::{RaComponent, Side};
 use crate::ra::{Message, RaId, node};
 use crate::service::{Event, Kind, Profile, code_of};
+use crate::wire::Broadcast;
 
 /// Query Component Status.
 const QUERY_STATUS: u16 = 0x2002;
@@ -91,7 +94,21 @@ impl Gateway {
         self.former.remove(&id);
         self.fronts.insert(id, front);
         self.with_front(now, id, |_, _| {});
+        self.call_everybody(id);
         true
+    }
+
+    /// Asks everybody for a name, so that all hear where the counterpart lives: its own discovery
+    /// speaks within its subsystem alone, and who knew it before may still write to where it was.
+    fn call_everybody(&mut self, source: JausId) {
+        let query = QueryIdentification {
+            query_type: 2.into(),
+        };
+        if let Ok(payload) = query.encode() {
+            let mut call = Outgoing::new(source, JausId::EVERYONE, payload);
+            call.broadcast = Broadcast::Global;
+            self.actions.push_back(Action::Send(call));
+        }
     }
 
     /// An RA subsystem is gone.

@@ -69,7 +69,7 @@ fn rubbish_from_a_component_that_is_known_is_refused_and_counted() {
             continue;
         }
         let data = Bytes::from(vec![0xFF; usize::from(code % 7)]);
-        world.ra_says(ra, Message::new(driver, us, code, data));
+        world.ra_says(ra, &Message::new(driver, us, code, data));
         if code % 1000 == 0 {
             world.run(Duration::from_millis(500));
         }

@@ -92,7 +92,7 @@ fn only_the_chosen_subsystems_are_shown() {
 #[test]
 fn its_pose_is_told_when_it_is_asked_for() {
     let (mut world, ra, _) = world();
-    world.ra_says(ra, says(RA_POSE, 0x2402, "ff00"));
+    world.ra_says(ra, &says(RA_POSE, 0x2402, "ff00"));
     world.run(Duration::from_secs(1));
     let told = world.ra_heard(ra, 0x4402);
     let [told] = &told[..] else {
@@ -108,7 +108,7 @@ fn its_pose_is_told_when_it_is_asked_for() {
 fn a_service_connection_runs_at_its_rate_until_it_is_terminated() {
     let (mut world, ra, _) = world();
     // Global poses, ten in a second.
-    world.ra_says(ra, says(RA_POSE, 0x0008, "02445802ff000000"));
+    world.ra_says(ra, &says(RA_POSE, 0x0008, "02445802ff000000"));
     world.run(Duration::from_secs(5));
     let heard = std::mem::take(&mut world.ra[ra].heard);
     let confirms: Vec<&Message> = heard.iter().filter(|it| it.code == 0x0009).collect();
@@ -123,7 +123,7 @@ fn a_service_connection_runs_at_its_rate_until_it_is_terminated() {
     assert!(reports.clone().all(|it| it.connection));
     let reports = reports.count();
     assert!((48..=52).contains(&reports), "{reports}");
-    world.ra_says(ra, says(RA_POSE, 0x000C, "024400"));
+    world.ra_says(ra, &says(RA_POSE, 0x000C, "024400"));
     world.run(Duration::from_secs(1));
     world.ra[ra].heard.clear();
     world.run(Duration::from_secs(2));
@@ -133,7 +133,7 @@ fn a_service_connection_runs_at_its_rate_until_it_is_terminated() {
 #[test]
 fn a_service_connection_for_what_is_not_there_is_refused() {
     let (mut world, ra, _) = world();
-    world.ra_says(ra, says(RA_POSE, 0x0008, "00405802ff000000"));
+    world.ra_says(ra, &says(RA_POSE, 0x0008, "00405802ff000000"));
     let told = world.ra_heard(ra, 0x0009);
     assert_eq!(told[0].data[5], 2, "the component is not capable");
 }
@@ -141,21 +141,21 @@ fn a_service_connection_for_what_is_not_there_is_refused() {
 #[test]
 fn it_is_driven_by_the_ra_component_that_controls_it() {
     let (mut world, ra, rover) = world();
-    world.ra_says(ra, says(RA_DRIVER, 0x000D, "7f"));
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
     world.run(Duration::from_secs(1));
     let told = world.ra_heard(ra, 0x000F);
     assert_eq!(told[0].data, Bytes::from_static(&[0]));
     let standing = *world.jaus[rover].stack.standing();
     assert_eq!(standing.controller.unwrap().id, JausId::new(30, 1, 32));
-    world.ra_says(ra, says(RA_DRIVER, 0x0004, ""));
+    world.ra_says(ra, &says(RA_DRIVER, 0x0004, ""));
     assert_eq!(world.jaus[rover].stack.standing().state, State::Ready);
     for _ in 0..10 {
         // Half of the propulsion forward.
-        world.ra_says(ra, says(RA_DRIVER, 0x0405, "0100ff3f"));
+        world.ra_says(ra, &says(RA_DRIVER, 0x0405, "0100ff3f"));
         world.run(Duration::from_millis(100));
     }
     let velocity = RaId::new(101, 1, 42, 7);
-    world.ra_says(ra, says(velocity, 0x2404, "0100"));
+    world.ra_says(ra, &says(velocity, 0x2404, "0100"));
     world.run(Duration::from_secs(1));
     let told = world.ra_heard(ra, 0x4404);
     let speed = i32::from_le_bytes([
@@ -165,7 +165,7 @@ fn it_is_driven_by_the_ra_component_that_controls_it() {
         told[0].data[5],
     ]);
     assert!(speed > 0, "{told:?}");
-    world.ra_says(ra, says(RA_DRIVER, 0x000E, ""));
+    world.ra_says(ra, &says(RA_DRIVER, 0x000E, ""));
     world.run(Duration::from_secs(1));
     assert_eq!(world.jaus[rover].stack.standing().controller, None);
 }
@@ -179,7 +179,7 @@ fn control_that_is_not_to_be_had_is_rejected_as_openjaus_does() {
     let stack = &mut world.jaus[operator].stack;
     stack.request_control(now, VEHICLE, 200, patience).unwrap();
     world.run(Duration::from_secs(1));
-    world.ra_says(ra, says(RA_DRIVER, 0x000D, "7f"));
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
     world.run(Duration::from_secs(1));
     assert_eq!(world.ra_heard(ra, 0x0010).len(), 1);
     let controller = world.jaus[rover].stack.standing().controller.unwrap();
@@ -189,7 +189,7 @@ fn control_that_is_not_to_be_had_is_rejected_as_openjaus_does() {
 #[test]
 fn control_is_lost_with_the_ra_system_that_had_it() {
     let (mut world, ra, rover) = world();
-    world.ra_says(ra, says(RA_DRIVER, 0x000D, "7f"));
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
     world.run(Duration::from_secs(1));
     assert!(world.jaus[rover].stack.standing().controller.is_some());
     world.ra.remove(ra);
@@ -202,7 +202,7 @@ fn a_question_that_is_repeated_while_it_waits_is_asked_once() {
     let (mut world, ra, rover) = world();
     world.jaus[rover].up = false;
     for _ in 0..50 {
-        world.ra_says(ra, says(RA_POSE, 0x2402, "ff00"));
+        world.ra_says(ra, &says(RA_POSE, 0x2402, "ff00"));
     }
     assert_eq!(world.count(Counter::QueriesFromRa), 1);
     assert_eq!(world.count(Counter::Repeated), 49);
@@ -220,6 +220,6 @@ fn its_departure_is_told() {
 fn what_has_no_counterpart_is_refused_and_counted() {
     let (mut world, ra, _) = world();
     let before = world.count(Counter::NoCounterpart);
-    world.ra_says(ra, says(RA_DRIVER, 0x0406, "0000"));
+    world.ra_says(ra, &says(RA_DRIVER, 0x0406, "0000"));
     assert_eq!(world.count(Counter::NoCounterpart), before + 1);
 }

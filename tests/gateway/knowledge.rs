@@ -48,7 +48,7 @@ fn an_ra_client_fills_a_jaus_store_and_reads_it_in_messages_of_many_datagrams() 
     let points: u16 = 2000;
     let create = create(points);
     assert!(create.len() > 20_000);
-    world.ra_says(ra, Message::new(OPERATOR, RA_STORE, 0x0A20, create));
+    world.ra_says(ra, &Message::new(OPERATOR, RA_STORE, 0x0A20, create));
     world.run(Duration::from_secs(5));
     let told = world.ra_heard(ra, 0x4A20);
     assert_eq!(told.len(), 1);
@@ -58,7 +58,7 @@ fn an_ra_client_fills_a_jaus_store_and_reads_it_in_messages_of_many_datagrams() 
 
     // All objects with their data.
     let query = Bytes::from_static(&[0, 1, 78]);
-    world.ra_says(ra, Message::new(OPERATOR, RA_STORE, 0x2A23, query));
+    world.ra_says(ra, &Message::new(OPERATOR, RA_STORE, 0x2A23, query));
     world.run(Duration::from_secs(5));
     let told = world.ra_heard(ra, 0x4A23);
     let octets: usize = told.iter().map(|it| it.data.len()).sum();
@@ -87,7 +87,7 @@ fn a_jaus_client_uses_an_ra_store() {
     );
     let mut answer = BytesMut::from(&[77, 2, 0][..]);
     answer.put_slice(&[1, 0, 0, 0, 2, 0, 0, 0]);
-    world.ra_says(ra, heard[0].answer(0x4A20, answer.freeze()));
+    world.ra_says(ra, &heard[0].answer(0x4A20, answer.freeze()));
     let told = |world: &World| {
         let events = world.jaus[operator].events.iter();
         let told = events.filter_map(|event| match event {
@@ -114,7 +114,7 @@ fn a_jaus_client_uses_an_ra_store() {
     let bounds = Bytes::from_static(&[
         5, 0xFF, 0xFF, 1, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 4, 0, 0, 0,
     ]);
-    world.ra_says(ra, heard[0].answer(0x4A22, bounds));
+    world.ra_says(ra, &heard[0].answer(0x4A22, bounds));
     let answered = world.jaus[operator]
         .events
         .iter()

@@ -233,9 +233,9 @@ fn control_is_given_back_when_its_client_is_gone() {
 fn whoever_has_less_authority_than_its_controller_is_refused_and_a_controller_is_told_of_its_loss()
 {
     let (mut world, ra, operator) = world();
-    let rival = COMMANDER;
     let rover = world.ra[ra].rover.as_mut().unwrap();
-    rover.controller = Some((jaus::ra::RaId::new(30, 1, 32, 1), 200));
+    // One of its own subsystem.
+    rover.controller = Some((jaus::ra::RaId::new(SUBSYSTEM, 1, 45, 1), 200));
     let news = take_control(&mut world, operator, 127);
     let refused = ControlNews::Refused(ControlRefused::InsufficientAuthority(127));
     assert_eq!(news, [refused]);
@@ -244,11 +244,24 @@ fn whoever_has_less_authority_than_its_controller_is_refused_and_a_controller_is
         [ControlNews::Granted]
     );
     let rover = world.ra[ra].rover.as_mut().unwrap();
-    assert_eq!(rover.controller, Some((rival, 220)));
+    assert_eq!(rover.controller, Some((COMMANDER, 220)));
     rover.lose_controller();
     world.run(seconds(1.0));
     let news = control_news(&mut world, operator);
     assert_eq!(news, [ControlNews::Lost(ControlLost::TakenBack)]);
+}
+
+#[test]
+fn a_jaus_client_with_more_authority_takes_it_over_from_another() {
+    let (mut world, ra, operator) = world();
+    take_control(&mut world, operator, 100);
+    let rival = JausId::new(43, 1, 1);
+    let rival = world.add_jaus(stack(rival, Kind::OperatorControlUnit, "Rival", Vec::new()));
+    assert_eq!(take_control(&mut world, rival, 200), [ControlNews::Granted]);
+    let news = control_news(&mut world, operator);
+    assert_eq!(news, [ControlNews::Lost(ControlLost::TakenBack)]);
+    let rover = world.ra[ra].rover.as_ref().unwrap();
+    assert_eq!(rover.controller, Some((COMMANDER, 200)));
 }
 
 #[test]

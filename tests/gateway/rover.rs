@@ -121,6 +121,12 @@ impl Rover {
             self.said.push(message.answer(0x0010, Bytes::new()));
             return;
         }
+        if let Some((before, rank)) = self.controller
+            && authority > rank
+        {
+            self.said
+                .push(Message::new(DRIVER, before, 0x0010, Bytes::new()));
+        }
         self.controller = Some((from, authority));
         self.said
             .push(message.answer(0x000F, Bytes::from_static(&[0])));

@@ -294,8 +294,8 @@ impl World {
     }
 
     /// A component of an RA system sends a message.
-    pub(crate) fn ra_says(&mut self, who: usize, message: Message) {
-        self.ra[who].node.send(self.now, &message).unwrap();
+    pub(crate) fn ra_says(&mut self, who: usize, message: &Message) {
+        self.ra[who].node.send(self.now, message).unwrap();
         self.settle();
     }
 

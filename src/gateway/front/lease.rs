@@ -27,6 +27,9 @@ pub(super) struct Lease {
     patience: Duration,
     /// The most authority that we claim.
     most: u8,
+    /// Whether the next rejection is about a hold of ours that a request of ours with more authority
+    /// has ended: OpenJAUS rejects whom it takes control from, and then confirms.
+    outranked_ourselves: bool,
     said: Said,
 }
 
@@ -66,6 +69,7 @@ impl Lease {
             state: State::Free,
             patience,
             most,
+            outranked_ourselves: false,
             said: Said::default(),
         }
     }
@@ -116,6 +120,7 @@ impl Lease {
                 let due = now >= asked + Self::RENEWAL || before.authority != client.authority;
                 let asked = if due { now } else { asked };
                 if due {
+                    self.outranked_ourselves = client.authority > before.authority;
                     self.pass_on(client);
                 }
                 self.state = State::Held { client, asked };
@@ -126,6 +131,7 @@ impl Lease {
             }
             State::Held { client: before, .. } => {
                 self.reject(before.id, Rejection::CONTROL_RELEASED);
+                self.outranked_ourselves = true;
                 self.ask(now, client);
             }
         }
@@ -160,6 +166,7 @@ impl Lease {
 
     /// The RA component has answered a request: 0 is yes.
     pub(super) fn handle_confirm(&mut self, now: Instant, code: u8) {
+        self.outranked_ourselves = false;
         match (self.state, code) {
             (State::Asking { client, .. }, 0) => {
                 self.state = State::Held { client, asked: now };
@@ -182,6 +189,9 @@ impl Lease {
 
     /// The RA component refuses control, or takes it back: somebody has a greater authority.
     pub(super) fn handle_reject(&mut self) {
+        if std::mem::take(&mut self.outranked_ourselves) {
+            return;
+        }
         match std::mem::replace(&mut self.state, State::Free) {
             State::Asking { client, .. } => {
                 self.confirm(client.id, Confirmation::INSUFFICIENT_AUTHORITY);
@@ -239,6 +249,7 @@ impl Lease {
 
     fn let_go(&mut self) {
         self.state = State::Free;
+        self.outranked_ourselves = false;
         self.said.to_ra.push((RELEASE, Bytes::new()));
     }
 
@@ -321,8 +332,24 @@ mod tests {
         let said = lease.take_said();
         assert_eq!(told(&said), [(CLIENT, 0x0010, 0)]);
         assert_eq!(said.to_ra, [(REQUEST, Bytes::from_static(&[200]))]);
+        // OpenJAUS rejects the hold that we had, and then confirms.
+        lease.handle_reject();
+        assert!(told(&lease.take_said()).is_empty());
         lease.handle_confirm(now, 0);
         assert!(lease.obeys(RIVAL) && !lease.obeys(CLIENT));
+        lease.handle_reject();
+        assert!(!lease.obeys(RIVAL), "the next one is meant");
+    }
+
+    #[test]
+    fn a_client_that_raises_its_own_authority_keeps_control() {
+        let (mut lease, now) = lease();
+        lease.request(now, CLIENT, 100);
+        lease.handle_confirm(now, 0);
+        lease.request(now, CLIENT, 150);
+        lease.handle_reject();
+        lease.handle_confirm(now, 0);
+        assert!(lease.obeys(CLIENT));
     }
 
     #[test]
