@@ -2,7 +2,11 @@
 //! octets, which are kept beside this file, and recorded traffic.
 
 #![cfg(all(feature = "ra33", feature = "view"))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test fails by panicking"
+)]
 
 mod captures;
 mod encoders;
