@@ -178,7 +178,7 @@ fn close(before: &Value, after: &Value, field: &str) -> Result<(), TestCaseError
                 match after.iter().find(|(other, _)| other == name) {
                     Some((_, other)) => close(value, other, name)?,
                     None => {
-                        prop_assert!(LEFT_OUT_OF_SOME.contains(&name.as_ref()), "{name} is lost")
+                        prop_assert!(LEFT_OUT_OF_SOME.contains(&name.as_ref()), "{name} is lost");
                     }
                 }
             }

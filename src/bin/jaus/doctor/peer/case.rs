@@ -201,7 +201,7 @@ impl Case {
     }
 
     /// A short message that nobody acts on, and that whoever has the id acknowledges.
-    pub(super) fn to_be_acknowledged(&mut self, id: JausId) -> Frame {
+    pub(super) fn wanting_acknowledgement(&mut self, id: JausId) -> Frame {
         let mut frame = self.frame(id, PADDING.to_le_bytes().to_vec().into());
         frame.flags = frame.flags.with_acknowledgement(Acknowledgement::Request);
         frame
@@ -210,7 +210,7 @@ impl Case {
     /// The same to everybody, as Junior calls whose address it does not know: who has no Discovery
     /// acknowledges.
     pub(super) fn call_alone(&mut self) -> Option<Send> {
-        let mut frame = self.to_be_acknowledged(self.id?);
+        let mut frame = self.wanting_acknowledgement(self.id?);
         frame.flags = frame.flags.with_broadcast(Broadcast::Global);
         Some(Send::Group(frame))
     }

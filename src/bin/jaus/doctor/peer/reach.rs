@@ -191,7 +191,7 @@ fn any_sign(case: &mut Case, address: SocketAddr) -> Question {
         Some(id) => {
             // Who has no Discovery acknowledges, at least.
             let query = case.frame(id, octets(&query));
-            let padding = case.to_be_acknowledged(id);
+            let padding = case.wanting_acknowledgement(id);
             vec![Send::To(address, query), Send::To(address, padding)]
         }
         None => vec![case.ask_all_at(address, &query)],

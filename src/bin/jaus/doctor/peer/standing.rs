@@ -58,7 +58,7 @@ pub(super) fn acknowledgement(case: &mut Case) -> Begin {
     let (Some(id), Some(address)) = (case.id, case.address) else {
         return Begin::Over(Verdict::skipped("no id is known there"));
     };
-    let frame = case.to_be_acknowledged(id);
+    let frame = case.wanting_acknowledgement(id);
     Begin::Ask(Question::new(Send::To(address, frame)))
 }
 
