@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::scenario::Scenario;
+use crate::suite::scenario::Scenario;
 
 /// What became of a scenario.
 #[derive(Debug, Clone, PartialEq, Eq)]

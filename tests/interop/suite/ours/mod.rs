@@ -12,7 +12,7 @@ use jaus::address::JausId;
 use jaus::component::{Component, Kind};
 use jaus::node::{Config, Node};
 
-use crate::scripted;
+use crate::suite::scripted;
 
 /// Says what went wrong, in a line.
 pub(crate) type Outcome = Result<(), String>;

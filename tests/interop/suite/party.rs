@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use jaus::address::JausId;
 
-use crate::hosts::{Host, Hosts, INTERFACE};
-use crate::process::Process;
-use crate::settings::{Party, Side, Start, with_environment};
+use crate::suite::hosts::{Host, Hosts, INTERFACE};
+use crate::suite::process::Process;
+use crate::suite::settings::{Party, Side, Start, with_environment};
 
 /// How long anything that is waited for may take. Reached only when something fails.
 pub(crate) fn patience() -> Duration {
-    Duration::from_secs(crate::number("JAUS_INTEROP_PATIENCE", 40))
+    Duration::from_secs(crate::suite::number("JAUS_INTEROP_PATIENCE", 40))
 }
 
 /// A party that is on the network.
@@ -139,7 +139,7 @@ impl<'a> Place<'a> {
         let places = [
             ("{jaus}", env!("CARGO_BIN_EXE_jaus").to_owned()),
             ("{self}", own.display().to_string()),
-            ("{peers}", crate::settings::PEERS.to_owned()),
+            ("{peers}", crate::suite::settings::PEERS.to_owned()),
             ("{logs}", self.logs.display().to_string()),
             ("{id}", self.party.id.to_string()),
             ("{id:x}", hexadecimal(self.party.id)),

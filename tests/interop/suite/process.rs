@@ -172,15 +172,19 @@ fn listen(from: impl Read + Send + 'static, to: Sender<String>, log: Arc<Mutex<F
     });
 }
 
-/// A command as people would call it: without the place of its program.
+/// A command as people would call it: in one line, and without the place of its program.
 fn short(command: &[String]) -> String {
     let Some((program, arguments)) = command.split_first() else {
         return String::new();
     };
-    let program = Path::new(program).file_name().unwrap_or(program.as_ref());
-    let words = std::iter::once(program.to_string_lossy());
-    let words = words.chain(arguments.iter().map(|word| word.as_str().into()));
-    words.collect::<Vec<_>>().join(" ")
+    let program = Path::new(program);
+    let is_ours = std::env::current_exe().is_ok_and(|own| own == program);
+    let program = match program.file_name() {
+        Some(name) if !is_ours => name.to_string_lossy().into_owned(),
+        _ => "interop".to_owned(),
+    };
+    let words = std::iter::once(program).chain(arguments.iter().cloned());
+    words.collect::<Vec<_>>().join(" ").replace('\n', "; ")
 }
 
 fn in_words(status: ExitStatus) -> String {

@@ -1,6 +1,6 @@
 //! What is tried with every peer, in the order in which it is tried.
 
-use crate::settings::Side;
+use crate::suite::settings::Side;
 
 /// One row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -13,7 +13,7 @@ mod vehicle;
 use std::net::Ipv4Addr;
 use std::time::Instant;
 
-use crate::ours::{Outcome, Told};
+use crate::suite::ours::{Outcome, Told};
 use asking::Asker;
 use habits::Habits;
 use speaker::Speaker;

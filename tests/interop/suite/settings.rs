@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use jaus::address::JausId;
 use serde::Deserialize;
 
-use crate::scenario::Scenario;
+use crate::suite::scenario::Scenario;
 
 /// Who has no file of this name here is looked for as a path.
 pub(crate) const PEERS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/interop/peers");

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::hosts::{Host, Hosts};
-use crate::party::{Place, Values, patience};
-use crate::process::Process;
-use crate::scenario::{KEEP, LOAD, Scenario};
-use crate::settings::{Party, Side};
-use crate::verdict::{Cell, Column, Verdict};
+use crate::suite::hosts::{Host, Hosts};
+use crate::suite::party::{Place, Values, patience};
+use crate::suite::process::Process;
+use crate::suite::scenario::{KEEP, LOAD, Scenario};
+use crate::suite::settings::{Party, Side};
+use crate::suite::verdict::{Cell, Column, Verdict};
 
 /// What who keeps asking prints for each answer.
 const ANSWERED: &str = "report";
@@ -25,6 +25,8 @@ struct Encounter<'a> {
     answerer: Place<'a>,
     hosts: &'a Hosts,
     directory: &'a Path,
+    /// What has gone wrong already.
+    failed: Vec<Scenario>,
 }
 
 /// Tries all of these scenarios. What is left of the run is in the directory.
@@ -46,6 +48,7 @@ pub(crate) fn run(
         answerer: Place::new(answerer, actor, Host::Answerer, &hosts, directory),
         hosts: &hosts,
         directory,
+        failed: Vec::new(),
     };
     let cells = scenarios.iter().map(|&scenario| encounter.cell(scenario));
     Ok(Column {
@@ -75,6 +78,7 @@ impl Encounter<'_> {
                         Verdict::Passed
                     }
                     Err(reason) => {
+                        self.failed.push(scenario);
                         recording = file.exists().then_some(file);
                         Verdict::Failed(self.answerer.trouble().unwrap_or(reason))
                     }
@@ -210,21 +214,27 @@ impl Encounter<'_> {
     fn pull_cable(&self, act: &str) -> Result<(), String> {
         let mut keep = self.keep(act)?;
         self.hosts.cable(false)?;
-        std::thread::sleep(Duration::from_secs(crate::number("JAUS_INTEROP_CABLE", 10)));
+        std::thread::sleep(Duration::from_secs(crate::suite::number(
+            "JAUS_INTEROP_CABLE",
+            10,
+        )));
         self.hosts.cable(true)?;
         keep.forget();
         goes_on(&mut keep)
     }
 
-    /// One does not stop asking, while another does everything else in turn.
+    /// One does not stop asking, while another does in turn everything that has not failed alone.
     fn mix(&self, side: Side, act: &str) -> Result<(), String> {
-        let end = Instant::now() + Duration::from_secs(crate::number("JAUS_INTEROP_MIXED", 10));
+        let end =
+            Instant::now() + Duration::from_secs(crate::suite::number("JAUS_INTEROP_MIXED", 10));
         let (actor, answerer) = (self.actor.party, self.answerer.party);
         let can = |scenario: &Scenario| {
             let excuse = actor.excuse_of_actor(*scenario);
             let excuse = excuse.or(answerer.excuse_of_answerer(*scenario));
             let act = scenario.act().filter(|act| actor.act.contains_key(*act));
-            scenario.side() == Some(side) && excuse.is_none() && act.is_some()
+            let is_small = scenario.octets() <= Scenario::Mixed.octets();
+            let is_hopeful = is_small && !self.failed.contains(scenario);
+            is_hopeful && scenario.side() == Some(side) && excuse.is_none() && act.is_some()
         };
         let others: Vec<Scenario> = Scenario::all().into_iter().filter(can).collect();
         let mut keep = self.keep(act)?;

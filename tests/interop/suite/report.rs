@@ -5,8 +5,8 @@ use std::path::Path;
 
 use jaus::cli::junit::{self, Case, CaseResult, Suite};
 
-use crate::scenario::Scenario;
-use crate::verdict::{Cell, Column, Verdict};
+use crate::suite::scenario::Scenario;
+use crate::suite::verdict::{Cell, Column, Verdict};
 
 /// A party and the version that it says it has.
 pub(crate) type Version = (String, String);

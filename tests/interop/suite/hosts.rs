@@ -4,7 +4,7 @@
 use std::process::Command;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use crate::networks::ip;
+use crate::suite::networks::ip;
 
 /// The name of the cable on either host.
 pub(crate) const INTERFACE: &str = "jaus0";
