@@ -4,7 +4,8 @@ use bytes::{BufMut, Bytes, BytesMut};
 
 use super::carry::Counterpart;
 use super::{Context, Refusal};
-use crate::codec::{DecodeError, DecodeErrorKind, Message};
+use crate::codec::{DecodeError, Message};
+use crate::messages::ra::forgiving;
 use crate::ra::ids::RaComponent;
 
 /// Octets of the message code in front of what a message says.
@@ -52,7 +53,9 @@ impl Pair {
             jaus: Jaus::CODE,
             jaus_name: Jaus::NAME,
             when: When::Always,
-            to_jaus: |payload, context| convert::<Ra, Jaus>(forgiving(payload)?, context),
+            to_jaus: |payload, context| {
+                convert::<Ra, Jaus>(forgiving(payload, Ra::decode)?, context)
+            },
             to_ra: |payload, context| convert::<Jaus, Ra>(Jaus::decode(payload)?, context),
         }
     }
@@ -65,7 +68,9 @@ impl Pair {
             jaus: Jaus::CODE,
             jaus_name: Jaus::NAME,
             when: When::Always,
-            to_jaus: |payload, _| read_by_both(forgiving::<Ra>(payload)?.encode()?, Jaus::decode),
+            to_jaus: |payload, _| {
+                read_by_both(forgiving(payload, Ra::decode)?.encode()?, Jaus::decode)
+            },
             to_ra: |payload, _| read_by_both(Jaus::decode(payload)?.encode()?, Ra::decode),
         }
     }
@@ -120,24 +125,4 @@ fn read_by_both<M>(
 ) -> Result<Bytes, Refusal> {
     decode(&payload)?;
     Ok(payload)
-}
-
-/// Reads a message and forgives a presence vector with bits that no field owns: peers set them all
-/// (OpenJAUS does by default) and write nothing for them.
-fn forgiving<M: Message>(payload: &Bytes) -> Result<M, Refusal> {
-    let error = match M::decode(payload) {
-        Ok(message) => return Ok(message),
-        Err(error) => error,
-    };
-    let DecodeErrorKind::Presence { found, defined } = error.kind() else {
-        return Err(error.into());
-    };
-    let width = found.to_le_bytes().len() - found.leading_zeros() as usize / 8;
-    let mut forgiven = BytesMut::from(payload.as_ref());
-    let vector = forgiven.get_mut(error.offset()..error.offset() + width);
-    let Some(vector) = vector else {
-        return Err(error.into());
-    };
-    vector.copy_from_slice(&(found & defined).to_le_bytes()[..width]);
-    Ok(M::decode(&forgiven.freeze())?)
 }

@@ -425,7 +425,7 @@ impl Scripted for Vehicle {
                 air.say(Door::Group, twin, &frame);
             }
         }
-        let due = self.ticks % 2 == 0 && self.fires;
+        let due = self.ticks.is_multiple_of(2) && self.fires;
         let events: Vec<_> = self.events.clone().into_iter().filter(|_| due).collect();
         for (event_id, it) in events {
             let periodic = it.kind == create_event::EventType::PERIODIC_SC;
@@ -491,7 +491,7 @@ impl Scripted for Ra {
 
     fn beat(&mut self, air: &mut Air) {
         self.ticks += 1;
-        if self.ticks % 10 == 0 {
+        if self.ticks.is_multiple_of(10) {
             let pulse = Bytes::from_static(&[0x02, 0x42]);
             Self::say([1, 35, 1, 10], [1, 1, 255, 255], pulse, Door::RaGroup, air);
         }
