@@ -123,6 +123,7 @@ impl Rover {
         }
         if let Some((before, rank)) = self.controller
             && authority > rank
+            && before.subsystem != SUBSYSTEM
         {
             self.said
                 .push(Message::new(DRIVER, before, 0x0010, Bytes::new()));

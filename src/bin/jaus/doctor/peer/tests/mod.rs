@@ -126,9 +126,7 @@ fn a_peer_of_the_reference_architecture_is_named_and_sent_to_the_gateway() {
     assert_eq!(outcome, Outcome::Broken);
     let mut elsewhere = settings("10.0.0.2");
     elsewhere.port = 40_000;
-    let mut astray = Ra::default();
-    astray.goes_astray = true;
-    let (text, _) = words(elsewhere, &mut astray);
+    let (text, _) = words(elsewhere, &mut Ra::astray());
     assert!(
         text.contains("it answers to our port 3794, which is taken"),
         "{text}"

@@ -460,11 +460,19 @@ impl Scripted for Silent {
 #[derive(Default)]
 pub(super) struct Ra {
     /// Its answers go to a port that somebody else has.
-    pub(super) goes_astray: bool,
+    goes_astray: bool,
     ticks: u64,
 }
 
 impl Ra {
+    /// One whose answers do not reach us.
+    pub(super) fn astray() -> Self {
+        Self {
+            goes_astray: true,
+            ..Self::default()
+        }
+    }
+
     fn say(source: [u8; 4], to: [u8; 4], payload: Bytes, door: Door, air: &mut Air) {
         let frame = Frame {
             version: Version::Ra,
