@@ -41,7 +41,7 @@ const EVENTS: [Row; 8] = [
         7,
         JUDGE,
         "f00103001e000400000002440000",
-        &[(JUDGE, "f401010305")],
+        &[(JUDGE, NOBODY_ANSWERS)],
     ),
     (
         8,
@@ -93,6 +93,14 @@ const CONTROL: [Row; 31] = [
     (26, D, "07000100", &[]),
     (26, A, "0220", &[(A, STANDBY)]),
 ];
+
+/// The code 5, and 80 octets that say "nobody here answers this query".
+const NOBODY_ANSWERS: &str = concat!(
+    "f401030305",
+    "6e6f626f6479206865726520616e73776572732074686973207175657279",
+    "00000000000000000000000000000000000000000000000000",
+    "00000000000000000000000000000000000000000000000000"
+);
 
 fn octets(hex: &str) -> Bytes {
     let digits: Vec<_> = hex

@@ -270,24 +270,28 @@ impl Endpoint {
     pub(super) fn next_delivery(&mut self, priority: Priority) -> Option<Transmit> {
         let now = self.latest?;
         while let Some(destination) = self.deliveries.next_ready(priority) {
-            let transmit = self.next_packet(now, destination, priority);
-            // What waits for numbers to be free has its next turn when something is acknowledged
-            // or given up.
+            let Some(transmit) = self.next_packet(now, destination, priority) else {
+                // What waits for numbers to be free has its next turn when something is
+                // acknowledged or given up.
+                continue;
+            };
+            self.deliveries.take_turn(destination);
+            self.deliveries.touch(destination);
             if transmit.is_some() {
-                self.deliveries.take_turn(destination);
-                self.deliveries.touch(destination);
                 return transmit;
             }
         }
         None
     }
 
+    /// Takes the next packet to a destination, if there is one; and what to transmit for it, if
+    /// some way leads there. If none does, it counts as lost on the way.
     fn next_packet(
         &mut self,
         now: Instant,
         destination: JausId,
         priority: Priority,
-    ) -> Option<Transmit> {
+    ) -> Option<Option<Transmit>> {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
         let cutting = self.cutting(destination, version);
@@ -310,10 +314,10 @@ impl Endpoint {
                 .map_err(SendError::Header),
             _ => self.transmit_to_all(now, &frame),
         };
-        sent.unwrap_or_else(|error| {
+        Some(sent.unwrap_or_else(|error| {
             debug!(%destination, %error, "cannot be sent");
             None
-        })
+        }))
     }
 
     /// Sends a packet by all ways that there are to its destination; gives back the first.

@@ -266,3 +266,20 @@ fn a_component_that_leaves_waits_for_nothing() {
     rig.endpoint.detach(US);
     assert_eq!(rig.endpoint.poll_timeout(), None);
 }
+
+#[test]
+fn what_no_link_takes_counts_as_lost_and_is_tried_again_in_time() {
+    let mut rig = Rig::new();
+    rig.send(Outgoing::new(US, PEER, vec![0; 3000].into()))
+        .unwrap();
+    rig.endpoint.remove_link(WIRE);
+    assert!(rig.transmits().is_empty(), "there is no way");
+    for _ in 0..200 {
+        rig.pass(Duration::from_millis(100));
+        assert!(rig.transmits().is_empty());
+        let timeout = rig.endpoint.poll_timeout();
+        assert!(timeout.is_none_or(|it| it > rig.now), "what is due is done");
+    }
+    assert_eq!(rig.count(Counter::MessagesGivenUp), 1);
+    assert_eq!(rig.endpoint.poll_timeout(), None);
+}
