@@ -155,7 +155,7 @@ fn newcomers_are_found_at_once_while_many_others_have_fallen_silent() {
     let fleet: Vec<_> = (1..=40)
         .map(|number| world.start(plain(JausId::new(200 + number, 1, 1), "rover")))
         .collect();
-    world.run(seconds(120));
+    world.run(seconds(300));
     assert_eq!(world.stack(watcher).directory().len(), 41, "and itself");
     for dead in fleet {
         world.kill(dead);
