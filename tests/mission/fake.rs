@@ -1,10 +1,12 @@
 //! A vehicle that is put together for tests.
 
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Handlers, Kind, Management, Subscription, When};
+use jaus::link::Group;
 use jaus::messages::ground::report_mission::Stage as MissionStage;
 use jaus::messages::ground::report_raster_maps::MapRec;
 use jaus::messages::ground::report_stage::State;
@@ -81,8 +83,9 @@ pub(crate) struct World {
 impl World {
     /// Everything runs, and the operator has the planner under control.
     pub(crate) async fn new(subsystem: u16) -> Self {
-        let node = Node::start(Config::loopback(subsystem, 1)).unwrap();
-        let desk = Node::start(Config::loopback(subsystem + 1, 1)).unwrap();
+        let group = own_group();
+        let start = |subsystem| Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
+        let (node, desk) = (start(subsystem), start(subsystem + 1));
         let vehicle = vehicle();
         let path = Switch::default();
         let path = Driver {
@@ -234,7 +237,14 @@ impl World {
     }
 }
 
-/// The planner of a subsystem; the tests of this file share the loopback.
+/// A group that no other test has: discovery asks strangers, too, and not without end at once.
+fn own_group() -> Group {
+    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
+    let port = socket.local_addr().unwrap().port();
+    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
+}
+
+/// The planner of a subsystem.
 async fn planner_of(operator: &Component, subsystem: u16) -> JausId {
     let mut changes = operator.watch();
     loop {

@@ -2,9 +2,10 @@
 //! The store and the stages are small fakes here, so that each thing that can go wrong can be made
 //! to go wrong; the vehicle drives in a simulation.
 #![cfg(feature = "parts")]
-#![expect(
+#![allow(
     clippy::disallowed_methods,
-    reason = "tests of running nodes wait in real time"
+    clippy::disallowed_types,
+    reason = "tests of running nodes wait in real time, and choose a port of their own"
 )]
 #![expect(
     clippy::unwrap_used,

@@ -63,7 +63,7 @@ impl Search {
     /// … again after this time, then after twice as long, and so on.
     const RETRY: Duration = Duration::from_secs(1);
     /// All questions together: a burst of this many, for a network that is found at once …
-    const BURST: u32 = 64;
+    const BURST: u32 = 96;
     /// … and then one in this time.
     const REFILL: Duration = Duration::from_secs(1);
     /// So many of the burst are kept for questions that were never asked: those about newcomers,
