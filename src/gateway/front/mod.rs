@@ -11,20 +11,24 @@
 //!
 //! The same stack is the RA component's voice among JAUS components: see [`Voice`].
 
+mod codes;
 mod lease;
 mod mirror;
 mod streams;
 mod voice;
+mod waiting;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use self::codes::{answer_to_command, crosses, is_management, needs_control};
 use self::lease::Lease;
 use self::mirror::{Mirror, Mirrored};
 use self::streams::Streams;
 pub(super) use self::voice::{Target, Voice};
+use self::waiting::{Held, Relayed};
 use super::convert::{self, Ids, Words};
 use super::counters::{Counter, Tally};
 use super::roles::Role;
@@ -82,23 +86,6 @@ pub(super) struct Plan {
     pub(super) ids: Ids,
     pub(super) patience: Duration,
     pub(super) authority: u8,
-}
-
-/// A client's message that waits for a report.
-struct Held {
-    message: Received,
-    report: u16,
-    /// The rate of the service connection that it needs, if it needs one.
-    hz: Option<f64>,
-    until: Instant,
-    next: Instant,
-}
-
-/// A client that waits for the answer to a query which was passed on.
-struct Relayed {
-    client: JausId,
-    report: u16,
-    until: Instant,
 }
 
 impl Front {
@@ -245,80 +232,6 @@ impl Front {
         if let Some(report) = answer_to_command(code) {
             self.expect(now, client, report);
         }
-    }
-
-    fn relay(
-        &mut self,
-        now: Instant,
-        client: JausId,
-        report: u16,
-        query: (u16, Bytes),
-        tally: &mut Tally,
-    ) {
-        if self.relayed.len() >= Self::MOST_WAITING {
-            return tally.refuse(now, Counter::TooManyWaiting, query.0, client);
-        }
-        tally.add(Counter::QueriesToRa);
-        self.to_ra.push(query);
-        self.expect(now, client, report);
-    }
-
-    fn expect(&mut self, now: Instant, client: JausId, report: u16) {
-        if self.relayed.len() < Self::MOST_WAITING {
-            self.relayed.push_back(Relayed {
-                client,
-                report,
-                until: now + self.patience,
-            });
-        }
-    }
-
-    /// Keeps a client's message until the report has come that it needs.
-    fn hold(
-        &mut self,
-        now: Instant,
-        message: &Received,
-        report: u16,
-        hz: Option<f64>,
-        tally: &mut Tally,
-    ) {
-        let until = now + self.patience;
-        let same = |it: &&mut Held| {
-            it.message.source == message.source && it.message.payload == message.payload
-        };
-        if let Some(held) = self.held.iter_mut().find(same) {
-            held.until = until;
-            return tally.add(Counter::Repeated);
-        }
-        if self.held.len() >= Self::MOST_WAITING {
-            let code = code_of(&message.payload).unwrap_or_default();
-            return tally.refuse(now, Counter::TooManyWaiting, code, message.source);
-        }
-        let asked = self.held.iter().any(|it| it.report == report);
-        if !asked {
-            tally.add(Counter::QueriesToRa);
-            self.ask(report);
-        }
-        self.held.push(Held {
-            message: message.clone(),
-            report,
-            hz,
-            until,
-            next: now + Self::ASK_AGAIN,
-        });
-    }
-
-    /// Asks the RA component for the whole of a state.
-    fn ask(&mut self, report: u16) {
-        if let Some(state) = pairs::state(report) {
-            self.to_ra.push((state.query(), state.query_for_all()));
-        }
-    }
-
-    fn is_fresh(&self, now: Instant, report: u16) -> bool {
-        let limit = self.streams.freshness(report).unwrap_or_default();
-        let age = self.mirror.age(now, report);
-        age.is_some_and(|age| age <= limit.max(Self::FRESH))
     }
 
     /// A message of the RA component has come: for us, or for the JAUS component that it sees under
@@ -491,34 +404,6 @@ impl Front {
         self.follow(now, tally);
     }
 
-    fn ask_again(&mut self, now: Instant, tally: &mut Tally) {
-        let mut reports = Vec::new();
-        let mut need_connection = false;
-        let ra = self.ra;
-        self.held.retain_mut(|it| {
-            if now >= it.until {
-                tally.refuse(now, Counter::Unanswered, it.report, ra);
-                return false;
-            }
-            if now >= it.next {
-                it.next = now + Self::ASK_AGAIN;
-                // Some components tell by service connections alone.
-                need_connection |= it.hz.is_none();
-                it.hz.get_or_insert(Self::CHANGES_HZ);
-                if !reports.contains(&it.report) {
-                    reports.push(it.report);
-                }
-            }
-            true
-        });
-        if need_connection {
-            self.review = Some(now);
-        }
-        for report in reports {
-            self.ask(report);
-        }
-    }
-
     /// Carries out what has been decided, and looks at what clients want.
     fn follow(&mut self, now: Instant, tally: &mut Tally) {
         let said = self.lease.take_said();
@@ -627,36 +512,6 @@ fn state_of(words: &Words, query: &Bytes) -> Option<u16> {
     let (code, _) = crosses(code).then(|| words.to_ra(query).ok())??;
     let report = pairs::report_of(code)?;
     pairs::state(report).map(|_| report)
-}
-
-/// Whether a message with this code is the RA component's business; all others are ours: transport,
-/// discovery, liveness, events, and who is in control.
-const fn crosses(code: u16) -> bool {
-    is_management(code)
-        || matches!(
-            code,
-            0x2002 | 0x0400..=0x04FF | 0x0A00..=0x0AFF | 0x2400..=0x24FF | 0x2A00..=0x2AFF
-        )
-}
-
-/// Shutdown, Standby, Resume, Reset, Set Emergency, Clear Emergency.
-const fn is_management(code: u16) -> bool {
-    matches!(code, 0x0002..=0x0007)
-}
-
-/// Whether a command is for the client in control alone. Anybody may stop a vehicle in an emergency,
-/// and knowledge stores are nobody's to drive.
-const fn needs_control(code: u16) -> bool {
-    !matches!(code, 0x0006 | 0x0007 | 0x0A00..=0x0AFF)
-}
-
-/// The report by which a command is answered, of those few that are.
-const fn answer_to_command(code: u16) -> Option<u16> {
-    match code {
-        0x0A20 => Some(0x4A20),
-        0x0A24 => Some(0x4A24),
-        _ => None,
-    }
 }
 
 /// Report Component Status of one that is ready, without further words.

@@ -1,0 +1,31 @@
+//! Which JAUS messages are an RA component's business, by their codes.
+
+/// Whether a message with this code is the RA component's business; all others are ours: transport,
+/// discovery, liveness, events, and who is in control.
+pub(super) const fn crosses(code: u16) -> bool {
+    is_management(code)
+        || matches!(
+            code,
+            0x2002 | 0x0400..=0x04FF | 0x0A00..=0x0AFF | 0x2400..=0x24FF | 0x2A00..=0x2AFF
+        )
+}
+
+/// Shutdown, Standby, Resume, Reset, Set Emergency, Clear Emergency.
+pub(super) const fn is_management(code: u16) -> bool {
+    matches!(code, 0x0002..=0x0007)
+}
+
+/// Whether a command is for the client in control alone. Anybody may stop a vehicle in an emergency,
+/// and knowledge stores are nobody's to drive.
+pub(super) const fn needs_control(code: u16) -> bool {
+    !matches!(code, 0x0006 | 0x0007 | 0x0A00..=0x0AFF)
+}
+
+/// The report by which a command is answered, of those few that are.
+pub(super) const fn answer_to_command(code: u16) -> Option<u16> {
+    match code {
+        0x0A20 => Some(0x4A20),
+        0x0A24 => Some(0x4A24),
+        _ => None,
+    }
+}
