@@ -9,10 +9,13 @@
     reason = "a test with sockets"
 )]
 
+#[path = "support/group.rs"]
+mod group;
+
 use std::future::Future;
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
+use group::own_group;
 use jaus::address::JausId;
 use jaus::component::{
     AttachError, Change, Component, FindError, Handlers, Kind, Level, Liveness, Patience,
@@ -27,13 +30,6 @@ use jaus::node::{Config, Node};
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);
-
-/// A group that belongs to one test, so that tests beside it are not heard.
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
-}
 
 fn start(subsystem: u16, group: Group) -> Node {
     Node::start(Config::loopback(subsystem, 1).group(group)).unwrap()

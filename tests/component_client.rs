@@ -10,10 +10,13 @@
     reason = "a test with sockets"
 )]
 
+#[path = "support/group.rs"]
+mod group;
+
 use std::future::Future;
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
+use group::own_group;
 use jaus::address::JausId;
 use jaus::codec::{Message, ServiceId};
 use jaus::component::{
@@ -21,7 +24,6 @@ use jaus::component::{
     Management, Outage, Patience, SubscribeError, Subscription, SubscriptionEnd, Update, When,
 };
 use jaus::endpoint::{Outgoing, Received};
-use jaus::link::Group;
 use jaus::messages::core::{
     CancelEvent, ConfirmControl, ConfirmEventRequest, CreateEvent, Event, QueryStatus,
     RejectControl, RejectEventRequest, ReleaseControl, ReportStatus, RequestControl, Resume,
@@ -31,12 +33,6 @@ use jaus::node::{Config, Node, Port};
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);
-
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
-}
 
 async fn within_limit<T>(future: impl Future<Output = T>) -> T {
     tokio::time::timeout(LIMIT, future)

@@ -10,15 +10,18 @@
     reason = "a test with sockets"
 )]
 
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
+#[path = "support/group.rs"]
+mod group;
+
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use group::own_group;
 use jaus::address::JausId;
 use jaus::endpoint::{Counter, Outgoing};
-use jaus::link::Group;
 use jaus::node::{Config, Node, Port};
 use jaus::wire::{Frame, judp};
 
@@ -33,12 +36,6 @@ const LOST: Duration = Duration::from_millis(500);
 
 /// The bound for the median, which is some 0.3 ms also without optimisation.
 const BOUND: Duration = Duration::from_millis(10);
-
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
-}
 
 /// Sends the flood, and says when it is over.
 fn flood(victim: SocketAddr, receiver: JausId, over: &AtomicBool) {

@@ -10,24 +10,20 @@
     reason = "a test with sockets"
 )]
 
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
+#[path = "support/group.rs"]
+mod group;
+
+use std::net::SocketAddr;
 use std::time::Duration;
 
 use bytes::Bytes;
+use group::own_group;
 use jaus::address::JausId;
 use jaus::endpoint::{Counter, Outgoing, Received};
-use jaus::link::Group;
 use jaus::node::{Config, Node, Port};
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);
-
-/// A group that belongs to one test, so that tests beside it are not heard.
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
-}
 
 /// A router with UDP and TCP, a component of its own, one beyond UDP and one beyond TCP.
 fn network(forward: bool) -> (Vec<Node>, [Port; 3]) {

@@ -10,6 +10,8 @@
     reason = "a test with sockets"
 )]
 
+#[path = "support/group.rs"]
+mod group;
 #[path = "ocu/scene.rs"]
 mod scene;
 

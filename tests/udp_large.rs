@@ -10,13 +10,15 @@
     reason = "a test with sockets"
 )]
 
+#[path = "support/group.rs"]
+mod group;
+
 use std::collections::BTreeSet;
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
 use bytes::Bytes;
+use group::own_group;
 use jaus::endpoint::{Counter, Event, Outgoing};
-use jaus::link::Group;
 use jaus::node::{Config, Node, Port};
 
 /// Longer than anything takes; reached only when a test fails.
@@ -24,13 +26,6 @@ const LIMIT: Duration = Duration::from_secs(20);
 /// Asked for, this gives the receive buffer of 212992 octets that sockets have on Linux unless
 /// they ask for another: the kernel doubles it.
 const USUAL_BUFFER: usize = 212_992 / 2;
-
-/// A group that belongs to one test, so that tests beside it are not heard.
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
-}
 
 /// Two nodes with a component each, which know each other's address.
 async fn pair(receive_buffer: Option<usize>) -> ([Node; 2], [Port; 2]) {

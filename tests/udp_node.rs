@@ -10,10 +10,13 @@
     reason = "a test with sockets"
 )]
 
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+#[path = "support/group.rs"]
+mod group;
+
 use std::time::Duration;
 
 use bytes::Bytes;
+use group::own_group;
 use jaus::address::JausId;
 use jaus::endpoint::{Event, Outgoing, Received, Unacknowledged};
 use jaus::link::Group;
@@ -25,13 +28,6 @@ const LIMIT: Duration = Duration::from_secs(20);
 
 const QUERY_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x22]);
 const REPORT_HEARTBEAT: Bytes = Bytes::from_static(&[0x02, 0x42]);
-
-/// A group that belongs to one test, so that tests beside it are not heard.
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
-}
 
 fn start(subsystem: u16, node: u8, group: Group) -> Node {
     Node::start(Config::loopback(subsystem, node).group(group)).unwrap()

@@ -8,10 +8,13 @@
     reason = "a test with sockets"
 )]
 
+#[path = "support/group.rs"]
+mod group;
+
 use std::future::Future;
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::time::Duration;
 
+use group::own_group;
 use jaus::codec::{Message, ServiceId};
 use jaus::component::{Component, FindError, Handlers, Kind};
 use jaus::link::Group;
@@ -29,12 +32,6 @@ type Heard = (&'static str, Option<f64>, Option<f64>);
 async fn within_limit<T>(future: impl Future<Output = T>) -> T {
     let limit = Duration::from_secs(20);
     tokio::time::timeout(limit, future).await.unwrap()
-}
-
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
 }
 
 fn start(group: Group, subsystem: u16) -> Node {

@@ -12,7 +12,10 @@
 
 mod cli_support;
 
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
+#[path = "support/group.rs"]
+mod group;
+
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -20,6 +23,7 @@ use std::time::Duration;
 use bytes::Bytes;
 use cli_support::run;
 use futures_util::{SinkExt, StreamExt};
+use group::own_group;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind};
 use jaus::endpoint::Outgoing;
@@ -40,13 +44,6 @@ const LIMIT: Duration = Duration::from_secs(30);
 /// Query Heartbeat Pulse, and the report.
 const QUERY: &[u8] = &[0x02, 0x22];
 const REPORT: &[u8] = &[0x02, 0x42];
-
-/// A group that belongs to one test, so that tests beside it are not heard.
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
-}
 
 /// A node of the vehicle that joins UDP and TCP, an operator beyond UDP, and a board beyond TCP.
 fn two_networks() -> (Node, Port, Port) {

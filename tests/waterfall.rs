@@ -11,11 +11,14 @@
     reason = "a test with sockets"
 )]
 
+#[path = "support/group.rs"]
+mod group;
+
 use std::future::Future;
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use group::own_group;
 use jaus::address::JausId;
 use jaus::codec::{FormattedBlob, Message};
 use jaus::component::{Component, Control, Kind};
@@ -40,12 +43,6 @@ const VECTOR: JausId = JausId::new(101, 44, 44);
 const PATH: JausId = JausId::new(101, 48, 48);
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(60);
-
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
-}
 
 /// A vehicle of five parts, each on a node of its own, and a client.
 struct Scene {

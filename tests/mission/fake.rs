@@ -1,12 +1,11 @@
 //! A vehicle that is put together for tests.
 
-use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::group::own_group;
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Handlers, Kind, Management, Subscription, When};
-use jaus::link::Group;
 use jaus::messages::ground::report_mission::Stage as MissionStage;
 use jaus::messages::ground::report_raster_maps::MapRec;
 use jaus::messages::ground::report_stage::State;
@@ -235,13 +234,6 @@ impl World {
             node.shutdown().await;
         }
     }
-}
-
-/// A group that no other test has: discovery asks strangers, too, and not without end at once.
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
 }
 
 /// The planner of a subsystem.

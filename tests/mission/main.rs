@@ -15,5 +15,7 @@
 )]
 
 mod fake;
+#[path = "../support/group.rs"]
+mod group;
 mod missions;
 mod whole;

@@ -1,9 +1,10 @@
 //! A vehicle, the operator's station, and pages.
 
 use std::future::Future;
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddr};
 use std::time::{Duration, Instant};
 
+use crate::group::own_group;
 use futures_util::{SinkExt, StreamExt};
 use jaus::component::{AccessControl, Component, Kind, Management};
 use jaus::link::Group;
@@ -26,12 +27,6 @@ pub(crate) async fn within_limit<T>(future: impl Future<Output = T>) -> T {
     tokio::time::timeout(LIMIT, future)
         .await
         .expect("it takes too long")
-}
-
-fn own_group() -> Group {
-    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-    let port = socket.local_addr().unwrap().port();
-    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
 }
 
 /// A vehicle that is one component, and a station that looks at it.
