@@ -1,7 +1,8 @@
 //! Acceleration State Sensor: how the vehicle's velocity changes, along and about its own axes.
 
+use super::behaviour::Behaviour;
+use super::cockpit::Cockpit;
 use super::exchange::Exchange;
-use super::vehicle::{Behaviour, Cockpit};
 use super::wanted::Wanted;
 use crate::codec::{Message, ServiceId};
 use crate::messages::mobility::report_acceleration_state as fields;

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::clock;
-use super::vehicle::Cockpit;
+use super::cockpit::Cockpit;
 use crate::codec::{Message, OutOfRange};
 use crate::endpoint::Received;
 use crate::messages::mobility::report_local_pose::TimeStamp;

@@ -1,8 +1,9 @@
 //! Global Pose Sensor: where the vehicle is on the globe, and where magnetic north is there.
 
+use super::behaviour::Behaviour;
 use super::both_versions;
+use super::cockpit::Cockpit;
 use super::exchange::Exchange;
-use super::vehicle::{Behaviour, Cockpit};
 use super::wanted::Wanted;
 use crate::codec::{Message, ServiceId};
 use crate::messages::mobility::report_global_pose as fields;

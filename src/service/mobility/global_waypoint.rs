@@ -1,17 +1,13 @@
 //! A waypoint on the globe, whatever message it came in.
 
-use super::exchange::Exchange;
-use super::place::{Kind, Place};
 use super::wanted::Wanted;
-use crate::codec::{Message, OutOfRange, ServiceId};
+use crate::codec::OutOfRange;
 use crate::messages::mobility::report_global_waypoint as fields;
 use crate::messages::mobility::report_global_waypoint_ext as ext;
 use crate::messages::mobility::set_global_waypoint_ext::{ZPosition, ZPositionAltitudeMsl};
 use crate::messages::mobility::{
-    QueryGlobalWaypoint, QueryGlobalWaypointExt, ReportGlobalWaypoint, ReportGlobalWaypointExt,
-    SetGlobalWaypoint, SetGlobalWaypointExt, global_waypoint_driver, global_waypoint_list_driver,
+    ReportGlobalWaypoint, ReportGlobalWaypointExt, SetGlobalWaypoint, SetGlobalWaypointExt,
 };
-use crate::service::Handled;
 use crate::vehicle::{Frame, GlobalPose, Waypoint};
 
 /// A waypoint on the globe: degrees, metres and radians.
@@ -27,9 +23,9 @@ pub(super) struct GlobalWaypoint {
     path_tolerance: Option<f64>,
 }
 
-impl From<SetGlobalWaypoint> for Place {
+impl From<SetGlobalWaypoint> for GlobalWaypoint {
     fn from(message: SetGlobalWaypoint) -> Self {
-        Self::Global(GlobalWaypoint {
+        Self {
             latitude: message.latitude_deg(),
             longitude: message.longitude_deg(),
             altitude: message.altitude_m(),
@@ -38,18 +34,18 @@ impl From<SetGlobalWaypoint> for Place {
             yaw: message.yaw_rad(),
             waypoint_tolerance: message.waypoint_tolerance_m(),
             path_tolerance: message.path_tolerance_m(),
-        })
+        }
     }
 }
 
-impl From<SetGlobalWaypointExt> for Place {
+impl From<SetGlobalWaypointExt> for GlobalWaypoint {
     fn from(message: SetGlobalWaypointExt) -> Self {
         let altitude = match message.z_position {
             Some(ZPosition::AltitudeMsl(altitude)) => Some(altitude.value()),
             // A ground vehicle has no choice of heights.
             _ => None,
         };
-        Self::Global(GlobalWaypoint {
+        Self {
             latitude: message.latitude_deg(),
             longitude: message.longitude_deg(),
             altitude,
@@ -58,7 +54,7 @@ impl From<SetGlobalWaypointExt> for Place {
             yaw: message.heading_rad(),
             waypoint_tolerance: message.waypoint_tolerance_m(),
             path_tolerance: message.path_tolerance_m(),
-        })
+        }
     }
 }
 
@@ -79,7 +75,8 @@ impl GlobalWaypoint {
         }
     }
 
-    fn report(&self, wanted: Wanted) -> Result<ReportGlobalWaypoint, OutOfRange> {
+    /// The report of version 1.0.
+    pub(super) fn report(&self, wanted: Wanted) -> Result<ReportGlobalWaypoint, OutOfRange> {
         let tolerance = fields::WaypointTolerance::new;
         Ok(ReportGlobalWaypoint {
             latitude: fields::Latitude::new(self.latitude)?,
@@ -93,7 +90,8 @@ impl GlobalWaypoint {
         })
     }
 
-    fn report_ext(&self, wanted: Wanted) -> Result<ReportGlobalWaypointExt, OutOfRange> {
+    /// The report of version 1.1.
+    pub(super) fn report_ext(&self, wanted: Wanted) -> Result<ReportGlobalWaypointExt, OutOfRange> {
         let tolerance = ext::WaypointTolerance::new;
         let altitude = wanted.optional(0, self.altitude, ZPositionAltitudeMsl::new);
         Ok(ReportGlobalWaypointExt {
@@ -106,35 +104,5 @@ impl GlobalWaypoint {
             waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
             path_tolerance: wanted.optional(5, self.path_tolerance, ext::PathTolerance::new),
         })
-    }
-}
-
-/// Waypoints on the globe.
-pub(super) struct Global;
-
-impl Kind for Global {
-    const DRIVER: ServiceId = global_waypoint_driver::V1_1;
-    const LIST_DRIVER: ServiceId = global_waypoint_list_driver::V1_1;
-    type Set = SetGlobalWaypoint;
-    type SetExt = SetGlobalWaypointExt;
-
-    fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
-        let Some(Place::Global(waypoint)) = exchange.cockpit.place() else {
-            return Handled::No;
-        };
-        match code {
-            QueryGlobalWaypoint::CODE => {
-                if let Some(query) = exchange.query::<QueryGlobalWaypoint>() {
-                    exchange.reply_if(waypoint.report(Wanted(query.presence_vector.into())));
-                }
-            }
-            QueryGlobalWaypointExt::CODE => {
-                if let Some(query) = exchange.query::<QueryGlobalWaypointExt>() {
-                    exchange.reply_if(waypoint.report_ext(Wanted(query.presence_vector.into())));
-                }
-            }
-            _ => return Handled::No,
-        }
-        Handled::Yes
     }
 }

@@ -1,8 +1,9 @@
 //! Local Pose Sensor: where the vehicle is in its local frame, and where that frame is.
 
+use super::behaviour::Behaviour;
 use super::both_versions;
+use super::cockpit::Cockpit;
 use super::exchange::Exchange;
-use super::vehicle::{Behaviour, Cockpit};
 use super::wanted::Wanted;
 use crate::codec::{Message, ServiceId};
 use crate::messages::mobility::report_local_pose as fields;

@@ -1,17 +1,13 @@
 //! A waypoint in the local frame, whatever message it came in.
 
-use super::exchange::Exchange;
-use super::place::{Kind, Place};
 use super::wanted::Wanted;
-use crate::codec::{Message, OutOfRange, ServiceId};
+use crate::codec::OutOfRange;
 use crate::messages::mobility::report_local_waypoint as fields;
 use crate::messages::mobility::report_local_waypoint_ext as ext;
 use crate::messages::mobility::set_local_waypoint_ext::{ZPosition, ZPositionZLocal};
 use crate::messages::mobility::{
-    QueryLocalWaypoint, QueryLocalWaypointExt, ReportLocalWaypoint, ReportLocalWaypointExt,
-    SetLocalWaypoint, SetLocalWaypointExt, local_waypoint_driver, local_waypoint_list_driver,
+    ReportLocalWaypoint, ReportLocalWaypointExt, SetLocalWaypoint, SetLocalWaypointExt,
 };
-use crate::service::Handled;
 use crate::vehicle::Waypoint;
 
 /// A waypoint in the local frame: metres and radians.
@@ -27,9 +23,9 @@ pub(super) struct LocalWaypoint {
     path_tolerance: Option<f64>,
 }
 
-impl From<SetLocalWaypoint> for Place {
+impl From<SetLocalWaypoint> for LocalWaypoint {
     fn from(message: SetLocalWaypoint) -> Self {
-        Self::Local(LocalWaypoint {
+        Self {
             x: message.x_m(),
             y: message.y_m(),
             z: message.z_m(),
@@ -38,18 +34,18 @@ impl From<SetLocalWaypoint> for Place {
             yaw: message.yaw_rad(),
             waypoint_tolerance: message.waypoint_tolerance_m(),
             path_tolerance: message.path_tolerance_m(),
-        })
+        }
     }
 }
 
-impl From<SetLocalWaypointExt> for Place {
+impl From<SetLocalWaypointExt> for LocalWaypoint {
     fn from(message: SetLocalWaypointExt) -> Self {
         let z = match message.z_position {
             Some(ZPosition::ZLocal(z)) => Some(z.value()),
             // A ground vehicle has no choice of heights.
             _ => None,
         };
-        Self::Local(LocalWaypoint {
+        Self {
             x: message.x_m(),
             y: message.y_m(),
             z,
@@ -58,7 +54,7 @@ impl From<SetLocalWaypointExt> for Place {
             yaw: message.heading_rad(),
             waypoint_tolerance: message.waypoint_tolerance_m(),
             path_tolerance: message.path_tolerance_m(),
-        })
+        }
     }
 }
 
@@ -73,7 +69,8 @@ impl LocalWaypoint {
         }
     }
 
-    fn report(&self, wanted: Wanted) -> Result<ReportLocalWaypoint, OutOfRange> {
+    /// The report of version 1.0.
+    pub(super) fn report(&self, wanted: Wanted) -> Result<ReportLocalWaypoint, OutOfRange> {
         let tolerance = fields::WaypointTolerance::new;
         Ok(ReportLocalWaypoint {
             x: fields::X::new(self.x)?,
@@ -87,7 +84,8 @@ impl LocalWaypoint {
         })
     }
 
-    fn report_ext(&self, wanted: Wanted) -> Result<ReportLocalWaypointExt, OutOfRange> {
+    /// The report of version 1.1.
+    pub(super) fn report_ext(&self, wanted: Wanted) -> Result<ReportLocalWaypointExt, OutOfRange> {
         let tolerance = ext::WaypointTolerance::new;
         let z = wanted.optional(0, self.z, ZPositionZLocal::new);
         Ok(ReportLocalWaypointExt {
@@ -100,35 +98,5 @@ impl LocalWaypoint {
             waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
             path_tolerance: wanted.optional(5, self.path_tolerance, ext::PathTolerance::new),
         })
-    }
-}
-
-/// Waypoints in the local frame.
-pub(super) struct Local;
-
-impl Kind for Local {
-    const DRIVER: ServiceId = local_waypoint_driver::V1_1;
-    const LIST_DRIVER: ServiceId = local_waypoint_list_driver::V1_1;
-    type Set = SetLocalWaypoint;
-    type SetExt = SetLocalWaypointExt;
-
-    fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
-        let Some(Place::Local(waypoint)) = exchange.cockpit.place() else {
-            return Handled::No;
-        };
-        match code {
-            QueryLocalWaypoint::CODE => {
-                if let Some(query) = exchange.query::<QueryLocalWaypoint>() {
-                    exchange.reply_if(waypoint.report(Wanted(query.presence_vector.into())));
-                }
-            }
-            QueryLocalWaypointExt::CODE => {
-                if let Some(query) = exchange.query::<QueryLocalWaypointExt>() {
-                    exchange.reply_if(waypoint.report_ext(Wanted(query.presence_vector.into())));
-                }
-            }
-            _ => return Handled::No,
-        }
-        Handled::Yes
     }
 }

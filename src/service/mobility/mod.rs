@@ -21,14 +21,18 @@
 //! afterwards.
 
 mod acceleration_state_sensor;
+mod behaviour;
 mod clock;
+mod cockpit;
 mod exchange;
 mod global_pose_sensor;
 mod global_waypoint;
+mod kind;
+mod list_driver;
 mod local_pose_sensor;
 mod local_waypoint;
+mod path_kinds;
 mod path_segment;
-mod path_segment_driver;
 mod place;
 mod primitive_driver;
 #[cfg(test)]
@@ -40,7 +44,7 @@ mod velocity_state_driver;
 mod velocity_state_sensor;
 mod wanted;
 mod waypoint_driver;
-mod waypoint_list_driver;
+mod waypoint_kinds;
 
 pub use vehicle::{OnVehicle, Vehicle};
 

@@ -5,7 +5,6 @@
 
 use bytes::Bytes;
 
-use super::place::Place;
 use super::wanted::Wanted;
 use crate::codec::{Message, OutOfRange};
 use crate::messages::mobility::report_global_path_segment as global;
@@ -35,46 +34,53 @@ pub(super) const LOCAL: [u16; 2] = [0x0410, 0x04B0];
 /// The same for segments on the globe.
 pub(super) const GLOBAL: [u16; 2] = [0x040F, 0x04AF];
 
-/// The segment in a message that sets one.
-pub(super) fn place(code: u16, octets: &Bytes) -> Option<Place> {
-    let [local, local_ext] = LOCAL;
-    let [global, global_ext] = GLOBAL;
+/// The segment in a message that sets one in the local frame.
+pub(super) fn local(code: u16, octets: &Bytes) -> Option<PathSegment> {
+    let [basic, ext] = LOCAL;
     match code {
-        code if code == local => {
+        code if code == basic => {
             let message: ReportLocalPathSegment = read_as(octets)?;
-            Some(Place::LocalPath(PathSegment {
+            Some(PathSegment {
                 control: (message.p1_x_m(), message.p1_y_m()),
                 end: (message.p2_x_m(), message.p2_y_m()),
                 weight: message.weighting_factor_value(),
                 path_tolerance: message.path_tolerance_m(),
-            }))
+            })
         }
-        code if code == local_ext => {
+        code if code == ext => {
             let message: ReportLocalPathSegmentExt = read_as(octets)?;
-            Some(Place::LocalPath(PathSegment {
+            Some(PathSegment {
                 control: (message.p1_x_m(), message.p1_y_m()),
                 end: (message.p2_x_m(), message.p2_y_m()),
                 weight: message.weighting_factor_value(),
                 path_tolerance: message.path_tolerance_m(),
-            }))
+            })
         }
-        code if code == global => {
+        _ => None,
+    }
+}
+
+/// The segment in a message that sets one on the globe.
+pub(super) fn global(code: u16, octets: &Bytes) -> Option<PathSegment> {
+    let [basic, ext] = GLOBAL;
+    match code {
+        code if code == basic => {
             let message: ReportGlobalPathSegment = read_as(octets)?;
-            Some(Place::GlobalPath(PathSegment {
+            Some(PathSegment {
                 control: (message.p1_latitude_deg(), message.p1_longitude_deg()),
                 end: (message.p2_latitude_deg(), message.p2_longitude_deg()),
                 weight: message.weighting_factor_value(),
                 path_tolerance: message.path_tolerance_m(),
-            }))
+            })
         }
-        code if code == global_ext => {
+        code if code == ext => {
             let message: ReportGlobalPathSegmentExt = read_as(octets)?;
-            Some(Place::GlobalPath(PathSegment {
+            Some(PathSegment {
                 control: (message.p1_latitude_deg(), message.p1_longitude_deg()),
                 end: (message.p2_latitude_deg(), message.p2_longitude_deg()),
                 weight: message.weighting_factor_value(),
                 path_tolerance: message.path_tolerance_m(),
-            }))
+            })
         }
         _ => None,
     }

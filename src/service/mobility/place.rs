@@ -4,13 +4,15 @@ use std::f64::consts::SQRT_2;
 
 use bytes::Bytes;
 
-use super::exchange::Exchange;
-use super::global_waypoint::{Global, GlobalWaypoint};
-use super::local_waypoint::{Local, LocalWaypoint};
+use super::global_waypoint::GlobalWaypoint;
+use super::local_waypoint::LocalWaypoint;
 use super::path_segment::{self, PathSegment};
-use crate::codec::{Message, ServiceId};
+use crate::codec::Message;
 use crate::messages::core::set_element::ElementRec;
-use crate::service::{Handled, code_of};
+use crate::messages::mobility::{
+    SetGlobalWaypoint, SetGlobalWaypointExt, SetLocalWaypoint, SetLocalWaypointExt,
+};
+use crate::service::code_of;
 use crate::vehicle::{Frame, Goal, Pose, Waypoint};
 
 /// Somewhere to drive to.
@@ -22,29 +24,21 @@ pub(super) enum Place {
     GlobalPath(PathSegment),
 }
 
-/// One kind of waypoints, and the services that drive to them.
-pub(super) trait Kind: Send + 'static {
-    /// The service that drives to one of them.
-    const DRIVER: ServiceId;
-    /// The service that drives to one after the other.
-    const LIST_DRIVER: ServiceId;
-    /// The message that sets one, in version 1.0.
-    type Set: Message + Clone + Into<Place>;
-    /// The message that sets one, in version 1.1.
-    type SetExt: Message + Clone + Into<Place>;
-
-    /// Answers the queries for the waypoint. As long as none is set, it is the first one of the
-    /// list. If that is of another kind, or there is none at all, there is no answer.
-    fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled;
-
-    /// The place that octets with a message say, if they are of this kind.
-    fn place(code: u16, octets: &Bytes) -> Option<Place> {
-        match code {
-            code if code == Self::Set::CODE => Self::Set::decode(octets).ok().map(Into::into),
-            code if code == Self::SetExt::CODE => Self::SetExt::decode(octets).ok().map(Into::into),
-            _ => None,
+macro_rules! set_by {
+    ($($message:ident => $place:ident),* $(,)?) => {$(
+        impl From<$message> for Place {
+            fn from(message: $message) -> Self {
+                Self::$place(message.into())
+            }
         }
-    }
+    )*};
+}
+
+set_by! {
+    SetLocalWaypoint => Local,
+    SetLocalWaypointExt => Local,
+    SetGlobalWaypoint => Global,
+    SetGlobalWaypointExt => Global,
 }
 
 impl Place {
@@ -55,10 +49,20 @@ impl Place {
     /// What an element of a list holds, if it is a place.
     pub(super) fn of(element: &ElementRec) -> Option<Self> {
         let octets = &element.element_data.data;
-        let code = code_of(octets)?;
-        Local::place(code, octets)
-            .or_else(|| Global::place(code, octets))
-            .or_else(|| path_segment::place(code, octets))
+        match code_of(octets)? {
+            SetLocalWaypoint::CODE => read::<SetLocalWaypoint>(octets),
+            SetLocalWaypointExt::CODE => read::<SetLocalWaypointExt>(octets),
+            SetGlobalWaypoint::CODE => read::<SetGlobalWaypoint>(octets),
+            SetGlobalWaypointExt::CODE => read::<SetGlobalWaypointExt>(octets),
+            code => Self::of_path(code, octets),
+        }
+    }
+
+    /// The place at the end of the path that a message with this code sets.
+    pub(super) fn of_path(code: u16, octets: &Bytes) -> Option<Self> {
+        let local = || path_segment::local(code, octets).map(Self::LocalPath);
+        let global = || path_segment::global(code, octets).map(Self::GlobalPath);
+        local().or_else(global)
     }
 
     /// Whether it can be reached, as far as it can be told without knowing where on the globe the
@@ -110,6 +114,10 @@ impl Place {
             Self::Local(_) | Self::Global(_) => None,
         }
     }
+}
+
+fn read<M: Message + Into<Place>>(octets: &Bytes) -> Option<Place> {
+    M::decode(octets).ok().map(Into::into)
 }
 
 fn in_reach(waypoint: &Waypoint) -> bool {

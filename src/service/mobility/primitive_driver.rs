@@ -1,8 +1,9 @@
 //! Primitive Driver: uses the vehicle's drives and brakes directly, without feedback.
 
+use super::behaviour::Behaviour;
 use super::both_versions;
+use super::cockpit::Cockpit;
 use super::exchange::Exchange;
-use super::vehicle::{Behaviour, Cockpit};
 use super::wanted::Wanted;
 use crate::codec::{Message, ServiceId};
 use crate::messages::mobility::report_wrench_effort as fields;

@@ -1,7 +1,8 @@
 //! Local and Global Vector Driver: keep a speed and a heading.
 
+use super::behaviour::Behaviour;
+use super::cockpit::Cockpit;
 use super::exchange::Exchange;
-use super::vehicle::{Behaviour, Cockpit};
 use super::wanted::Wanted;
 use crate::codec::{Message, OutOfRange, ServiceId};
 use crate::messages::mobility::{

@@ -1,23 +1,24 @@
-//! The vehicle that all mobility services of a component share, and what they have in common.
+//! The vehicle that all mobility services of a component share, and each of them as a component
+//! offers it.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::acceleration_state_sensor::AccelerationStateSensor;
+use super::behaviour::Behaviour;
 use super::clock::Clock;
+use super::cockpit::Cockpit;
 use super::exchange::Exchange;
 use super::global_pose_sensor::GlobalPoseSensor;
-use super::global_waypoint::Global;
+use super::list_driver::ListDriver;
 use super::local_pose_sensor::LocalPoseSensor;
-use super::local_waypoint::Local;
-use super::path_segment_driver::{GlobalPathSegmentDriver, LocalPathSegmentDriver};
+use super::path_kinds::{GlobalPath, LocalPath};
 use super::primitive_driver::PrimitiveDriver;
-use super::travel::Travel;
 use super::vector_driver::{GlobalVectorDriver, LocalVectorDriver};
 use super::velocity_state_driver::VelocityStateDriver;
 use super::velocity_state_sensor::VelocityStateSensor;
 use super::waypoint_driver::WaypointDriver;
-use super::waypoint_list_driver::WaypointListDriver;
+use super::waypoint_kinds::{Global, Local};
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 use crate::service::{Context, Elements, Handled, ListManager, Service, Standing, code_of};
@@ -29,31 +30,13 @@ pub struct Vehicle {
     cockpit: Arc<Mutex<Cockpit>>,
 }
 
-/// What the services of a vehicle share.
-pub(super) struct Cockpit {
-    pub(super) pilot: Pilot,
-    /// The list that the list drivers work off.
-    pub(super) elements: Elements,
-    pub(super) travel: Travel,
-    pub(super) clock: Option<Clock>,
-    /// Magnetic north as seen from true north, in radians, once set.
-    pub(super) magnetic_variation: f64,
-}
-
 impl Vehicle {
     /// A vehicle that nobody drives yet, and that does not know what time it is: its reports carry
     /// no time stamps.
     #[must_use]
     pub fn new(pilot: Pilot) -> Self {
-        let cockpit = Cockpit {
-            pilot,
-            elements: Elements::new(),
-            travel: Travel::default(),
-            clock: None,
-            magnetic_variation: 0.0,
-        };
         Self {
-            cockpit: Arc::new(Mutex::new(cockpit)),
+            cockpit: Arc::new(Mutex::new(Cockpit::new(pilot))),
         }
     }
 
@@ -84,7 +67,7 @@ impl Vehicle {
     #[must_use]
     pub fn has_arrived(&self) -> bool {
         let cockpit = self.lock();
-        cockpit.pilot.is_there() && cockpit.travel.is_over()
+        cockpit.pilot.is_there() && cockpit.travel.active().is_none()
     }
 
     /// How much of the list that it works off lies behind it, in percent.
@@ -166,14 +149,14 @@ impl Vehicle {
     /// Needs the [`list_manager`](Self::list_manager) beside it.
     #[must_use]
     pub fn local_waypoint_list_driver(&self) -> OnVehicle {
-        self.service(WaypointListDriver::<Local>::on(&self.elements()))
+        self.service(ListDriver::<Local>::on(&self.elements()))
     }
 
     /// Global Waypoint List Driver: drives to waypoints on the globe, one after the other. Needs
     /// the [`list_manager`](Self::list_manager) beside it.
     #[must_use]
     pub fn global_waypoint_list_driver(&self) -> OnVehicle {
-        self.service(WaypointListDriver::<Global>::on(&self.elements()))
+        self.service(ListDriver::<Global>::on(&self.elements()))
     }
 
     /// Velocity State Driver: keeps a velocity.
@@ -198,14 +181,14 @@ impl Vehicle {
     /// Needs the [`list_manager`](Self::list_manager) beside it.
     #[must_use]
     pub fn local_path_segment_driver(&self) -> OnVehicle {
-        self.service(LocalPathSegmentDriver::on(&self.elements()))
+        self.service(ListDriver::<LocalPath>::on(&self.elements()))
     }
 
     /// Global Path Segment Driver: drives along curves on the globe, one after the other. Needs
     /// the [`list_manager`](Self::list_manager) beside it.
     #[must_use]
     pub fn global_path_segment_driver(&self) -> OnVehicle {
-        self.service(GlobalPathSegmentDriver::on(&self.elements()))
+        self.service(ListDriver::<GlobalPath>::on(&self.elements()))
     }
 
     fn elements(&self) -> Elements {
@@ -238,31 +221,6 @@ impl std::fmt::Debug for Vehicle {
         f.debug_struct("Vehicle")
             .field("motion", &self.motion())
             .finish()
-    }
-}
-
-/// What is particular to one mobility service.
-pub(super) trait Behaviour: Send {
-    /// What is offered, the newest version first.
-    fn offers(&self) -> Vec<ServiceId>;
-
-    /// Deals with a message that has this code.
-    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled;
-
-    /// Whether this service tells the end of commands with this code.
-    fn tells_end_of(&self, command: u16) -> bool {
-        let _ = command;
-        false
-    }
-
-    /// The vehicle has moved: says which answers are others now.
-    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        let _ = (cockpit, context);
-    }
-
-    /// The vehicle has been stopped, because the component may no longer act.
-    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        let _ = (cockpit, context);
     }
 }
 

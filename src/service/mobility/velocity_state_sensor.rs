@@ -1,8 +1,9 @@
 //! Velocity State Sensor: how fast the vehicle moves, along and about its own axes.
 
+use super::behaviour::Behaviour;
 use super::both_versions;
+use super::cockpit::Cockpit;
 use super::exchange::Exchange;
-use super::vehicle::{Behaviour, Cockpit};
 use super::wanted::Wanted;
 use crate::codec::{Message, ServiceId};
 use crate::messages::mobility::report_velocity_state::{

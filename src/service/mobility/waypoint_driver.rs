@@ -2,24 +2,26 @@
 
 use std::marker::PhantomData;
 
+use super::behaviour::Behaviour;
 use super::both_versions;
+use super::cockpit::{Cockpit, changed};
 use super::exchange::Exchange;
-use super::place::{Kind, Place};
+use super::kind::Waypoints;
+use super::place::Place;
 use super::travel;
-use super::vehicle::{Behaviour, Cockpit};
 use crate::codec::{Message, ServiceId};
 use crate::service::{Context, Handled};
 
 /// A driver to waypoints of one kind.
 pub(super) struct WaypointDriver<K>(PhantomData<K>);
 
-impl<K: Kind> WaypointDriver<K> {
+impl<K: Waypoints> WaypointDriver<K> {
     pub(super) const fn new() -> Self {
         Self(PhantomData)
     }
 }
 
-impl<K: Kind> Behaviour for WaypointDriver<K> {
+impl<K: Waypoints> Behaviour for WaypointDriver<K> {
     fn offers(&self) -> Vec<ServiceId> {
         both_versions(K::DRIVER).into()
     }
@@ -62,5 +64,5 @@ fn set(place: Option<Place>, command: u16, exchange: &mut Exchange<'_, '_>) {
     }
     tracing::info!(%source, ?place, "waypoint set");
     exchange.cockpit.set_place(place, command, exchange.context);
-    travel::changed(exchange.context);
+    changed(exchange.context);
 }

@@ -1,11 +1,9 @@
-//! Local and Global Path Segment Driver: drive along curves, one after the other.
+//! Path segments in the local frame and on the globe, as the drivers along them take and tell them.
 
-use super::both_versions;
 use super::exchange::Exchange;
+use super::kind::Kind;
 use super::path_segment::{self, PathSegment};
 use super::place::Place;
-use super::travel;
-use super::vehicle::{Behaviour, Cockpit};
 use super::wanted::Wanted;
 use crate::codec::{Message, ServiceId};
 use crate::messages::core::reject_element_request::ResponseCode;
@@ -13,49 +11,19 @@ use crate::messages::mobility::{
     QueryGlobalPathSegment, QueryGlobalPathSegmentExt, QueryLocalPathSegment,
     QueryLocalPathSegmentExt, global_path_segment_driver, local_path_segment_driver,
 };
-use crate::service::{Context, Elements, Handled, code_of};
+use crate::service::{Elements, Handled, code_of};
 
-/// Drives along curves in the local frame.
-pub(super) struct LocalPathSegmentDriver;
+/// Segments in the local frame.
+pub(super) struct LocalPath;
 
-/// Drives along curves on the globe.
-pub(super) struct GlobalPathSegmentDriver;
+impl Kind for LocalPath {
+    const LIST_DRIVER: ServiceId = local_path_segment_driver::V1_1;
 
-impl LocalPathSegmentDriver {
-    /// A driver that works the vehicle's list off, which takes its segments from now on.
-    pub(super) fn on(elements: &Elements) -> Self {
+    fn accept(elements: &Elements) {
         accept(elements, path_segment::LOCAL);
-        Self
-    }
-}
-
-impl GlobalPathSegmentDriver {
-    /// A driver that works the vehicle's list off, which takes its segments from now on.
-    pub(super) fn on(elements: &Elements) -> Self {
-        accept(elements, path_segment::GLOBAL);
-        Self
-    }
-}
-
-fn accept(elements: &Elements, codes: [u16; 2]) {
-    for code in codes {
-        elements.accept_code(code, |octets| {
-            let place = code_of(octets).and_then(|code| path_segment::place(code, octets));
-            match place {
-                Some(place) if place.is_in_reach() => Ok(()),
-                Some(_) => Err(ResponseCode::UNSPECIFIED_ERROR),
-                None => Err(ResponseCode::UNSUPPORTED_ELEMENT_TYPE),
-            }
-        });
-    }
-}
-
-impl Behaviour for LocalPathSegmentDriver {
-    fn offers(&self) -> Vec<ServiceId> {
-        both_versions(local_path_segment_driver::V1_1).into()
     }
 
-    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+    fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
             QueryLocalPathSegment::CODE => {
                 if let Some(query) = exchange.query::<QueryLocalPathSegment>() {
@@ -71,30 +39,23 @@ impl Behaviour for LocalPathSegmentDriver {
                     });
                 }
             }
-            _ => return travel::handle_list(code, exchange),
+            _ => return Handled::No,
         }
         Handled::Yes
     }
-
-    fn tells_end_of(&self, command: u16) -> bool {
-        travel::tells_end_of(command)
-    }
-
-    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        cockpit.work_off(context);
-    }
-
-    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        cockpit.abandon(context);
-    }
 }
 
-impl Behaviour for GlobalPathSegmentDriver {
-    fn offers(&self) -> Vec<ServiceId> {
-        both_versions(global_path_segment_driver::V1_1).into()
+/// Segments on the globe.
+pub(super) struct GlobalPath;
+
+impl Kind for GlobalPath {
+    const LIST_DRIVER: ServiceId = global_path_segment_driver::V1_1;
+
+    fn accept(elements: &Elements) {
+        accept(elements, path_segment::GLOBAL);
     }
 
-    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+    fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
             QueryGlobalPathSegment::CODE => {
                 if let Some(query) = exchange.query::<QueryGlobalPathSegment>() {
@@ -112,21 +73,23 @@ impl Behaviour for GlobalPathSegmentDriver {
                     });
                 }
             }
-            _ => return travel::handle_list(code, exchange),
+            _ => return Handled::No,
         }
         Handled::Yes
     }
+}
 
-    fn tells_end_of(&self, command: u16) -> bool {
-        travel::tells_end_of(command)
-    }
-
-    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        cockpit.work_off(context);
-    }
-
-    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        cockpit.abandon(context);
+/// Has a list take segments from messages with these codes, if they end in reach.
+fn accept(elements: &Elements, codes: [u16; 2]) {
+    for code in codes {
+        elements.accept_code(code, |octets| {
+            let place = code_of(octets).and_then(|code| Place::of_path(code, octets));
+            match place {
+                Some(place) if place.is_in_reach() => Ok(()),
+                Some(_) => Err(ResponseCode::UNSPECIFIED_ERROR),
+                None => Err(ResponseCode::UNSUPPORTED_ELEMENT_TYPE),
+            }
+        });
     }
 }
 

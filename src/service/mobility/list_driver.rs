@@ -1,28 +1,29 @@
-//! Local and Global Waypoint List Driver: drive to waypoints one after the other.
+//! The drivers that work a list off: Local and Global Waypoint List Driver, Local and Global Path
+//! Segment Driver.
 
 use std::marker::PhantomData;
 
+use super::behaviour::Behaviour;
 use super::both_versions;
+use super::cockpit::Cockpit;
 use super::exchange::Exchange;
-use super::place::Kind;
+use super::kind::Kind;
 use super::travel;
-use super::vehicle::{Behaviour, Cockpit};
 use crate::codec::ServiceId;
 use crate::service::{Context, Elements, Handled};
 
-/// A driver along lists of waypoints of one kind.
-pub(super) struct WaypointListDriver<K>(PhantomData<K>);
+/// A driver to the places of one kind in a list, one after the other.
+pub(super) struct ListDriver<K>(PhantomData<K>);
 
-impl<K: Kind> WaypointListDriver<K> {
-    /// A driver that works the vehicle's list off, which takes its waypoints from now on.
+impl<K: Kind> ListDriver<K> {
+    /// A driver that works the vehicle's list off, which takes its places from now on.
     pub(super) fn on(elements: &Elements) -> Self {
-        elements.accept_if(|message: &K::Set| message.clone().into().is_in_reach());
-        elements.accept_if(|message: &K::SetExt| message.clone().into().is_in_reach());
+        K::accept(elements);
         Self(PhantomData)
     }
 }
 
-impl<K: Kind> Behaviour for WaypointListDriver<K> {
+impl<K: Kind> Behaviour for ListDriver<K> {
     fn offers(&self) -> Vec<ServiceId> {
         both_versions(K::LIST_DRIVER).into()
     }
