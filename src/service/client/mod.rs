@@ -5,15 +5,18 @@
 //! hear what the component hears, and send in its name; a [`Stack`](super::Stack) owns them.
 
 mod control;
+mod news;
 mod rejection;
 mod subscription;
 mod subscriptions;
 #[cfg(test)]
 mod tests;
+mod topic;
 
 pub(super) use control::Controls;
 pub use control::{ControlId, ControlLost, ControlNews, ControlRefused};
+pub use news::{Outage, SubscriptionEnd, SubscriptionNews};
 pub use rejection::Rejection;
-pub use subscription::{Outage, SubscriptionNews, When};
+pub use subscriptions::SubscriptionId;
 pub(super) use subscriptions::Subscriptions;
-pub use subscriptions::{CannotSubscribe, SubscriptionEnd, SubscriptionId, Topic};
+pub use topic::{CannotSubscribe, Topic, When};

@@ -1,98 +1,16 @@
 //! One subscription: the event of a peer that brings a report again and again. It is created,
 //! renewed, found to be down and created again, until the application has had enough of it.
 
-use std::fmt;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
 use super::Rejection;
-use super::subscriptions::{SubscriptionEnd, Topic};
+use super::news::{Outage, SubscriptionEnd, SubscriptionNews};
+use super::topic::{Topic, When};
 use crate::address::JausId;
 use crate::messages::core::{ConfirmEventRequest, Event, QueryEventTimeout};
 use crate::service::{NoAnswer, Outbox, Patience, code_of};
-
-/// When a subscribed report is to come.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum When {
-    /// Again and again, whether or not anything has changed.
-    Periodic {
-        /// The wanted rate in hertz, above 0 and up to 1092.
-        hz: f64,
-        /// The least rate in hertz that is of use; a peer that cannot keep it is refused.
-        least_hz: f64,
-    },
-    /// Whenever it has changed.
-    OnChange,
-}
-
-impl When {
-    /// At a rate in hertz, or whatever lower rate the peer can keep.
-    #[must_use]
-    pub const fn hz(hz: f64) -> Self {
-        Self::Periodic { hz, least_hz: 0.0 }
-    }
-
-    /// Refuses a peer that cannot keep `least_hz`.
-    #[must_use]
-    pub const fn at_least(self, least_hz: f64) -> Self {
-        match self {
-            Self::Periodic { hz, .. } => Self::Periodic { hz, least_hz },
-            Self::OnChange => self,
-        }
-    }
-}
-
-/// What becomes of a subscription.
-#[derive(Debug, Clone, PartialEq)]
-pub enum SubscriptionNews {
-    /// The peer has confirmed the event: for the first time, after it was down, or at another rate.
-    Up {
-        /// The confirmed rate in hertz; `None` for reports on change.
-        hz: Option<f64>,
-    },
-    /// A report has come.
-    Report {
-        /// The report from its message code on.
-        report: Bytes,
-        /// How many reports before this one have been lost on the way.
-        lost: u8,
-    },
-    /// Nothing comes at present; the event is being created again.
-    Down {
-        /// When the last sign of the event came.
-        since: Instant,
-        /// What is the matter.
-        why: Outage,
-    },
-    /// It is over, and nothing will come any more.
-    Ended(SubscriptionEnd),
-}
-
-/// Why a subscription is down.
-#[derive(Debug, Clone, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Outage {
-    /// No report has come for four periods, nor for half a second.
-    Silent,
-    /// The peer does not confirm that the event still exists.
-    Unconfirmed,
-    /// Discovery has lost the peer.
-    PeerLost,
-    /// The peer does not know the event any more, and refuses to create it again.
-    Refused(Rejection),
-}
-
-impl fmt::Display for Outage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Silent => f.write_str("the reports have stopped"),
-            Self::Unconfirmed => f.write_str("the peer does not confirm the event any more"),
-            Self::PeerLost => f.write_str("the peer is gone"),
-            Self::Refused(reason) => write!(f, "the peer refuses the event: {reason}"),
-        }
-    }
-}
 
 /// Where a subscription stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

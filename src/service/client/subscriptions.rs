@@ -4,93 +4,21 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
-use bytes::Bytes;
-
+use super::Rejection;
+use super::news::SubscriptionNews;
 use super::subscription::{Order, Subscription};
-use super::{Rejection, SubscriptionNews, When};
+use super::topic::{CannotSubscribe, Topic};
 use crate::address::JausId;
-use crate::codec::{EncodeError, Message};
+use crate::codec::Message;
 use crate::endpoint::Received;
-use crate::messages::core::create_event::EventType;
 use crate::messages::core::{
-    CancelEvent, ConfirmEventRequest, CreateEvent, Event, RejectEventRequest, ReportEventTimeout,
+    CancelEvent, ConfirmEventRequest, Event, RejectEventRequest, ReportEventTimeout,
 };
-use crate::service::{Change, Handled, NoAnswer, Outbox, Patience, code_of, read};
+use crate::service::{Change, Handled, Outbox, Patience, code_of, read};
 
 /// Names one subscription of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SubscriptionId(u64);
-
-/// What is subscribed to.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Topic {
-    /// Whose reports.
-    pub peer: JausId,
-    /// The query from its message code on, whose answer the report is.
-    pub query: Bytes,
-    /// The message code of the report.
-    pub report: u16,
-    /// How often.
-    pub when: When,
-}
-
-impl Topic {
-    /// Whether the wire can carry what is asked for.
-    ///
-    /// # Errors
-    /// What can not be, as [`Stack::subscribe`](crate::service::Stack::subscribe) would say.
-    pub fn check(&self) -> Result<(), CannotSubscribe> {
-        create_event(self, 0)?.encode()?;
-        Ok(())
-    }
-}
-
-/// Why a subscription cannot even be tried.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CannotSubscribe {
-    /// Only one component can be subscribed to at a time.
-    #[error("{0} is not one component, and an event is one component's")]
-    NotOneComponent(JausId),
-    /// The wire carries rates up to 1092 Hz in steps of 1/60 Hz.
-    #[error("{hz} Hz cannot be asked for: a rate is from 1/60 to 1092 Hz")]
-    Rate {
-        /// The wanted rate in hertz.
-        hz: f64,
-    },
-    /// The wire cannot carry the query.
-    #[error(transparent)]
-    Encode(#[from] EncodeError),
-    /// The peer would take both for one event.
-    #[error("this component subscribes to it already: use that subscription, or drop it first")]
-    Already,
-    /// There is no room.
-    #[error("there are {0} subscriptions already, and no more are possible: drop some")]
-    TooMany(usize),
-}
-
-/// Why a subscription is over, or never came to be.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SubscriptionEnd {
-    /// The peer refused the event.
-    #[error("the peer refuses it: {0}")]
-    Rejected(Rejection),
-    /// The peer neither confirmed nor refused it.
-    #[error(
-        "CreateEvent was answered with neither ConfirmEventRequest nor RejectEventRequest: asked {} times in {:.1} s",
-        .0.tries, .0.waited.as_secs_f64()
-    )]
-    NoAnswer(NoAnswer),
-    /// The peer is slower than is of use.
-    #[error("only {hz:.2} Hz were confirmed, and at least {least_hz:.2} Hz are wanted")]
-    TooSlow {
-        /// The confirmed rate in hertz.
-        hz: f64,
-        /// The least wanted rate in hertz.
-        least_hz: f64,
-    },
-}
 
 /// The subscriptions of one component.
 ///
@@ -150,7 +78,7 @@ impl Subscriptions {
             report: topic.report,
             when: topic.when,
             patience,
-            create: create_event(topic, request)?.encode()?,
+            create: topic.create_event(request)?.encode()?,
             request,
             query: topic.query.clone(),
         };
@@ -455,22 +383,4 @@ impl Leaving {
             out.send(self.peer, &cancel);
         }
     }
-}
-
-fn create_event(topic: &Topic, request: u8) -> Result<CreateEvent, CannotSubscribe> {
-    let mut create = CreateEvent {
-        request_id: request,
-        event_type: EventType::EVERY_CHANGE,
-        query_message: topic.query.clone(),
-        ..CreateEvent::default()
-    };
-    if let When::Periodic { hz, .. } = topic.when {
-        create.event_type = EventType::PERIODIC_SC;
-        let set = create.set_requested_periodic_rate_hz(hz);
-        // What is rounded to 0 would be no rate.
-        if set.is_err() || create.requested_periodic_rate == Default::default() {
-            return Err(CannotSubscribe::Rate { hz });
-        }
-    }
-    Ok(create)
 }

@@ -1,0 +1,83 @@
+//! What becomes of a subscription, as its holder is told.
+
+use std::fmt;
+use std::time::Instant;
+
+use bytes::Bytes;
+
+use super::Rejection;
+use crate::service::NoAnswer;
+
+/// What becomes of a subscription.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SubscriptionNews {
+    /// The peer has confirmed the event: for the first time, after it was down, or at another rate.
+    Up {
+        /// The confirmed rate in hertz; `None` for reports on change.
+        hz: Option<f64>,
+    },
+    /// A report has come.
+    Report {
+        /// The report from its message code on.
+        report: Bytes,
+        /// How many reports before this one have been lost on the way.
+        lost: u8,
+    },
+    /// Nothing comes at present; the event is being created again.
+    Down {
+        /// When the last sign of the event came.
+        since: Instant,
+        /// What is the matter.
+        why: Outage,
+    },
+    /// It is over, and nothing will come any more.
+    Ended(SubscriptionEnd),
+}
+
+/// Why a subscription is down.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Outage {
+    /// No report has come for four periods, nor for half a second.
+    Silent,
+    /// The peer does not confirm that the event still exists.
+    Unconfirmed,
+    /// Discovery has lost the peer.
+    PeerLost,
+    /// The peer does not know the event any more, and refuses to create it again.
+    Refused(Rejection),
+}
+
+impl fmt::Display for Outage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Silent => f.write_str("the reports have stopped"),
+            Self::Unconfirmed => f.write_str("the peer does not confirm the event any more"),
+            Self::PeerLost => f.write_str("the peer is gone"),
+            Self::Refused(reason) => write!(f, "the peer refuses the event: {reason}"),
+        }
+    }
+}
+
+/// Why a subscription is over, or never came to be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SubscriptionEnd {
+    /// The peer refused the event.
+    #[error("the peer refuses it: {0}")]
+    Rejected(Rejection),
+    /// The peer neither confirmed nor refused it.
+    #[error(
+        "CreateEvent was answered with neither ConfirmEventRequest nor RejectEventRequest: asked {} times in {:.1} s",
+        .0.tries, .0.waited.as_secs_f64()
+    )]
+    NoAnswer(NoAnswer),
+    /// The peer is slower than is of use.
+    #[error("only {hz:.2} Hz were confirmed, and at least {least_hz:.2} Hz are wanted")]
+    TooSlow {
+        /// The confirmed rate in hertz.
+        hz: f64,
+        /// The least wanted rate in hertz.
+        least_hz: f64,
+    },
+}
