@@ -77,19 +77,7 @@ macro_rules! __codec_bit_field {
             }
         }
 
-        impl $crate::codec::Fixed for $name {
-            const SIZE: usize = <$raw as $crate::codec::Fixed>::SIZE;
-
-            #[inline(always)]
-            fn get(run: &[u8], at: usize) -> Self {
-                Self($crate::codec::Fixed::get(run, at))
-            }
-
-            #[inline(always)]
-            fn put(self, run: &mut [u8], at: usize) {
-                $crate::codec::Fixed::put(self.0, run, at);
-            }
-        }
+        $crate::codec::fixed_newtype!($name($raw));
 
         impl ::core::fmt::Debug for $name {
             fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {

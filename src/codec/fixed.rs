@@ -69,6 +69,27 @@ macro_rules! count {
 number!(u8, u16, u32, u64, i8, i16, i32, i64, f32, f64);
 count!(u8, u16, u32, u64);
 
+/// A newtype is written as what it wraps.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __codec_fixed_newtype {
+    ($name:ident($raw:ty)) => {
+        impl $crate::codec::Fixed for $name {
+            const SIZE: usize = <$raw as $crate::codec::Fixed>::SIZE;
+
+            #[inline(always)]
+            fn get(run: &[u8], at: usize) -> Self {
+                Self($crate::codec::Fixed::get(run, at))
+            }
+
+            #[inline(always)]
+            fn put(self, run: &mut [u8], at: usize) {
+                $crate::codec::Fixed::put(self.0, run, at);
+            }
+        }
+    };
+}
+
 impl<T: Fixed, const N: usize> Fixed for [T; N] {
     const SIZE: usize = N * T::SIZE;
 

@@ -57,8 +57,8 @@ pub use writer::Writer;
 #[doc(hidden)]
 pub use crate::{
     __codec_arbitrary_integer as arbitrary_integer, __codec_bit_field as bit_field,
-    __codec_enumeration as enumeration, __codec_if_arbitrary as if_arbitrary,
-    __codec_if_serde as if_serde, __codec_scaled as scaled,
+    __codec_enumeration as enumeration, __codec_fixed_newtype as fixed_newtype,
+    __codec_if_arbitrary as if_arbitrary, __codec_if_serde as if_serde, __codec_scaled as scaled,
 };
 
 /// Passes its content on if this crate has the feature `serde`, wherever it is expanded.
