@@ -29,7 +29,7 @@ mod vehicle_process;
 
 use std::process::{Child, Command, Stdio};
 
-use hosts::{LIMIT, ROLE, TwoHosts, on_two_hosts};
+use hosts::{TwoHosts, on_two_hosts};
 use vehicle_process::VehicleProcess;
 
 /// A running gateway; ended with a word when dropped.
@@ -116,20 +116,9 @@ fn a_jaus_vehicle_is_listed_asked_and_driven_from_ra() {
 /// Not a test of its own: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
-    let Ok(role) = std::env::var(ROLE) else {
-        return;
-    };
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .unwrap();
-    // Not for ever, should the test that waits for this process be killed.
-    let play = async {
-        match role.as_str() {
-            "ra-vehicle" => ra_vehicle::play().await,
-            "operator" => operator::play().await,
-            other => panic!("unknown role {other}"),
-        }
-    };
-    let _ = runtime.block_on(async { tokio::time::timeout(2 * LIMIT, play).await });
+    hosts::play(async |role| match role {
+        "ra-vehicle" => ra_vehicle::play().await,
+        "operator" => operator::play().await,
+        other => panic!("unknown role {other}"),
+    });
 }

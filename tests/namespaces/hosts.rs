@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 use crate::networks::{ip, on_hosts};
 
 /// Longer than anything takes; reached only when a test fails.
-pub(crate) const LIMIT: Duration = Duration::from_secs(30);
+const LIMIT: Duration = Duration::from_secs(30);
 
 /// Set for a process that plays a node; says which.
-pub(crate) const ROLE: &str = "JAUS_TEST_ROLE";
+const ROLE: &str = "JAUS_TEST_ROLE";
 
 /// Set for a process that plays a node with other settings than the usual.
 pub(crate) const SETTINGS: &str = "JAUS_TEST_SETTINGS";
@@ -175,4 +175,18 @@ impl Drop for Process {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// Plays the role that this process was started in, if it was in any: not for ever, should the test
+/// that waits for it be killed.
+pub(crate) fn play(part: impl AsyncFnOnce(&str)) {
+    let Ok(role) = std::env::var(ROLE) else {
+        return;
+    };
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .unwrap();
+    let played = async { tokio::time::timeout(2 * LIMIT, part(&role)).await };
+    let _ = runtime.block_on(played);
 }

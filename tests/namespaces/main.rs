@@ -24,7 +24,7 @@ mod vehicle_process;
 
 use std::time::{Duration, Instant};
 
-use hosts::{LIMIT, ROLE, on_two_hosts};
+use hosts::on_two_hosts;
 use networks::{run, say_skipped};
 
 #[test]
@@ -147,28 +147,17 @@ fn what_comes_through_two_cables_is_delivered_once() {
 /// Not a test of its own: does nothing unless another test starts it in a role.
 #[test]
 fn a_process_that_plays_a_node() {
-    let Ok(role) = std::env::var(ROLE) else {
-        return;
-    };
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .unwrap();
-    // Not for ever, should the test that waits for this process be killed.
-    let play = async {
-        match role.as_str() {
-            "echo" => roles::echo().await,
-            "caller" => roles::call().await,
-            "sink" => roles::sink().await,
-            "flood" => roles::flood().await,
-            "listener" => roles::listen().await,
-            "announcer" => roles::announce().await,
-            "vehicle" => roles::vehicle().await,
-            "train" => roles::train().await,
-            "station" => roles::station().await,
-            "operator" => roles::operator().await,
-            other => panic!("unknown role {other}"),
-        }
-    };
-    let _ = runtime.block_on(async { tokio::time::timeout(2 * LIMIT, play).await });
+    hosts::play(async |role| match role {
+        "echo" => roles::echo().await,
+        "caller" => roles::call().await,
+        "sink" => roles::sink().await,
+        "flood" => roles::flood().await,
+        "listener" => roles::listen().await,
+        "announcer" => roles::announce().await,
+        "vehicle" => roles::vehicle().await,
+        "train" => roles::train().await,
+        "station" => roles::station().await,
+        "operator" => roles::operator().await,
+        other => panic!("unknown role {other}"),
+    });
 }
