@@ -73,7 +73,7 @@ impl UnixEcho {
 }
 
 pub(crate) fn unix_echo() {
-    let folder = crate::place::folder();
+    let folder = crate::run::folder();
     let path = format!("{}/echo-{}.sock", folder.display(), std::process::id());
     let listener = UnixListener::bind(&path).expect("a socket");
     println!("{path}");

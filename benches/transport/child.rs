@@ -4,8 +4,8 @@ use std::env;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
-use crate::place;
 use crate::roles::Role;
+use crate::run;
 
 /// A running child, ended when dropped.
 pub(crate) struct Process {
@@ -20,7 +20,7 @@ impl Process {
         let this = env::current_exe().expect("the path of this program");
         let mut child = Command::new(this)
             .env(Role::VARIABLE, role.to_words())
-            .env(place::RUN, place::run().to_string())
+            .env(run::VARIABLE, run::number().to_string())
             .stdout(Stdio::piped())
             .spawn()
             .expect("a child process");

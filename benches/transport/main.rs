@@ -23,9 +23,12 @@ mod child;
 mod idle;
 mod one_way;
 mod place;
+mod play;
 mod report;
 mod roles;
 mod round_trip;
+mod run;
+mod setting;
 
 use std::env;
 
@@ -58,7 +61,7 @@ const QUICK: Effort = Effort {
 
 fn main() {
     if let Some(role) = roles::of_this_process() {
-        return role.play();
+        return play::play(role);
     }
     let mut effort = THOROUGH;
     let mut filter = String::new();
@@ -83,5 +86,5 @@ fn main() {
     }
     report::machine();
     // Left behind if a measurement has failed.
-    let _ = std::fs::remove_dir_all(place::folder());
+    let _ = std::fs::remove_dir_all(run::folder());
 }

@@ -10,9 +10,9 @@ use jaus::wire::Priority;
 use tokio::time::{sleep, timeout};
 
 use crate::child::Process;
-use crate::place::Setting;
 use crate::report::{self, median, ratio, spread};
 use crate::roles::{self, CODE, COUNT, Role};
+use crate::setting::Setting;
 use crate::{Effort, baseline};
 
 /// Octets of a message.

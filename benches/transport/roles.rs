@@ -1,12 +1,11 @@
-//! What a child process of the benchmark does.
+//! What a child process of the benchmark may be, and how it is told.
 
 use std::env;
 
 use jaus::address::JausId;
-use jaus::endpoint::{Outgoing, Received};
+use jaus::endpoint::Received;
 
-use crate::place::{self, Place};
-use crate::{baseline, idle};
+use crate::place::Place;
 
 /// The code of all messages here: an experimental one, which no service takes.
 pub(crate) const CODE: [u8; 2] = [0x01, 0xD7];
@@ -62,19 +61,6 @@ impl Role {
             _ => return None,
         })
     }
-
-    /// Does it, for as long as the process lives.
-    pub(crate) fn play(self) {
-        match self {
-            Self::UdpEcho => baseline::udp_echo(),
-            Self::UdpSink => baseline::udp_sink(),
-            Self::UnixEcho => baseline::unix_echo(),
-            Self::Echo(id, place) => run(echo(id, place)),
-            Self::Sink(id, place) => run(sink(id, place)),
-            Self::Node(id, place) => run(node(id, place)),
-            Self::Idle(components) => run(idle::stay(components)),
-        }
-    }
 }
 
 /// The role of this process; none for the one that the user has started.
@@ -91,45 +77,7 @@ pub(crate) fn runtime() -> tokio::runtime::Runtime {
         .expect("a runtime")
 }
 
-/// Runs a component in a task of its own, as most are: what a runtime blocks on costs it one call
-/// into the kernel more for each turn.
-fn run(role: impl Future<Output = ()> + Send + 'static) {
-    let runtime = runtime();
-    let task = runtime.spawn(role);
-    runtime.block_on(task).expect("a role without surprises");
-}
-
-async fn echo(id: JausId, place: Place) {
-    let mut component = place.attach(id).await;
-    println!("ready");
-    while let Some(message) = component.port.recv().await {
-        let answer = Outgoing::new(id, message.source, message.payload);
-        component.port.send(answer).expect("sent");
-    }
-}
-
-async fn sink(id: JausId, place: Place) {
-    let mut component = place.attach(id).await;
-    println!("ready");
-    let mut count = 0u64;
-    while let Some(message) = component.port.recv().await {
-        if is(&message, COUNT) {
-            let answer = [&COUNT[..], &count.to_le_bytes()].concat();
-            let mut answer = Outgoing::new(id, message.source, answer.into());
-            answer.priority = message.priority;
-            component.port.send(answer).expect("sent");
-        } else if is(&message, CODE) {
-            count += 1;
-        }
-    }
-}
-
-async fn node(id: JausId, place: Place) {
-    let _node = place::serve(id, &place);
-    println!("ready");
-    std::future::pending::<()>().await;
-}
-
+/// Whether a message has a code.
 pub(crate) fn is(message: &Received, code: [u8; 2]) -> bool {
     message.payload.starts_with(&code)
 }

@@ -12,9 +12,10 @@ use tokio::time::timeout;
 use crate::Effort;
 use crate::baseline::{UdpEcho, UnixEcho};
 use crate::child::Process;
-use crate::place::{Component, Setting};
+use crate::place::Component;
 use crate::report::{self, median, micros, percentile, ratio, spread};
 use crate::roles::{self, CODE, Role};
+use crate::setting::Setting;
 
 const LENGTHS: [usize; 2] = [64, 1024];
 

@@ -1,0 +1,60 @@
+//! What a child process does in its role.
+
+use jaus::address::JausId;
+use jaus::endpoint::Outgoing;
+
+use crate::place::{self, Place};
+use crate::roles::{CODE, COUNT, Role, is, runtime};
+use crate::{baseline, idle};
+
+/// Plays a role, for as long as the process lives.
+pub(crate) fn play(role: Role) {
+    match role {
+        Role::UdpEcho => baseline::udp_echo(),
+        Role::UdpSink => baseline::udp_sink(),
+        Role::UnixEcho => baseline::unix_echo(),
+        Role::Echo(id, place) => run(echo(id, place)),
+        Role::Sink(id, place) => run(sink(id, place)),
+        Role::Node(id, place) => run(node(id, place)),
+        Role::Idle(components) => run(idle::stay(components)),
+    }
+}
+
+/// Runs a component in a task of its own, as most are: what a runtime blocks on costs it one call
+/// into the kernel more for each turn.
+fn run(role: impl Future<Output = ()> + Send + 'static) {
+    let runtime = runtime();
+    let task = runtime.spawn(role);
+    runtime.block_on(task).expect("a role without surprises");
+}
+
+async fn echo(id: JausId, place: Place) {
+    let mut component = place.attach(id).await;
+    println!("ready");
+    while let Some(message) = component.port.recv().await {
+        let answer = Outgoing::new(id, message.source, message.payload);
+        component.port.send(answer).expect("sent");
+    }
+}
+
+async fn sink(id: JausId, place: Place) {
+    let mut component = place.attach(id).await;
+    println!("ready");
+    let mut count = 0u64;
+    while let Some(message) = component.port.recv().await {
+        if is(&message, COUNT) {
+            let answer = [&COUNT[..], &count.to_le_bytes()].concat();
+            let mut answer = Outgoing::new(id, message.source, answer.into());
+            answer.priority = message.priority;
+            component.port.send(answer).expect("sent");
+        } else if is(&message, CODE) {
+            count += 1;
+        }
+    }
+}
+
+async fn node(id: JausId, place: Place) {
+    let _node = place::serve(id, &place);
+    println!("ready");
+    std::future::pending::<()>().await;
+}

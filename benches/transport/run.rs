@@ -1,0 +1,23 @@
+//! One run of the benchmark, which all its processes know by its number.
+
+use std::env;
+use std::fs;
+use std::path::PathBuf;
+
+/// Names the run to its child processes.
+pub(crate) const VARIABLE: &str = "JAUS_BENCH_RUN";
+
+/// The number of this run: the id of the process that the user has started.
+pub(crate) fn number() -> u32 {
+    let told = env::var(VARIABLE)
+        .ok()
+        .and_then(|number| number.parse().ok());
+    told.unwrap_or_else(std::process::id)
+}
+
+/// A folder of this run for sockets, shared by all its processes.
+pub(crate) fn folder() -> PathBuf {
+    let folder = env::temp_dir().join(format!("jaus-bench-{}", number()));
+    fs::create_dir_all(&folder).expect("a folder for sockets");
+    folder
+}

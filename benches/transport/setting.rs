@@ -1,0 +1,60 @@
+//! How two components of the benchmark stand to each other, and the nodes that they need for it.
+
+use jaus::address::JausId;
+
+use crate::child::Process;
+use crate::place::Place;
+use crate::roles::Role;
+use crate::run::folder;
+
+/// How two components of the benchmark stand to each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Setting {
+    /// Each carries a node of its own.
+    OwnNodes,
+    /// Both are attached to one node in a third process.
+    OneNode,
+    /// Each is attached to a node; the two nodes are two more processes.
+    TwoNodes,
+}
+
+impl Setting {
+    pub(crate) const ALL: [Self; 3] = [Self::OwnNodes, Self::OneNode, Self::TwoNodes];
+
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::OwnNodes => "two components with a node of their own",
+            Self::OneNode => "two component processes on one node",
+            Self::TwoNodes => "two component processes on two nodes",
+        }
+    }
+
+    /// The ids of the two components; others for each setting, because all are in one group.
+    pub(crate) const fn ids(self) -> [JausId; 2] {
+        match self {
+            Self::OwnNodes => [JausId::new(101, 1, 33), JausId::new(102, 1, 33)],
+            Self::OneNode => [JausId::new(103, 1, 33), JausId::new(103, 1, 34)],
+            Self::TwoNodes => [JausId::new(104, 1, 33), JausId::new(105, 1, 33)],
+        }
+    }
+
+    /// Starts the nodes, and says where the two components are to live.
+    pub(crate) fn start(self) -> (Vec<Process>, [Place; 2]) {
+        let node = |id: JausId, name: &str| {
+            let place = Place::On(folder().join(format!("{self:?}-{name}.sock")));
+            (Process::start(&Role::Node(id, place.clone())), place)
+        };
+        let [ours, theirs] = self.ids();
+        match self {
+            Self::OwnNodes => (Vec::new(), [Place::Own, Place::Own]),
+            Self::OneNode => {
+                let (process, place) = node(ours, "one");
+                (vec![process], [place.clone(), place])
+            }
+            Self::TwoNodes => {
+                let ((one, here), (two, there)) = (node(ours, "ours"), node(theirs, "theirs"));
+                (vec![one, two], [here, there])
+            }
+        }
+    }
+}
