@@ -7,27 +7,10 @@
 //! On the wire a message is `code ++ header ++ body ++ footer`, little-endian, without padding.
 
 use std::fmt;
-use std::path::Path;
 use std::sync::Arc;
 
 use crate::behaviour::StateMachine;
-
-/// Where something was declared: a file with the line and column (both from 1) in it.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Location {
-    /// The file as it was named to the loader.
-    pub file: Arc<Path>,
-    /// Line, counted from 1.
-    pub line: u32,
-    /// Column in characters, counted from 1.
-    pub column: u32,
-}
-
-impl fmt::Display for Location {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}", self.file.display(), self.line, self.column)
-    }
-}
+pub use crate::source::Location;
 
 /// A service's version, `major.minor`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

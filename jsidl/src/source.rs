@@ -1,9 +1,25 @@
 //! The texts of a load, and the way back from an offset in one of them to file, line and column.
 
+use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::model::Location;
+/// Where something was declared: a file with the line and column (both from 1) in it.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Location {
+    /// The file as it was named to the loader.
+    pub file: Arc<Path>,
+    /// Line, counted from 1.
+    pub line: u32,
+    /// Column in characters, counted from 1.
+    pub column: u32,
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.file.display(), self.line, self.column)
+    }
+}
 
 /// A place in one of the loaded texts: eight octets instead of a whole [`Location`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -12,8 +12,7 @@ mod run;
 
 use std::fmt;
 
-use crate::model::Location;
-use crate::source::Span;
+use crate::source::{Location, Span};
 
 pub use draw::{dot, mermaid};
 pub use guard::{Argument, Call, Comparison, Guard};

@@ -5,19 +5,14 @@
 //! merged machine has an answer (the case of letters is passed over, a composite state begins in
 //! its first state), it is a warning.
 
-use std::collections::HashMap;
-
-use super::triggers::Triggers;
+use super::triggers::{Events, Triggers};
 use crate::behaviour::{
     Argument, Guard, Machine, MachineState, Name, State, StateMachine, Transition, TransitionKind,
 };
 use crate::diagnostic::Report;
 use crate::library::Library;
-use crate::model::{Id, Service};
+use crate::model::Service;
 use crate::source::Span;
-
-/// The internal events that services declare, by name.
-pub(crate) type Events<'a> = HashMap<&'a Id, Vec<&'a str>>;
 
 /// Looks at what a service itself says about its machines, beside what it inherits.
 /// `states_left` bounds the work for all services together.

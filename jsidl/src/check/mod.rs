@@ -17,7 +17,7 @@ use crate::diagnostic::Report;
 use crate::source::Span;
 use crate::syntax::Node;
 
-pub(crate) use behaviour::{Events, behaviour};
+pub(crate) use behaviour::behaviour;
 pub(crate) use composite::{array, count, count_limit, group, header, required, size, tag};
 pub(crate) use field::{
     bits, enum_index, octet_index, one_meaning, overlap, scale, value_range, value_set,
@@ -25,6 +25,7 @@ pub(crate) use field::{
 };
 pub(crate) use layout::same_shape;
 pub(crate) use service::{ambiguous_codes, ambiguous_names, left_out, same_service};
+pub(crate) use triggers::Events;
 
 /// Names must differ, because they are how everyone speaks of the things. `what` is their plural.
 pub(crate) fn unique<'n>(

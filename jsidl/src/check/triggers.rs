@@ -3,12 +3,14 @@
 //!
 //! A service that declares no events, and whose bases declare none, leaves open what there is.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
-use super::behaviour::Events;
 use crate::behaviour::Name;
 use crate::library::Library;
-use crate::model::Service;
+use crate::model::{Id, Service};
+
+/// The internal events that services declare, by name.
+pub(crate) type Events<'a> = HashMap<&'a Id, Vec<&'a str>>;
 
 /// The names of events and messages, in lower case: published definitions differ in it.
 pub(super) struct Triggers<'a> {

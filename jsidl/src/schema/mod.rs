@@ -90,7 +90,7 @@ pub fn of_message(message: &Message) -> Json {
     let mut schema = if message.header.is_none() && message.footer.is_none() {
         match &message.body {
             Some(body) => shape::of(&body.shape),
-            None => shape::object(Map::new(), &[]),
+            None => object(Map::new(), &[]),
         }
     } else {
         let sections = [
@@ -105,7 +105,7 @@ pub fn of_message(message: &Message) -> Json {
             properties.insert(key.to_owned(), shape::of(&item.shape));
             required.push(key);
         }
-        shape::object(properties, &required)
+        object(properties, &required)
     };
     schema["title"] = message.name.clone().into();
     describe(&mut schema, &message.description);
@@ -140,4 +140,17 @@ fn describe(schema: &mut Json, words: &str) {
     if !words.is_empty() {
         schema["description"] = words.into();
     }
+}
+
+/// An object that admits these keys only.
+fn object(properties: Map<String, Json>, required: &[&str]) -> Json {
+    let mut schema = json!({ "type": "object" });
+    if !properties.is_empty() {
+        schema["properties"] = properties.into();
+    }
+    if !required.is_empty() {
+        schema["required"] = required.into();
+    }
+    schema["additionalProperties"] = false.into();
+    schema
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value as Json, json};
 
-use super::{describe, shape};
+use super::{describe, object};
 use crate::model::{BitField, Meaning, Number, Scalar, SubField, ValueSet};
 
 /// The key for the bits of a bit field that no sub-field owns.
@@ -70,7 +70,7 @@ pub(super) fn bits(bits: &BitField) -> Json {
         describe(&mut schema, "Bits that no sub-field owns, in place.");
         properties.insert(RESERVED.to_owned(), schema);
     }
-    shape::object(properties, &[])
+    object(properties, &[])
 }
 
 fn sub_field(field: &SubField) -> Json {

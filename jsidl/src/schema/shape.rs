@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value as Json, json};
 
-use super::{describe, number};
+use super::{describe, number, object};
 use crate::model::{Array, Choice, Count, Group, Item, List, Shape, Unsigned, Variant};
 
 /// The schema of a shape.
@@ -34,19 +34,6 @@ pub(super) fn of(shape: &Shape) -> Json {
         Shape::Measure { choices } => measure(choices),
         Shape::Array(array) => dimension(array, &array.dimensions),
     }
-}
-
-/// An object that admits these keys only.
-pub(super) fn object(properties: Map<String, Json>, required: &[&str]) -> Json {
-    let mut schema = json!({ "type": "object" });
-    if !properties.is_empty() {
-        schema["properties"] = properties.into();
-    }
-    if !required.is_empty() {
-        schema["required"] = required.into();
-    }
-    schema["additionalProperties"] = false.into();
-    schema
 }
 
 fn closed<const N: usize>(properties: [(&str, Json); N], required: &[&str]) -> Json {
