@@ -8,6 +8,7 @@
 )]
 
 pub mod failure;
+mod identity;
 pub mod junit;
 mod launch;
 pub mod logging;

@@ -12,7 +12,7 @@ use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue, Deserializer, Error};
 
 use super::failure::Failure;
-use super::network::Identity;
+use super::identity::Identity;
 
 /// The programs' own keys; all others are the node's.
 const OWN: [&str; 3] = ["id", "name", "kind"];

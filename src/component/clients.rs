@@ -7,13 +7,12 @@ use std::time::Instant;
 
 use tokio::sync::{mpsc, oneshot, watch};
 
-use super::control::Condition;
 use super::feed::Feed;
 use crate::address::JausId;
 use crate::node;
 use crate::service::{
-    CannotSubscribe, ControlId, ControlNews, ControlRefused, Patience, Stack, SubscriptionEnd,
-    SubscriptionId, SubscriptionNews, Topic,
+    CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Patience, Stack,
+    SubscriptionEnd, SubscriptionId, SubscriptionNews, Topic,
 };
 
 /// A wish for something that lasts.
@@ -70,6 +69,15 @@ pub(super) type Controlled = Result<(Ticket, watch::Receiver<Condition>), NotCon
 pub(super) enum NotControlled {
     Refused(ControlRefused),
     NotSent(node::SendError),
+}
+
+/// How control is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Condition {
+    Held,
+    Lost(ControlLost),
+    /// The peer has been told, or will never answer.
+    Released,
 }
 
 /// Everything that somebody holds or waits for.

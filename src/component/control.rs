@@ -4,14 +4,14 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
-use super::clients::Ticket;
+use super::clients::{Condition, Ticket};
 use super::{Component, ControlError, ManageError};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::messages::core::{
     ClearEmergency, QueryStatus, ReportStatus, Reset, Resume, SetEmergency, Standby,
 };
-use crate::service::{ControlLost, State};
+use crate::service::State;
 
 /// How long a peer may take to reach a state …
 const STATE_LIMIT: Duration = Duration::from_secs(1);
@@ -30,15 +30,6 @@ pub struct Control {
     component: Component,
     peer: JausId,
     condition: watch::Receiver<Condition>,
-}
-
-/// How control is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Condition {
-    Held,
-    Lost(ControlLost),
-    /// The peer has been told, or will never answer.
-    Released,
 }
 
 impl Control {

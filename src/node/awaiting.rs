@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tokio::sync::oneshot;
 
 use super::error::Undelivered;
-use super::local::Replies;
+use super::replies::Replies;
 use crate::address::JausId;
 use crate::endpoint::{Event, MessageHandle};
 use crate::link::local::record::Reply;

@@ -44,6 +44,7 @@ mod links;
 mod local;
 mod mailbox;
 mod port;
+mod replies;
 mod tap;
 
 use std::net::SocketAddr;

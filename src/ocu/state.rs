@@ -215,3 +215,12 @@ pub struct Map {
     /// Raised by every change.
     pub revision: u32,
 }
+
+/// A map at one of its revisions.
+pub(crate) type Edition = (u16, u32);
+
+impl Map {
+    pub(crate) const fn edition(&self) -> Edition {
+        (self.id, self.revision)
+    }
+}

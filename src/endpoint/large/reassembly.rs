@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use super::style;
+use super::style::{self, Whole};
 use crate::address::JausId;
 use crate::endpoint::{Config, Counter, Counters};
 use crate::peer::LargeStyle;
@@ -196,14 +196,6 @@ impl Sender {
         self.put(place, run);
         place
     }
-}
-
-/// A message of which every fragment was received.
-#[derive(Debug, PartialEq, Eq)]
-pub(in crate::endpoint) struct Whole {
-    pub(in crate::endpoint) payload: Bytes,
-    /// How it was cut, if that can be told.
-    pub(in crate::endpoint) style: LargeStyle,
 }
 
 /// The unfinished large messages.

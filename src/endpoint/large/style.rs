@@ -5,9 +5,16 @@ use std::collections::VecDeque;
 
 use bytes::Bytes;
 
-use super::reassembly::Whole;
 use crate::peer::{JAUSPP_FRAGMENT, LargeStyle};
 use crate::wire::{Version, large};
+
+/// A message of which every fragment was received.
+#[derive(Debug, PartialEq, Eq)]
+pub(in crate::endpoint) struct Whole {
+    pub(in crate::endpoint) payload: Bytes,
+    /// How it was cut, if that can be told.
+    pub(in crate::endpoint) style: LargeStyle,
+}
 
 /// Joins the fragments of a whole message, whose sender may be known to cut in some style.
 ///

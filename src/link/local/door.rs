@@ -10,15 +10,12 @@ use std::net::SocketAddr;
 
 use tokio::net::TcpListener;
 
-use super::stream::{ReadHalf, WriteHalf, tcp_halves};
+use super::stream::{Guest, tcp_halves};
 #[cfg(unix)]
 use super::unix_door::{self, UnixDoor};
-use super::{Address, Error};
-
-/// Where a node is found on systems without Unix sockets.
 #[cfg(not(unix))]
-pub(super) const DEFAULT_PORT: SocketAddr =
-    SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 37940);
+use super::usual_place::PORT;
+use super::{Address, Error};
 
 /// Where component processes come in.
 #[derive(Debug)]
@@ -26,15 +23,6 @@ pub(crate) enum Door {
     #[cfg(unix)]
     Unix(UnixDoor),
     Tcp(TcpListener),
-}
-
-/// Somebody at the door.
-#[derive(Debug)]
-pub(crate) struct Guest {
-    pub(crate) read: ReadHalf,
-    pub(crate) write: WriteHalf,
-    /// The number of its process, where the system tells.
-    pub(crate) pid: Option<u32>,
 }
 
 impl Door {
@@ -46,7 +34,7 @@ impl Door {
             #[cfg(unix)]
             Address::Path(path) => UnixDoor::open(path).map(Self::Unix),
             #[cfg(not(unix))]
-            Address::Default => Self::open_tcp(DEFAULT_PORT),
+            Address::Default => Self::open_tcp(PORT),
             #[cfg(not(unix))]
             Address::Path(_) => Err(Error::NoUnixSockets),
             Address::Tcp(port) => Self::open_tcp(*port),

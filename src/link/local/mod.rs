@@ -13,6 +13,7 @@
 //! | `address` | where the node is found |
 //! | `door` | the node's side: directory and socket with their rights, stale sockets |
 //! | `stream` | the two kinds of stream, and who is at the other end |
+//! | `usual_place` | where the node is found by whoever is told nothing else |
 //!
 //! What to do with the records is the business of [`node`](crate::node).
 
@@ -28,12 +29,13 @@ mod stream;
 mod unix_door;
 #[cfg(unix)]
 mod unix_stream;
+mod usual_place;
 
 pub use address::{Address, InvalidAddress, Local};
 pub use assembler::{Assembler, Body};
 pub(crate) use connection::Connection;
-pub(crate) use door::{Door, Guest};
+pub(crate) use door::Door;
 pub use error::Error;
 pub(crate) use outbox::Outbox;
 pub use stream::Process;
-pub(crate) use stream::{WriteHalf, connect};
+pub(crate) use stream::{Guest, WriteHalf, connect};

@@ -13,7 +13,7 @@ use tokio::net::{UnixStream, unix::UCred};
 
 #[cfg(unix)]
 use super::unix_stream::{UnixReadHalf, UnixWriteHalf, halves};
-use super::{Address, Error};
+use super::{Address, Error, usual_place};
 
 /// The process at the other end.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
@@ -34,6 +34,15 @@ impl fmt::Display for Process {
             (None, name) => write!(f, "\"{name}\""),
         }
     }
+}
+
+/// Somebody at a node's door.
+#[derive(Debug)]
+pub(crate) struct Guest {
+    pub(crate) read: ReadHalf,
+    pub(crate) write: WriteHalf,
+    /// The number of its process, where the system tells.
+    pub(crate) pid: Option<u32>,
 }
 
 /// The half of a stream that is read.
@@ -129,15 +138,6 @@ pub(super) fn tcp_halves(stream: TcpStream) -> (ReadHalf, WriteHalf) {
     (ReadHalf::Tcp(read), WriteHalf::Tcp(write))
 }
 
-/// The user that this process acts for.
-#[cfg(unix)]
-pub(super) fn own_uid() -> Result<u32, Error> {
-    let doing = "asking the system who we are";
-    let (one, _) = UnixStream::pair().map_err(Error::io(doing))?;
-    let credentials = one.peer_cred().map_err(Error::io(doing))?;
-    Ok(credentials.uid())
-}
-
 /// The number of the process at the other end, as credentials tell it.
 #[cfg(unix)]
 pub(super) fn pid_of(credentials: &UCred) -> Option<u32> {
@@ -150,11 +150,11 @@ pub(super) fn pid_of(credentials: &UCred) -> Option<u32> {
 pub(crate) async fn connect(address: &Address) -> Result<(ReadHalf, WriteHalf), Error> {
     match address {
         #[cfg(unix)]
-        Address::Default => connect_unix(&super::unix_door::default_path()?).await,
+        Address::Default => connect_unix(&usual_place::path()?).await,
         #[cfg(unix)]
         Address::Path(path) => connect_unix(path).await,
         #[cfg(not(unix))]
-        Address::Default => connect_tcp(super::door::DEFAULT_PORT).await,
+        Address::Default => connect_tcp(usual_place::PORT).await,
         #[cfg(not(unix))]
         Address::Path(_) => Err(Error::NoUnixSockets),
         Address::Tcp(port) => connect_tcp(*port).await,
@@ -173,7 +173,7 @@ async fn connect_unix(path: &std::path::Path) -> Result<(ReadHalf, WriteHalf), E
     let credentials = stream
         .peer_cred()
         .map_err(Error::io("asking the system whose node that is"))?;
-    let (uid, own) = (credentials.uid(), own_uid()?);
+    let (uid, own) = (credentials.uid(), usual_place::own_uid()?);
     // Root may do everything, also trust whom it likes.
     if uid != own && uid != 0 && own != 0 {
         return Err(Error::Foreign {

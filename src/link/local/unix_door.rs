@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use tokio::net::{UnixListener, UnixStream};
 
 use super::Error;
-use super::door::Guest;
-use super::stream::{own_uid, pid_of, unix_halves};
+use super::stream::{Guest, pid_of, unix_halves};
+use super::usual_place::{SOCKET, directory, own_uid};
 
 /// A Unix socket that is removed when the node ends.
 #[derive(Debug)]
@@ -76,34 +76,16 @@ pub(super) const fn may_enter(uid: u32, owner: u32) -> bool {
     uid == owner || uid == 0
 }
 
-/// The usual path of the socket, whether it exists or not.
-pub(super) fn default_path() -> Result<PathBuf, Error> {
-    Ok(default_directory()?.join("node.sock"))
-}
-
 /// The usual path, in a directory that exists and is the owner's alone.
 pub(super) fn make_default() -> Result<PathBuf, Error> {
-    let directory = default_directory()?;
+    let directory = directory()?;
     match DirBuilder::new().mode(0o700).create(&directory) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => {
             return Err(Error::io(format!("making {}", directory.display()))(error));
         }
         _ => check_directory(&directory, own_uid()?, 0o077)?,
     }
-    Ok(directory.join("node.sock"))
-}
-
-fn default_directory() -> Result<PathBuf, Error> {
-    let given = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
-    if let Some(directory) = given.filter(|directory| directory.is_absolute()) {
-        return Ok(directory.join("jaus"));
-    }
-    let uid = own_uid()?;
-    let of_user = PathBuf::from(format!("/run/user/{uid}"));
-    if of_user.is_dir() {
-        return Ok(of_user.join("jaus"));
-    }
-    Ok(PathBuf::from(format!("/tmp/jaus-{uid}")))
+    Ok(directory.join(SOCKET))
 }
 
 fn parent(path: &Path) -> &Path {

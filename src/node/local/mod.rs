@@ -15,7 +15,6 @@ use std::time::Duration;
 
 use tokio::sync::Semaphore;
 
-pub(super) use self::session::Replies;
 use self::session::Session;
 use super::attendance::{ComponentEvent, Departure};
 use super::core::Shared;

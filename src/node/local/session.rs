@@ -7,10 +7,9 @@
 //! not read either while the answers to them do not fit, so that nothing here grows with what it
 //! does.
 
-use std::collections::VecDeque;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::task::{Context, Poll, Waker};
+use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::Duration;
 
 use tokio::time::Sleep;
@@ -19,6 +18,7 @@ use super::super::attendance::{ComponentEvent, Departure};
 use super::super::awaiting::Waiter;
 use super::super::core::{Core, LAST_WORDS, Shared};
 use super::super::mailbox::Mailbox;
+use super::super::replies::Replies;
 use crate::address::JausId;
 use crate::endpoint::{Outgoing, Received};
 use crate::link::local::record::{Delivery, RecordError, Reply, Request, Send};
@@ -28,44 +28,8 @@ use crate::link::local::{Body, Connection, Error, Outbox, Process, WriteHalf};
 const FULL: usize = 64 << 10;
 /// Reads in one turn, before other tasks have theirs.
 const TURN: usize = 4;
-/// Answers that may wait before nothing more is read from their component.
-const MAX_REPLIES: usize = 4096;
 /// How long a component may read nothing before that is news.
 const STUCK: Duration = Duration::from_secs(2);
-
-/// Answers for a component that do not come from its mailbox.
-#[derive(Debug, Default)]
-pub(in super::super) struct Replies(Mutex<(VecDeque<Reply>, Option<Waker>)>);
-
-impl Replies {
-    pub(in super::super) fn push(&self, reply: Reply) {
-        let (replies, waker) = &mut *self.lock();
-        replies.push_back(reply);
-        if let Some(waker) = waker.take() {
-            waker.wake();
-        }
-    }
-
-    fn is_full(&self) -> bool {
-        self.lock().0.len() >= MAX_REPLIES
-    }
-
-    /// Moves the answers to where they are written.
-    fn drain(&self, cx: &Context<'_>, outbox: &mut Outbox) {
-        let (replies, waker) = &mut *self.lock();
-        for reply in replies.drain(..) {
-            outbox.reply(&reply);
-        }
-        match waker {
-            Some(known) if known.will_wake(cx.waker()) => {}
-            _ => *waker = Some(cx.waker().clone()),
-        }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, (VecDeque<Reply>, Option<Waker>)> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
 
 /// An attached component.
 #[derive(Debug)]

@@ -8,12 +8,12 @@ use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::timeout;
 
 use super::Reply;
-use super::maps::Edition;
 use crate::address::JausId;
 use crate::codec::{Message, OutOfRange};
 use crate::component::{Component, Control, ControlError, DeliverError};
 use crate::messages::core::{ClearEmergency, QueryStatus, ReportStatus, SetEmergency};
 use crate::messages::mobility::SetWrenchEffort;
+use crate::ocu::state::Edition;
 use crate::ocu::stick::Push;
 
 /// A job's end.

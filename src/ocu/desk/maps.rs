@@ -7,13 +7,10 @@ use super::hands::{Finished, Hands};
 use crate::address::JausId;
 use crate::component::Component;
 use crate::messages::ground::{QueryRasterCells, ReportRasterCells};
-use crate::ocu::state::Map;
+use crate::ocu::state::{Edition, Map};
 
 /// Takes the cells, or hears why there are none.
 pub(crate) type CellsReply = Box<dyn FnOnce(Result<Bytes, String>) + Send>;
-
-/// A map at one of its revisions.
-pub(super) type Edition = (u16, u32);
 
 /// The map that is kept, and who waits for one.
 #[derive(Default)]
@@ -38,7 +35,7 @@ impl Maps {
         let (Some(store), Some(map)) = (store, map) else {
             return reply(Err("no such map is known".to_owned()));
         };
-        let edition = (map.id, map.revision);
+        let edition = map.edition();
         if let Some((kept, cells)) = &self.kept
             && *kept == edition
         {

@@ -2,8 +2,6 @@
 
 use serde_json::{Map, Value as Json};
 
-use super::filter::compare;
-
 /// A term such as `Pose.X>=1.5`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Field {
@@ -14,7 +12,7 @@ pub(super) struct Field {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Comparison {
+enum Comparison {
     Equal,
     Unequal,
     Less,
@@ -34,6 +32,33 @@ const SIGNS: [(&str, Comparison); 7] = [
     (">", Comparison::More),
     ("~", Comparison::Contains),
 ];
+
+impl Comparison {
+    /// Whether a field's value and what is wanted compare so.
+    fn holds(self, value: &Json, wanted: &str) -> bool {
+        let number = wanted.parse::<f64>().ok();
+        match (self, value.as_f64(), number) {
+            (Self::Equal, Some(value), Some(wanted)) => value == wanted,
+            (Self::Unequal, Some(value), Some(wanted)) => value != wanted,
+            (Self::Less, Some(value), Some(wanted)) => value < wanted,
+            (Self::AtMost, Some(value), Some(wanted)) => value <= wanted,
+            (Self::More, Some(value), Some(wanted)) => value > wanted,
+            (Self::AtLeast, Some(value), Some(wanted)) => value >= wanted,
+            _ => {
+                let plain = match value {
+                    Json::String(text) => text.to_lowercase(),
+                    other => other.to_string().to_lowercase(),
+                };
+                match self {
+                    Self::Equal => plain == wanted.to_lowercase(),
+                    Self::Unequal => plain != wanted.to_lowercase(),
+                    Self::Contains => plain.contains(&wanted.to_lowercase()),
+                    _ => false,
+                }
+            }
+        }
+    }
+}
 
 impl Field {
     /// Takes a comparison apart; `None` if it is none.
@@ -106,7 +131,7 @@ impl Field {
             (Json::Array(values), None) => values.iter().any(|value| self.leads(value, path)),
             (Json::Object(object), Some(_)) => self.is_in(object, path),
             (_, Some(_)) => false,
-            (value, None) => compare(self.comparison, value, &self.wanted),
+            (value, None) => self.comparison.holds(value, &self.wanted),
         }
     }
 }

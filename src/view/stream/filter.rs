@@ -18,10 +18,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde_json::Value as Json;
-
 use super::Entry;
-use super::fields::{Comparison, Field};
+use super::fields::Field;
 use crate::address::JausId;
 
 /// Terms that a message must all meet. The empty filter lets everything pass.
@@ -336,29 +334,4 @@ fn is_like(text: &str, wanted: &str) -> bool {
         (text, rest) = (left, behind);
     }
     text.ends_with(rest)
-}
-
-/// How a field's value and what is wanted compare.
-pub(super) fn compare(comparison: Comparison, value: &Json, wanted: &str) -> bool {
-    let number = wanted.parse::<f64>().ok();
-    match (comparison, value.as_f64(), number) {
-        (Comparison::Equal, Some(value), Some(wanted)) => value == wanted,
-        (Comparison::Unequal, Some(value), Some(wanted)) => value != wanted,
-        (Comparison::Less, Some(value), Some(wanted)) => value < wanted,
-        (Comparison::AtMost, Some(value), Some(wanted)) => value <= wanted,
-        (Comparison::More, Some(value), Some(wanted)) => value > wanted,
-        (Comparison::AtLeast, Some(value), Some(wanted)) => value >= wanted,
-        _ => {
-            let plain = match value {
-                Json::String(text) => text.to_lowercase(),
-                other => other.to_string().to_lowercase(),
-            };
-            match comparison {
-                Comparison::Equal => plain == wanted.to_lowercase(),
-                Comparison::Unequal => plain != wanted.to_lowercase(),
-                Comparison::Contains => plain.contains(&wanted.to_lowercase()),
-                _ => false,
-            }
-        }
-    }
 }

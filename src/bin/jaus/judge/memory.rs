@@ -1,11 +1,42 @@
-//! What a run remembers from one exchange to the next.
+//! What a run remembers from one exchange to the next, and of whom.
 
 use std::collections::BTreeMap;
 
 use jaus::address::JausId;
 use serde_json::Value as Json;
 
-use super::step::{Speaker, Stream};
+/// One of the five components that the judge speaks with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Speaker {
+    /// 42.1.1: asks, subscribes and drives.
+    Main,
+    /// 42.2.1: takes control first.
+    First,
+    /// 42.2.2: wants control with too little authority.
+    Second,
+    /// 42.2.3: takes control from the first.
+    Third,
+    /// 42.2.4: declares emergencies.
+    Fourth,
+}
+
+impl Speaker {
+    pub(super) const ALL: [Self; 5] = [
+        Self::Main,
+        Self::First,
+        Self::Second,
+        Self::Third,
+        Self::Fourth,
+    ];
+}
+
+/// An event stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Stream {
+    pub(super) id: u8,
+    /// The code of the report that it carries.
+    pub(super) report: u16,
+}
 
 /// What earlier answers told, for later questions and checks.
 #[derive(Debug)]

@@ -12,31 +12,7 @@ use bytes::Bytes;
 use jaus::codec::Message;
 
 use super::memory::Memory;
-
-/// One of the five components that the judge speaks with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Speaker {
-    /// 42.1.1: asks, subscribes and drives.
-    Main,
-    /// 42.2.1: takes control first.
-    First,
-    /// 42.2.2: wants control with too little authority.
-    Second,
-    /// 42.2.3: takes control from the first.
-    Third,
-    /// 42.2.4: declares emergencies.
-    Fourth,
-}
-
-impl Speaker {
-    pub(super) const ALL: [Self; 5] = [
-        Self::Main,
-        Self::First,
-        Self::Second,
-        Self::Third,
-        Self::Fourth,
-    ];
-}
+pub(super) use super::memory::{Speaker, Stream};
 
 /// Where the steps come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -190,14 +166,6 @@ pub(super) struct Expectation {
 
 /// Which event streams are meant: their ids and the codes of the reports in them, as remembered.
 pub(super) type Streams = fn(&Memory) -> Result<Vec<Stream>, String>;
-
-/// An event stream.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Stream {
-    pub(super) id: u8,
-    /// The code of the report that it carries.
-    pub(super) report: u16,
-}
 
 /// Periodic events to the main speaker, watched for a while.
 pub(super) struct Watch {

@@ -1,5 +1,6 @@
-//! Where programs are: beside `jaus` itself, then in the search path.
+//! Where programs are: beside `jaus` itself, then in the search path; and how paths are written.
 
+use std::borrow::Cow;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -29,7 +30,7 @@ impl Programs {
     /// from `base`.
     pub(super) fn find(&self, name: &str, base: &Path) -> Result<PathBuf, String> {
         if name.contains('/') {
-            let path = base.join(super::system::home(name));
+            let path = base.join(home(name));
             return match is_program(&path) {
                 true => Ok(path),
                 false => Err(format!("there is no program {}", path.display())),
@@ -67,4 +68,13 @@ impl Programs {
 fn is_program(path: &Path) -> bool {
     let runs = |it: fs::Metadata| it.is_file() && it.permissions().mode() & 0o111 != 0;
     fs::metadata(path).is_ok_and(runs)
+}
+
+/// A path in which `~/` stands for the user's own folder.
+pub(super) fn home(path: &str) -> Cow<'_, Path> {
+    let own = path.strip_prefix("~/").zip(std::env::home_dir());
+    match own {
+        Some((rest, home)) => home.join(rest).into(),
+        None => Path::new(path).into(),
+    }
 }

@@ -1,7 +1,6 @@
 //! The file that says what a system is: TOML, read so that every mistake in it is told at once,
 //! each with its line and what would be right.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;
@@ -12,7 +11,7 @@ use jaus::cli::settings::{self, Mistake};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::programs::Programs;
+use super::programs::{Programs, home};
 
 /// What runs on this machine, in the order of the file.
 #[derive(Debug)]
@@ -115,15 +114,6 @@ impl System {
         self.parts
             .retain(|part| names.is_empty() || names.contains(&part.name));
         Ok(self)
-    }
-}
-
-/// A path in which `~/` stands for the user's own folder.
-pub(super) fn home(path: &str) -> Cow<'_, Path> {
-    let own = path.strip_prefix("~/").zip(std::env::home_dir());
-    match own {
-        Some((rest, home)) => home.join(rest).into(),
-        None => Path::new(path).into(),
     }
 }
 
