@@ -1,6 +1,7 @@
 //! `jaus-ra-gateway`: OpenJAUS 3.3 and other RA 3.x systems among JAUS components, and the other way
 //! round.
 
+use std::net::Ipv4Addr;
 use std::process::ExitCode;
 use std::str::FromStr;
 use std::time::Duration;
@@ -71,6 +72,11 @@ struct RaNetwork {
     /// The multicast group of the RA network, or off
     #[arg(long, value_name = "ADDRESS", default_value = "224.1.0.1:3794")]
     ra_group: Group,
+
+    /// A host of the RA network that multicast does not reach, by its IPv4 address: heartbeats and what
+    /// else goes to the group go to it, too (repeatable)
+    #[arg(long, value_name = "ADDRESS")]
+    ra_peer: Vec<Ipv4Addr>,
 
     /// Our UDP port there. RA systems answer to 3794, whatever it is
     #[arg(long, value_name = "PORT", default_value_t = STANDARD_PORT)]
@@ -155,6 +161,7 @@ impl Ready for Flags {
         jaus-ra-gateway --interface eth0                  both networks on one cable\n  \
         jaus-ra-gateway --interface eth0 --ra-interface eth1\n  \
         jaus-ra-gateway --interface eth0 --framing judp   for JUDP_Interface: true\n  \
+        jaus-ra-gateway --interface eth0 --ra-peer 10.1.2.3   beyond a router\n  \
         jaus-ra-gateway --interface eth0 --ra-offset 1000 RA subsystem 20 is 1020 among JAUS\n  \
         jaus-ra-gateway --interface eth0 --show 101 --stats=10s";
     const ID: JausId = JausId::new(250, 1, 1);
@@ -202,6 +209,8 @@ impl Flags {
         if !self.show.is_empty() {
             settings.show = Show::Only(self.show.iter().copied().collect());
         }
+        let peers = self.ra.ra_peer.iter().copied();
+        settings.ra.carrier.peers = peers.map(Into::into).collect();
         settings.ra.carrier.group_dialects = match self.ra.framing {
             // In the framings that are heard; all RA systems tell regularly that they are there.
             Framing::Auto => Vec::new(),

@@ -100,6 +100,13 @@ impl Addresses {
         Some((place.address, place.dialect))
     }
 
+    /// In which framing a host writes, if it has been heard.
+    pub(super) fn dialect_at(&self, host: IpAddr) -> Option<Dialect> {
+        let mut places = self.places.values();
+        let place = places.find(|place| place.address.ip() == host)?;
+        Some(place.dialect)
+    }
+
     /// Whether somebody writes in that framing.
     pub(super) fn speaks(&self, dialect: Dialect) -> bool {
         self.places.values().any(|place| place.dialect == dialect)

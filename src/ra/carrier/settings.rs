@@ -26,6 +26,10 @@ pub struct Settings {
     /// that somebody is heard to use is added by itself; where others are used, one that nobody
     /// uses is left out nine times of ten. Answers go in the framing of what was heard last.
     pub group_dialects: Vec<Dialect>,
+    /// Hosts that multicast does not reach: what goes to the group goes to each of them, too. Who of
+    /// them has not been heard yet gets it in the framings of the group, or, if there are none, in
+    /// both in turn.
+    pub peers: Vec<IpAddr>,
     /// The header versions that are accepted, of 0 (RA 2.x), 1 (3.0 and 3.1) and 2 (3.2 and 3.3).
     pub versions: Vec<u8>,
     /// The most subsystems whose address is remembered; there are no more than 254.
@@ -58,6 +62,7 @@ impl Default for Settings {
         Self {
             port: judp::PORT,
             group_dialects: vec![Dialect::Opc],
+            peers: Vec::new(),
             versions: vec![2],
             max_subsystems: 254,
             max_message: 1 << 20,

@@ -96,8 +96,12 @@ impl Carrier {
     /// Where what is for a subsystem goes, and how.
     fn ways(&mut self, from: u8, to: u8) -> Result<Vec<(To, Dialect)>, SendError> {
         if to == RaId::ALL {
-            let dialects = self.group_dialects(from);
-            return Ok(dialects.map(|dialect| (To::Group, dialect)).collect());
+            let sent = self.group_sent.entry(from).or_default();
+            let turn = *sent;
+            *sent = sent.wrapping_add(1);
+            let group = self.group_dialects(turn);
+            let group = group.map(|dialect| (To::Group, dialect));
+            return Ok(group.chain(self.to_peers(turn)).collect());
         }
         let known = self.addresses.of(to);
         let (address, dialect) = known.ok_or(SendError::Unknown(to))?;
@@ -108,16 +112,30 @@ impl Carrier {
     /// configured. OpenJAUS reports each datagram of a framing that is not its own as an error; so
     /// where others are spoken, one that nobody speaks is used each tenth time only. Who does speak
     /// it is heard by then.
-    fn group_dialects(&mut self, from: u8) -> impl Iterator<Item = Dialect> + '_ {
+    fn group_dialects(&self, turn: u32) -> impl Iterator<Item = Dialect> + '_ {
         const RARELY: u32 = 10;
-        let sent = self.group_sent.entry(from).or_default();
-        let is_turn = sent.is_multiple_of(RARELY);
-        *sent = sent.wrapping_add(1);
+        let is_turn = turn.is_multiple_of(RARELY);
         let all = [Dialect::Opc, Dialect::As5669].into_iter();
         let is_quiet = !all.clone().any(|dialect| self.addresses.speaks(dialect));
         all.filter(move |&dialect| {
             let configured = self.settings.group_dialects.contains(&dialect);
             self.addresses.speaks(dialect) || (configured && (is_quiet || is_turn))
+        })
+    }
+
+    /// The same for the hosts that multicast does not reach: each in its own framing; who was not
+    /// heard yet waits for the first word, and gets it in one of those that it may understand.
+    fn to_peers(&self, turn: u32) -> impl Iterator<Item = (To, Dialect)> + '_ {
+        let configured = self.settings.group_dialects.as_slice();
+        let candidates = match configured {
+            [] => &[Dialect::Opc, Dialect::As5669],
+            some => some,
+        };
+        let next = candidates[turn as usize % candidates.len()];
+        self.settings.peers.iter().map(move |&host| {
+            let to = SocketAddr::new(host, self.settings.port);
+            let dialect = self.addresses.dialect_at(host).unwrap_or(next);
+            (To::Address(to), dialect)
         })
     }
 

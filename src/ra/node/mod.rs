@@ -11,6 +11,10 @@
 //! All questions come from the node manager of our first subsystem. While we show nothing, nobody is
 //! asked.
 //!
+//! [Hosts that multicast does not reach](super::carrier::Settings::peers) are heard by whatever they
+//! send, for their heartbeats go to the group: while nothing comes from one, it is asked for its
+//! pulse.
+//!
 //! Everything else that is for a component of ours comes out as [`Event::Message`].
 
 mod answer;
@@ -96,7 +100,11 @@ impl RaNode {
 
     /// A datagram has come.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: Bytes) {
+        let is_out_of_reach = self.settings.carrier.peers.contains(&from.ip());
         for message in self.carrier.handle_datagram(now, from, datagram) {
+            if is_out_of_reach && !self.peers.contains_key(&message.source.subsystem) {
+                self.handle_heartbeat(now, message.source);
+            }
             self.handle_message(now, message);
         }
     }

@@ -12,9 +12,12 @@ use std::time::Instant;
 
 use super::RaNode;
 use super::own::Own;
+use super::peer::Peer;
 use crate::codec::Message as _;
 use crate::messages::ra33::query_configuration::QueryField;
-use crate::messages::ra33::{QueryConfiguration, ReportConfiguration, ReportHeartbeatPulse};
+use crate::messages::ra33::{
+    QueryConfiguration, QueryHeartbeatPulse, ReportConfiguration, ReportHeartbeatPulse,
+};
 use crate::ra::carrier::SendError;
 use crate::ra::{Message, RaId};
 
@@ -32,6 +35,31 @@ impl RaNode {
         let code = ReportHeartbeatPulse::CODE;
         let heartbeat = Message::new(own.communicator(), everybody, code, bytes::Bytes::new());
         self.transmit(&heartbeat);
+        if let Some(asker) = self.asker().filter(|asker| asker.subsystem == subsystem) {
+            self.feel_pulses(now, asker);
+        }
+    }
+
+    /// Asks those whose heartbeats do not come here, and who have been silent for a while, whether
+    /// they are still there.
+    fn feel_pulses(&mut self, now: Instant, asker: RaId) {
+        let named = &self.settings.carrier.peers;
+        let is_silent = |(id, peer): &(&u8, &Peer)| {
+            let host = self.carrier.address(**id).map(|address| address.ip());
+            let since = now.saturating_duration_since(peer.heard);
+            host.is_some_and(|host| named.contains(&host)) && since >= self.settings.heartbeat
+        };
+        let silent = self.peers.iter().filter(is_silent);
+        let silent: Vec<_> = silent.map(|(_, peer)| peer.communicator).collect();
+        for communicator in silent {
+            let code = QueryHeartbeatPulse::CODE;
+            self.transmit(&Message::new(
+                asker,
+                communicator,
+                code,
+                bytes::Bytes::new(),
+            ));
+        }
     }
 
     /// Tells what has changed in a subsystem of ours, if it is time to.

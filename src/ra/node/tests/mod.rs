@@ -4,6 +4,7 @@ mod anything;
 mod hostile;
 mod meeting;
 mod openjaus;
+mod unicast;
 
 use std::collections::VecDeque;
 use std::net::SocketAddr;
@@ -64,6 +65,8 @@ struct Host {
 struct World {
     now: Instant,
     hosts: Vec<Host>,
+    /// Whether datagrams for the group arrive.
+    multicast: bool,
     /// Loses every so many-th datagram; 0 loses none.
     loses: u32,
     sent: u32,
@@ -71,14 +74,19 @@ struct World {
 
 impl World {
     fn new(hosts: u8) -> Self {
+        Self::with(hosts, &Settings::default())
+    }
+
+    fn with(hosts: u8, settings: &Settings) -> Self {
         let host = |number| Host {
-            node: RaNode::new(Settings::default()),
+            node: RaNode::new(settings.clone()),
             address: address(number),
             events: Vec::new(),
         };
         Self {
             now: start(),
             hosts: (1..=hosts).map(host).collect(),
+            multicast: true,
             loses: 0,
             sent: 0,
         }
@@ -113,7 +121,10 @@ impl World {
             }
             let source = self.hosts[from].address;
             for (to, host) in self.hosts.iter_mut().enumerate() {
-                let meant = transmit.to == To::Group || transmit.to == To::Address(host.address);
+                let meant = match transmit.to {
+                    To::Group => self.multicast,
+                    To::Address(address) => address == host.address,
+                };
                 if to != from && meant {
                     let datagram = transmit.datagram.clone();
                     host.node.handle_datagram(self.now, source, datagram);
