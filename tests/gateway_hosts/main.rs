@@ -72,26 +72,36 @@ impl Drop for Gateway {
 #[test]
 fn an_ra_vehicle_is_found_watched_and_driven_from_jaus() {
     let test = "an_ra_vehicle_is_found_watched_and_driven_from_jaus";
-    on_two_hosts(test, |hosts| {
-        let gateway = Gateway::start(hosts, &["--stats", "--json"]);
-        let vehicle = hosts.start(0, "ra-vehicle");
-        vehicle.says("listening on");
-        let operator = hosts.start(1, "operator");
-        assert_eq!(operator.says("found 20.1.38"), "Pose");
-        assert!(operator.says("latitude").starts_with("37.2"));
-        let poses: u32 = operator.says("poses in 3 s").parse().unwrap();
-        assert!((25..=35).contains(&poses), "{poses}");
-        operator.says("in control");
-        vehicle.says("controlled by 250.1.32.1");
-        vehicle.says("driven");
-        operator.says("released");
-        vehicle.says("controlled by nobody");
-        let printed = gateway.end();
-        let report: serde_json::Value = serde_json::from_str(&printed).unwrap();
-        let components = report["ra_components"].as_array().unwrap();
-        let pose = components.iter().find(|it| it["ra"] == "20.1.38.1");
-        assert_eq!(pose.unwrap()["jaus"], "20.1.38", "{printed}");
-    });
+    on_two_hosts(test, |hosts| watch_and_drive(hosts, &[]));
+}
+
+#[test]
+fn an_ra_vehicle_that_multicast_does_not_reach_is_driven_when_it_is_named() {
+    let test = "an_ra_vehicle_that_multicast_does_not_reach_is_driven_when_it_is_named";
+    let unicast = ["--ra-group", "off", "--ra-peer", "10.213.77.1"];
+    on_two_hosts(test, |hosts| watch_and_drive(hosts, &unicast));
+}
+
+/// An RA vehicle on the first host, seen and driven from the second through a gateway with these flags.
+fn watch_and_drive(hosts: &TwoHosts, flags: &[&str]) {
+    let gateway = Gateway::start(hosts, &[flags, &["--stats", "--json"]].concat());
+    let vehicle = hosts.start(0, "ra-vehicle");
+    vehicle.says("listening on");
+    let operator = hosts.start(1, "operator");
+    assert_eq!(operator.says("found 20.1.38"), "Pose");
+    assert!(operator.says("latitude").starts_with("37.2"));
+    let poses: u32 = operator.says("poses in 3 s").parse().unwrap();
+    assert!((25..=35).contains(&poses), "{poses}");
+    operator.says("in control");
+    vehicle.says("controlled by 250.1.32.1");
+    vehicle.says("driven");
+    operator.says("released");
+    vehicle.says("controlled by nobody");
+    let printed = gateway.end();
+    let report: serde_json::Value = serde_json::from_str(&printed).unwrap();
+    let components = report["ra_components"].as_array().unwrap();
+    let pose = components.iter().find(|it| it["ra"] == "20.1.38.1");
+    assert_eq!(pose.unwrap()["jaus"], "20.1.38", "{printed}");
 }
 
 #[test]
