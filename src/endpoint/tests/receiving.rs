@@ -137,20 +137,29 @@ fn every_message_of_a_datagram_is_delivered() {
 
 #[test]
 fn stale_octets_behind_a_message_are_counted_and_nothing_else() {
-    let mut rig = Rig::new();
     let message = judp::encode(&from_peer(QUERY_IDENTIFICATION)).unwrap();
-    rig.hear_octets(
-        PEER_HOST,
-        [&message[..], b"jaus:jss:core:Time"].concat().into(),
-    );
-    assert_eq!(rig.received().len(), 1);
-    assert_eq!(
-        (
-            rig.count(Counter::StaleOctets),
-            rig.count(Counter::Malformed)
-        ),
-        (18, 0)
-    );
+    // The end of a name; and what has the form of a message, but is for nobody.
+    let for_nobody = judp::encode(&Frame {
+        source: id("42.1.9"),
+        destination: id("101.0.1"),
+        ..from_peer(QUERY_HEARTBEAT)
+    });
+    for stale in [&b"jaus:jss:core:Time"[..], &for_nobody.unwrap()[1..]] {
+        let mut rig = Rig::new();
+        rig.hear_octets(PEER_HOST, [&message[..], stale].concat().into());
+        assert_eq!(rig.received().len(), 1);
+        assert_eq!(
+            [
+                Counter::MessagesReceived,
+                Counter::StaleOctets,
+                Counter::Malformed
+            ]
+            .map(|counter| rig.count(counter)),
+            [1, stale.len() as u64, 0]
+        );
+        let known: Vec<_> = rig.endpoint.peers().map(|peer| peer.id).collect();
+        assert_eq!(known, [PEER], "nobody else is learned");
+    }
 }
 
 #[test]
@@ -253,7 +262,21 @@ fn a_restarted_peer_does_not_lose_its_first_messages() {
     }
     assert_eq!(
         (rig.received().len(), rig.count(Counter::Duplicate)),
-        (9, 0)
+        (9, 0),
+        "the same once more after a short time"
+    );
+    // What wants an acknowledgement may be repeated for longer; then it is the same in all.
+    for payload in [&b"\x02\x20\x01"[..], b"\x02\x20\x02", b"\x02\x20\x03"] {
+        rig.hear(&Frame {
+            flags: Flags::default().with_acknowledgement(Acknowledgement::Request),
+            ..from_peer(payload)
+        });
+        rig.pass(Duration::from_millis(100));
+    }
+    assert_eq!(
+        (rig.received().len(), rig.count(Counter::Duplicate)),
+        (3, 0),
+        "other content with the same number"
     );
 }
 
