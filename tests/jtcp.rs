@@ -17,6 +17,7 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::node::{Config, Node, Peer, Port, StartError};
+use jaus::peer::Peer as Known;
 use jaus::wire::jtcp::{self, Decoder};
 use jaus::wire::{Acknowledgement, Frame, Version};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -281,6 +282,27 @@ async fn each_id_is_answered_on_the_connection_on_which_it_was_heard_last() {
     assert_eq!(again.read().await.unwrap().destination, ids[0]);
 }
 
+/// Junior takes the first messages of a node that is started again for duplicates of earlier ones,
+/// if their numbers are the same.
+#[tokio::test]
+async fn a_node_begins_at_a_number_by_chance() {
+    let mut numbers = Vec::new();
+    for _start in 0..4 {
+        let vehicle = Node::start(listening(101)).unwrap();
+        let mut driver = vehicle.attach(1).unwrap();
+        let mut junior = Scripted::connect(address(&vehicle)).await;
+        let query = frame(JausId::new(2, 1, 1), driver.id(), 1);
+        junior.write(&jtcp::encode(&query).unwrap()).await;
+        receive(&mut driver).await;
+        driver
+            .send(to(&driver, query.source, REPORT_HEARTBEAT))
+            .unwrap();
+        numbers.push(junior.read().await.unwrap().sequence);
+    }
+    numbers.dedup();
+    assert!(numbers.len() > 1, "each began with {numbers:?}");
+}
+
 /// JAUS++ writes the version octet before each message, as a segment of its own.
 #[tokio::test]
 async fn a_version_octet_before_each_message_is_taken() {
@@ -295,6 +317,35 @@ async fn a_version_octet_before_each_message_is_taken() {
     }
     for _ in 0..3 {
         assert_eq!(receive(&mut driver).await.payload, QUERY_HEARTBEAT);
+    }
+}
+
+/// Register Services to another subsystem is what others might send too; the version octet before
+/// each message besides makes it certain.
+#[tokio::test]
+async fn jauspp_is_recognised_by_the_version_octets_in_its_stream() {
+    let registration = Bytes::from_static(b"\x00\x0B\x00");
+    let vehicle = Node::start(listening(101)).unwrap();
+    let mut driver = vehicle.attach(1).unwrap();
+    for (id, again, profile) in [
+        (JausId::new(2, 1, 1), &[2][..], Known::JausPlusPlus),
+        (JausId::new(3, 1, 1), &[], Known::Standard),
+    ] {
+        let message = |sequence| Frame {
+            payload: registration.clone(),
+            ..frame(id, driver.id(), sequence)
+        };
+        let [first, second] = [7, 8].map(|it| jtcp::encode(&message(it)).unwrap());
+        let mut peer = Scripted::connect(address(&vehicle)).await;
+        peer.write(&[&first, again, &second[1..]].concat()).await;
+        for _message in 0..2 {
+            receive(&mut driver).await;
+        }
+        let recognised = || {
+            let known = vehicle.peers().into_iter().find(|it| it.id == id);
+            known.is_some_and(|it| it.profile == profile)
+        };
+        until("recognising it", recognised).await;
     }
 }
 

@@ -90,6 +90,13 @@ impl Endpoint {
         self.receive(now, from, frame);
     }
 
+    /// Takes note that a version octet stood before the latest frame of `source` in the middle of a
+    /// TCP stream, which tells something of who it is.
+    pub fn handle_repeated_version(&mut self, source: JausId) {
+        self.peers
+            .recognise(source, peer::Recogniser::handle_repeated_version);
+    }
+
     /// Whether anything may come by a path.
     fn check_path(&self, from: Path) -> Result<(), Counter> {
         if !self.links.contains_key(&from.link) {

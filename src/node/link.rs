@@ -138,10 +138,17 @@ impl Link {
                 true
             }
             Self::Tcp(link) => link.receive(cx, now, |arrival| match arrival {
-                Arrival::Frame(peer, frame) => {
-                    let path = from(Remote::Socket(peer));
+                Arrival::Frame {
+                    remote,
+                    frame,
+                    version_again,
+                } => {
+                    let path = from(Remote::Socket(remote));
                     taps.frame(path, &frame);
                     endpoint.handle_frame(now, path, &frame);
+                    if version_again {
+                        endpoint.handle_repeated_version(frame.source);
+                    }
                 }
                 Arrival::Closed(peer, _) => endpoint.forget_path(from(Remote::Socket(peer))),
             }),

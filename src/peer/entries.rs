@@ -215,7 +215,7 @@ departures! {
         does: "writes the version octet before each message of a TCP stream, as a segment of its \
                own",
         source: Source::Recorded,
-        told: Told::NeedNotBe,
+        told: Told::By(&[Sign::RepeatedVersion]),
         ours: "both ways of writing are read. It hangs when a message of ours comes in two \
                segments: use UDP with it",
         place: "src/wire/jtcp/decoder.rs",
@@ -228,7 +228,11 @@ departures! {
         does: "opens a TCP connection to whoever it hears by UDP, writes on it, and reads only those \
                that others opened",
         source: Source::Recorded,
-        told: Told::By(&[Sign::RegistersAcrossSubsystems, Sign::StaleOctets]),
+        told: Told::By(&[
+            Sign::RegistersAcrossSubsystems,
+            Sign::StaleOctets,
+            Sign::RepeatedVersion,
+        ]),
         ours: "whoever is known by UDP is answered by UDP; where there is TCP alone, give its id \
                with `tcp.connect`, so that we open a connection of our own",
         place: "src/endpoint/receive.rs",

@@ -205,6 +205,11 @@ impl Connection {
         }
     }
 
+    /// Whether a version octet stood before the latest frame that was not the stream's first octet.
+    pub(super) const fn repeats_version(&self) -> bool {
+        self.decoder.repeats_version()
+    }
+
     fn poll_read(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Closed>> {
         loop {
             if let Err(e) = ready!(self.stream.poll_read_ready(cx)) {

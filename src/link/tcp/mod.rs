@@ -101,7 +101,14 @@ pub struct ConnectionReport {
 #[derive(Debug)]
 pub enum Arrival {
     /// A message came from this remote address.
-    Frame(SocketAddr, Frame),
+    Frame {
+        /// The remote address.
+        remote: SocketAddr,
+        /// The message.
+        frame: Frame,
+        /// Whether a version octet stood before it that was not the stream's first octet.
+        version_again: bool,
+    },
     /// The connection with this remote address is gone.
     Closed(SocketAddr, Closed),
 }
@@ -248,7 +255,11 @@ impl TcpLink {
             let mut batch = 0;
             while let Poll::Ready(result) = connection.poll_recv(cx) {
                 match result {
-                    Ok(frame) => arrived(Arrival::Frame(remote, frame)),
+                    Ok(frame) => arrived(Arrival::Frame {
+                        remote,
+                        frame,
+                        version_again: connection.repeats_version(),
+                    }),
                     Err(closed) => {
                         self.closed.push_back((remote, closed));
                         break;

@@ -35,6 +35,9 @@ pub struct Decoder {
     input: BytesMut,
     /// Octets of the stream before those in `input`.
     offset: usize,
+    /// Whether a version octet stands before what comes next, besides the stream's first.
+    version_again: bool,
+    repeats_version: bool,
     failed: Option<Error>,
 }
 
@@ -70,6 +73,13 @@ impl Decoder {
         self.version
     }
 
+    /// Whether a version octet stood before the latest frame that was not the stream's first octet.
+    /// JAUS++ writes one before each.
+    #[must_use]
+    pub const fn repeats_version(&self) -> bool {
+        self.repeats_version
+    }
+
     /// How many octets wait for the rest of their message.
     #[must_use]
     pub fn buffered(&self) -> usize {
@@ -100,7 +110,10 @@ impl Decoder {
         loop {
             match self.look(version)? {
                 None => return Ok(None),
-                Some(Next::Version) => self.skip(1),
+                Some(Next::Version) => {
+                    self.skip(1);
+                    self.version_again = true;
+                }
                 Some(Next::Message(size)) if self.input.len() < size => {
                     self.input.reserve(size - self.input.len());
                     return Ok(None);
@@ -152,6 +165,7 @@ impl Decoder {
             self.input.advance(size);
         }
         self.offset = self.offset.wrapping_add(size);
+        self.repeats_version = std::mem::take(&mut self.version_again);
         Ok(frame)
     }
 

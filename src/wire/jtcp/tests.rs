@@ -56,6 +56,23 @@ fn a_version_octet_before_each_message_is_read() {
 }
 
 #[test]
+fn a_version_octet_is_told_of_the_message_that_it_stands_before() {
+    let [first, second] = JAUSPP;
+    let stream = hex(&format!("02 {first} 02 {second} {second} 02 {first}"));
+    for size in [stream.len(), 1, 7] {
+        let mut decoder = Decoder::new();
+        let mut told = Vec::new();
+        for part in stream.chunks(size) {
+            decoder.input().extend_from_slice(part);
+            while decoder.next_frame().unwrap().is_some() {
+                told.push(decoder.repeats_version());
+            }
+        }
+        assert_eq!(told, [false, true, false, true], "in parts of {size}");
+    }
+}
+
+#[test]
 fn a_message_of_the_reserved_type_2_is_no_version_octet() {
     let reserved = "02 1100 01 01016600 01016500 002b02 0700";
     let frames = decode(&format!("02 {reserved} {} 02 {}", JAUSPP[0], JAUSPP[1])).unwrap();
