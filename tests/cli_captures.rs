@@ -310,6 +310,20 @@ fn a_large_message_is_shown_in_parts_and_then_whole_in_both_styles() {
 }
 
 #[test]
+fn messages_of_the_reference_architecture_are_read_and_written_without_their_headers() {
+    let pose = "02440100aaaaaa2a\n";
+    let read = run(&["decode", "--hex", "--ra"], pose.as_bytes());
+    let line = read.only_line();
+    assert_eq!(line["service"], "urn:jaus-rs:ra33:GlobalPoseSensor");
+    assert_eq!(line["body"]["Latitude"], 30.0);
+    // The line names the service; a message that does not needs the flag.
+    assert_eq!(run(&["encode"], read.stdout.as_bytes()).stdout, pose);
+    let named = br#"{"message":"ReportGlobalPose","body":{"Latitude":30}}"#;
+    assert_eq!(run(&["encode", "--ra"], named).stdout, pose);
+    assert_ne!(run(&["encode"], named).stdout, pose);
+}
+
+#[test]
 fn another_port_is_read_if_asked_for() {
     let capture = pcap_of(&[Message::new(QUERY_IDENTIFICATION).datagram()]);
     assert_eq!(run(&["decode", "-", "--port", "4000"], &capture).stdout, "");

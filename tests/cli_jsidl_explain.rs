@@ -57,7 +57,7 @@ fn older_headers_stale_octets_and_files_of_octets_are_explained_as_well() {
     let octets: Vec<u8> = [
         &[1, 0, 0, 0, 17][..],
         &[
-            6, 2, 0x00, 0x2B, 255, 255, 255, 255, 7, 1, 0xE8, 3, 1, 0, 0, 0,
+            6, 2, 0x00, 0x2B, 255, 255, 255, 255, 7, 1, 101, 0, 1, 0, 0, 0,
         ],
         &[2, 9, 9, 9],
     ]
@@ -81,6 +81,48 @@ fn older_headers_stale_octets_and_files_of_octets_are_explained_as_well() {
         (&query["offset"], &query["raw"]),
         (&Json::from(21), &Json::from(2))
     );
+}
+
+/// Recorded of OpenJAUS 3.3.1, which sets all bits of a presence vector: 20.1.35.1 confirms an event
+/// to 10.1.1.1.
+#[test]
+fn messages_of_openjaus_are_explained_by_the_definitions_of_the_reference_architecture() {
+    let message = "f301 ff 00 014b 00 0000 00";
+    let header = "0602 f301 0101010a 01230114 0800 0000";
+    let data = &message[5..];
+    for (prefix, transport) in [("4a41555330312e30", "ra"), ("01 0000 0018", "judp1")] {
+        let input = format!("{prefix} {header} {data}");
+        let run = run(&["jsidl", "explain", "--json", &input], b"");
+        let line = run.only_line();
+        assert_eq!((run.status, &line["transport"]), (0, &transport.into()));
+        assert_eq!(line["messages"][0]["service"], "urn:jaus-rs:ra33:Events");
+        let rows = line["rows"].as_array().unwrap();
+        let octets = rows.iter().map(|row| row["octets"].as_str().unwrap());
+        assert_eq!(octets.collect::<String>(), input.replace(' ', ""));
+        let vector = rows.iter().find(|row| row["kind"] == "presence vector");
+        let note = "bits without a field are passed over";
+        assert_eq!(vector.unwrap()["note"], note);
+    }
+    let run = run(&["jsidl", "explain", "--ra", message], b"");
+    assert!(
+        run.status == 0
+            && run
+                .stdout
+                .starts_with("ConfirmEventRequest 01F3h of urn:jaus-rs:ra33"),
+        "{run:?}"
+    );
+}
+
+#[test]
+fn a_message_that_only_the_reference_architecture_can_read_has_a_hint() {
+    // Its Report Identification, whose name has a fixed length.
+    let name = format!("004b 02 0000 00 {}", "4f".repeat(80));
+    let run_it = run(&["jsidl", "explain", &name], b"");
+    assert_eq!(run_it.status, 1);
+    let hint =
+        "as a message of the Reference Architecture (OpenJAUS 3.x) all of it can be read: --ra";
+    assert!(run_it.stdout.contains(hint), "{}", run_it.stdout);
+    assert_eq!(run(&["jsidl", "explain", "--ra", &name], b"").status, 0);
 }
 
 #[test]

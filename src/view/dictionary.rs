@@ -33,6 +33,8 @@ pub struct Dictionary {
     /// The Reference Architecture's, whose codes are those of other layouts in `by_code`.
     ra: BTreeMap<u16, Definition>,
     preferred: Vec<ServiceName>,
+    /// Whether all of `ra` is preferred.
+    prefers_ra: bool,
 }
 
 /// How much of a name must be right for it to be taken for a slip: 1 is all of it.
@@ -107,6 +109,7 @@ impl Dictionary {
             by_code,
             ra: BTreeMap::new(),
             preferred: Vec::new(),
+            prefers_ra: false,
         }
     }
 
@@ -187,7 +190,8 @@ impl Dictionary {
     /// # Errors
     /// If no definition here belongs to such a service.
     pub fn prefer(&mut self, service: ServiceName) -> Result<(), Unreadable> {
-        let all = || self.by_code.values().flatten().flat_map(|d| &d.services);
+        let definitions = || self.by_code.values().flatten().chain(self.ra.values());
+        let all = || definitions().flat_map(|d| &d.services);
         if all().any(|known| service.matches(known)) {
             self.preferred.push(service);
             return Ok(());
@@ -209,6 +213,19 @@ impl Dictionary {
         ))
     }
 
+    /// Takes the Reference Architecture's definitions wherever it has any, for messages without a
+    /// header, which would tell.
+    pub fn prefer_reference_architecture(&mut self) {
+        self.prefers_ra = true;
+    }
+
+    /// The Reference Architecture's definition for a code, if that is preferred.
+    fn preferred_ra(&self, code: u16) -> Option<&Definition> {
+        let preferred = |it: &Id| self.prefers_ra || self.is_preferred(it);
+        let known = self.ra.get(&code);
+        known.filter(|definition| definition.services.iter().any(preferred))
+    }
+
     /// The name of the messages with this code, if it is known.
     pub fn name_of(&self, code: u16) -> Option<&str> {
         self.candidates(code).next().map(Definition::name)
@@ -222,6 +239,9 @@ impl Dictionary {
                 format!("a message begins with the two octets of its code, here are {count}");
             return Reading::unknown(None, Unreadable::new(problem, 0));
         };
+        if let Some(definition) = self.preferred_ra(code) {
+            return self.reading(code, 0, definition, definition.decode(octets));
+        }
         let mut failure = None;
         for (rank, definition) in self.candidates(code).enumerate() {
             match definition.decode(octets) {
@@ -322,6 +342,9 @@ impl Dictionary {
 
     /// The definitions that a request may mean, best first; at least one.
     fn requested(&self, request: &Request) -> Result<Vec<&Definition>, Unreadable> {
+        if let Some(of_ra) = self.requested_of_ra(request) {
+            return Ok(vec![of_ra]);
+        }
         let codes = match request.code {
             Some(code) => vec![code],
             None => self.by_code.keys().copied().collect(),
@@ -356,6 +379,23 @@ impl Dictionary {
             return Err(Unreadable::new(problem, 0));
         }
         Ok(of_service)
+    }
+
+    /// The definition of the Reference Architecture that a request means: it names the service, or
+    /// these definitions are preferred.
+    fn requested_of_ra(&self, request: &Request) -> Option<&Definition> {
+        let is_it = |it: &&Definition| {
+            request.code.is_none_or(|code| code == it.code())
+                && request
+                    .message
+                    .as_deref()
+                    .is_none_or(|name| name == it.name())
+                && match &request.service {
+                    Some(service) => it.belongs_to(service),
+                    None => self.preferred_ra(it.code()).is_some(),
+                }
+        };
+        self.ra.values().find(is_it)
     }
 
     /// What to say about a message that is not here.

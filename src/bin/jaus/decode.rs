@@ -34,6 +34,11 @@ pub(crate) struct Decode {
     #[arg(long)]
     hex: bool,
 
+    /// Read messages without their headers by the definitions of the Reference Architecture (RA 3.x,
+    /// OpenJAUS 3.x); in a capture the headers tell
+    #[arg(long, requires = "hex")]
+    ra: bool,
+
     /// The UDP port that JAUS messages come from or go to (repeatable)
     #[arg(long, value_name = "PORT", default_values_t = [JAUS_PORT], conflicts_with = "hex")]
     port: Vec<u16>,
@@ -44,7 +49,10 @@ pub(crate) struct Decode {
 
 impl Decode {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        let dictionary = self.definitions.load()?;
+        let mut dictionary = self.definitions.load()?;
+        if self.ra {
+            dictionary.prefer_reference_architecture();
+        }
         let input = open(self.file.as_deref())?;
         let mut printer = Printer {
             output: Output::new(),

@@ -19,13 +19,21 @@ use crate::definitions::Definitions;
     echo '{\"message\":\"QueryIdentification\",\"body\":{\"QueryType\":2}}' | jaus encode\n  \
     jaus decode --hex < messages.txt | jaus encode")]
 pub(crate) struct Encode {
+    /// Write messages by the definitions of the Reference Architecture (RA 3.x, OpenJAUS 3.x), also
+    /// those whose "service" is not given
+    #[arg(long)]
+    ra: bool,
+
     #[command(flatten)]
     definitions: Definitions,
 }
 
 impl Encode {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        let dictionary = self.definitions.load()?;
+        let mut dictionary = self.definitions.load()?;
+        if self.ra {
+            dictionary.prefer_reference_architecture();
+        }
         let mut output = Output::new();
         let mut complete = true;
         for line in io::stdin().lock().lines() {

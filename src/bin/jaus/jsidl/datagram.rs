@@ -53,10 +53,11 @@ impl Datagram {
         )
     }
 
-    /// All rows, and the messages among them that are explained.
+    /// All rows, and the messages among them that are explained; `explain` gives nothing for what
+    /// nothing is known of.
     pub(super) fn rows(
         &self,
-        explain: impl Fn(&[u8]) -> Result<Explanation, Failure>,
+        explain: impl Fn(&Frame) -> Result<Option<Explanation>, Failure>,
     ) -> Result<(Vec<Row>, Vec<Explanation>), Failure> {
         let mut rows = Rows {
             octets: &self.octets,
@@ -69,12 +70,15 @@ impl Datagram {
         for (start, frame, end) in &self.frames {
             rows.position = *start;
             rows.header(frame);
-            if self.version == Version::Ra || frame.flags.data() != DataControl::Single {
-                rows.unread(end - trailer(frame), not_explained(frame));
-            } else if !frame.is_acknowledgement() {
-                let message = explain(&frame.payload)?;
+            if frame.flags.data() != DataControl::Single {
+                rows.unread(end - trailer(frame), PART);
+            } else if frame.is_acknowledgement() {
+                // Nothing but a header.
+            } else if let Some(message) = explain(frame)? {
                 rows.message(&message, frame.version);
                 messages.push(message);
+            } else {
+                rows.unread(end - trailer(frame), NOBODYS);
             }
             if trailer(frame) > 0 {
                 rows.number(trailer(frame), "sequence number");
@@ -85,18 +89,16 @@ impl Datagram {
     }
 }
 
+/// What is said of a fragment.
+const PART: &str = "a part of a large message: put the parts together first";
+/// What is said of data whose layout nothing tells.
+const NOBODYS: &str = "unknown to the Reference Architecture; --service chooses another layout";
+
 /// Octets of a frame behind its message.
 const fn trailer(frame: &Frame) -> usize {
     match frame.version {
         Version::As5669a => as5669a::TRAILER_LEN,
         Version::As5669 | Version::Ra => 0,
-    }
-}
-
-fn not_explained(frame: &Frame) -> &'static str {
-    match frame.version {
-        Version::Ra => "a message of the Reference Architecture, which has layouts of its own",
-        _ => "a part of a large message: put the parts together first",
     }
 }
 

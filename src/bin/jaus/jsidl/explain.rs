@@ -1,5 +1,6 @@
 //! `jaus jsidl explain`: the octets of a message or datagram, one by one.
 
+use std::cell::LazyCell;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -10,11 +11,12 @@ use clap::Args;
 use jaus::cli::failure::Failure;
 use jaus::cli::output::Output;
 use jaus::view;
-use jaus::wire::judp;
+use jaus::wire::{Frame, Version, judp};
 use jsidl::Library;
 use jsidl::explain::{Explanation, ServiceName, Unexplained, explain, table};
 
 use super::datagram::Datagram;
+use super::ra::{ReferenceArchitecture, may_be_of_ra};
 use super::sources::{self, Sources};
 
 /// More octets are not read: a datagram has at most 65,507, a large message seldom more than this.
@@ -24,13 +26,15 @@ const MOST: u64 = 4 << 20;
 ///
 /// Shown are the octets, the field that they belong to, the number on the wire and what it means,
 /// optional fields that are absent, and where reading stops if something is wrong. A whole JUDP
-/// datagram is recognised by its header, which is explained as well.
+/// datagram is recognised by its header, which is explained as well, and which tells the messages of
+/// the Reference Architecture (OpenJAUS 3.x), whose codes mean other layouts.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus jsidl explain 002B02\n  \
     jaus jsidl explain 02 00 11 00 09 ff ff ff ff 07 01 e8 03 00 2b 02 00 00\n  \
     jaus jsidl explain message.bin --jsidl my-services/\n  \
     jaus jsidl explain --service 'urn:jaus:jss:core:Time 1.0' 11 40 40 e2 01 00\n  \
+    jaus jsidl explain --ra 02 44 01 00 aa aa aa 2a\n  \
     jaus jsidl explain --json - < message.hex | jq .rows\n\n\
     Exit status: 0 all was read; 1 reading stopped; 2 nothing is known of such a message.")]
 pub(crate) struct Arguments {
@@ -46,6 +50,10 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "URN[ VERSION]")]
     service: Option<String>,
 
+    /// Explain a message without its header by the definitions of the Reference Architecture (RA 3.x)
+    #[arg(long)]
+    ra: bool,
+
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -56,6 +64,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let Sources { loaded, .. } = sources::load(&arguments.jsidl)?;
     let explainer = Explainer {
         library: loaded.library,
+        ra: LazyCell::new(ReferenceArchitecture::load),
+        by_ra: arguments.ra,
         service: arguments
             .service
             .as_deref()
@@ -76,17 +86,29 @@ fn wrong(name: &str, error: &Unexplained) -> Failure {
 
 struct Explainer {
     library: Library,
+    ra: LazyCell<ReferenceArchitecture>,
+    /// Whether what may be of the Reference Architecture is to be taken for it.
+    by_ra: bool,
     service: Option<ServiceName>,
 }
 
 impl Explainer {
     /// A bare message: whether all of it could be read, and what to print.
     fn message(&self, octets: &Bytes, json: bool) -> Result<(bool, String), Failure> {
-        let explanation = self.explain(octets).map_err(|error| {
+        let explained = if self.by_ra {
+            self.explain_as_ra(octets)
+        } else {
+            self.explain(octets)
+        };
+        let explanation = explained.map_err(|error| {
             // What begins like a datagram is more likely a damaged one than an unknown message.
-            Failure::new(match damaged(octets) {
+            let error = match damaged(octets) {
                 Some(damage) => format!("{error}; as a JUDP datagram: {damage}"),
                 None => error.to_string(),
+            };
+            Failure::new(match self.hint(octets) {
+                Some(hint) => format!("{error}; {hint}"),
+                None => error,
             })
         })?;
         let complete = explanation.stop.is_none();
@@ -98,11 +120,22 @@ impl Explainer {
         if let Some(damage) = damaged(octets).filter(|_| !complete) {
             text.push_str(&format!("\nIt is no JUDP datagram either: {damage}\n"));
         }
+        if let Some(hint) = self.hint(octets).filter(|_| !complete) {
+            text.push_str(&format!("\nBut {hint}\n"));
+        }
         Ok((complete, text))
     }
 
+    /// What is said of a message that cannot be read, if the Reference Architecture has it.
+    fn hint(&self, octets: &Bytes) -> Option<&'static str> {
+        let of_ra = !self.by_ra && self.explain_as_ra(octets).is_ok_and(|it| it.stop.is_none());
+        of_ra.then_some(
+            "as a message of the Reference Architecture (OpenJAUS 3.x) all of it can be read: --ra",
+        )
+    }
+
     fn datagram(&self, datagram: &Datagram, json: bool) -> Result<(bool, String), Failure> {
-        let (rows, messages) = datagram.rows(|octets| self.explain(octets).map_err(Failure::of))?;
+        let (rows, messages) = datagram.rows(|frame| self.framed(frame).map_err(Failure::of))?;
         let complete = messages.iter().all(|message| message.stop.is_none());
         if json {
             let mut messages: Vec<_> = messages.iter().map(Explanation::to_json).collect();
@@ -128,8 +161,33 @@ impl Explainer {
         Ok((complete, text))
     }
 
+    /// The message of a frame, by the definitions that its header and its source speak for; nothing
+    /// if these do not know it, and no others are asked for.
+    fn framed(&self, frame: &Frame) -> Result<Option<Explanation>, Unexplained> {
+        let older = frame.version != Version::As5669a;
+        let as_ra = (older && self.by_ra || may_be_of_ra(frame))
+            .then(|| self.explain_as_ra(&frame.payload))
+            .and_then(Result::ok);
+        let is_sure = frame.version == Version::Ra || self.by_ra;
+        match as_ra {
+            Some(of_ra) if is_sure || of_ra.stop.is_none() => Ok(Some(of_ra)),
+            None if is_sure && older && self.service.is_none() => Ok(None),
+            // A message of the services may come from a subsystem that looks like one of the
+            // Reference Architecture.
+            of_ra => match (self.explain(&frame.payload), of_ra) {
+                (Ok(other), Some(of_ra)) if other.stop.is_some() => Ok(Some(of_ra)),
+                (Err(_), Some(of_ra)) => Ok(Some(of_ra)),
+                (other, _) => other.map(Some),
+            },
+        }
+    }
+
     fn explain(&self, octets: &[u8]) -> Result<Explanation, Unexplained> {
         explain(&self.library, octets, self.service.as_ref())
+    }
+
+    fn explain_as_ra(&self, octets: &Bytes) -> Result<Explanation, Unexplained> {
+        self.ra.explain(octets, self.service.as_ref())
     }
 }
 

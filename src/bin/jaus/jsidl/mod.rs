@@ -8,6 +8,7 @@ mod docs;
 mod explain;
 mod fmt;
 mod lua;
+mod ra;
 mod rust;
 mod schema;
 mod sources;
