@@ -148,9 +148,12 @@ fn tshark_finds_the_messages_and_faults_that_our_own_reading_finds() {
     let script = directory.join("jaus.lua");
     let mut loader = jsidl::Loader::new();
     loader.catalogue();
+    if cfg!(feature = "ra33") {
+        loader.reference_architecture();
+    }
     fs::write(&script, jsidl::lua::dissector(&loader.load().library)).unwrap();
 
-    let dictionary = Dictionary::new();
+    let dictionary = Dictionary::complete();
     let (mut files, mut total) = (Vec::new(), 0);
     captures(&shared, &mut files);
     files.sort();

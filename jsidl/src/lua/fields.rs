@@ -11,7 +11,7 @@ use super::text;
 use crate::model::{NamedValue, Number, Signed, Unsigned};
 
 /// The names that stand for the transport's and for all messages' fields, below `jaus.`.
-const RESERVED: [&str; 30] = [
+const RESERVED: [&str; 31] = [
     "acknowledgement",
     "address",
     "broadcast",
@@ -30,6 +30,7 @@ const RESERVED: [&str; 30] = [
     "message",
     "presence_vector",
     "priority",
+    "ra",
     "ra_priority",
     "ra_version",
     "sequence",
@@ -119,6 +120,11 @@ pub(super) fn prefix(message: &str) -> String {
     } else {
         format!("jaus.{name}")
     }
+}
+
+/// What filters call a message of the Reference Architecture.
+pub(super) fn ra_prefix(message: &str) -> String {
+    format!("jaus.ra.{}", plain(message))
 }
 
 /// What filters call a field of the message that they call `prefix`.

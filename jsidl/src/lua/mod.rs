@@ -6,7 +6,9 @@
 //! puts large messages together across packets.
 //!
 //! A field is called `jaus.<message>.<field>` in filters, in lower case, wherever in the message it
-//! stands; a message is `jaus.<message>`.
+//! stands; a message is `jaus.<message>`. Messages of the Reference Architecture have the codes and
+//! names of others: they have a table of their own, and are `jaus.ra.<message>`. Which is meant is
+//! told by header and source.
 
 mod fields;
 mod shapes;
@@ -17,7 +19,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 
 use self::fields::{Fields, Kind};
-use crate::catalogue;
+use crate::catalogue::{self, Entry};
 use crate::library::Library;
 use crate::model::{Message, Service};
 
@@ -34,27 +36,40 @@ const RUNTIME: [&str; 6] = [
 /// The script for every message of a library.
 ///
 /// Where several definitions share a code, Wireshark tries those first that do not come with this
-/// crate, then newer versions before older ones, and shows the first that fits the octets.
+/// crate, then newer versions before older ones, and shows the first that fits the octets. The
+/// [Reference Architecture](crate::catalogue::Entry::of_reference_architecture)'s are tried for its
+/// messages alone.
 ///
 /// ```
 /// let mut loader = jsidl::Loader::new();
-/// loader.catalogue();
+/// loader.catalogue().reference_architecture();
 /// let script = jsidl::lua::dissector(&loader.load().library);
 /// assert!(script.contains("jaus.reportidentification.querytype"));
+/// assert!(script.contains("jaus.ra.reportidentification.queryfield"));
 /// ```
 pub fn dissector(library: &Library) -> String {
+    let (of_ra, services): (Vec<_>, Vec<_>) = in_order(library).into_iter().partition(is_of_ra);
     let mut fields = Fields::default();
+    let both = |fields: &mut Fields| {
+        let services = layouts(&services, fields::prefix, fields);
+        let of_ra = layouts(&of_ra, fields::ra_prefix, fields);
+        [("message_table", services), ("ra_message_table", of_ra)]
+    };
     // Once to learn which names are claimed by what, once to write.
-    layouts(library, &mut fields);
+    both(&mut fields);
     fields.settle();
-    let layouts = layouts(library, &mut fields);
-    let mut out = introduction(library, layouts.len());
+    let tables = both(&mut fields);
+    let count = tables.iter().map(|(_, layouts)| layouts.len()).sum();
+    let mut out = introduction(library, count);
     fields.write(&mut out);
-    out.push_str("local message_table = {\n");
-    for layout in &layouts {
-        layout.write(&mut out);
+    for (name, layouts) in &tables {
+        // Writing to a string does not fail.
+        let _ = writeln!(out, "local {name} = {{");
+        for layout in layouts {
+            layout.write(&mut out);
+        }
+        out.push_str("}\n");
     }
-    out.push_str("}\n");
     for part in RUNTIME {
         out.push('\n');
         out.push_str(part);
@@ -87,14 +102,19 @@ impl Layout<'_> {
     }
 }
 
-/// All layouts, those of one code in the order in which they are to be tried.
-fn layouts<'m>(library: &'m Library, fields: &mut Fields) -> Vec<Layout<'m>> {
+/// All layouts of services, those of one code in the order in which they are to be tried. Filters
+/// call a message as `prefix` says.
+fn layouts<'m>(
+    services: &[&'m Service],
+    prefix: fn(&str) -> String,
+    fields: &mut Fields,
+) -> Vec<Layout<'m>> {
     let mut by_code: BTreeMap<u16, Vec<Layout<'m>>> = BTreeMap::new();
     let mut known: HashMap<(u16, String), usize> = HashMap::new();
-    for service in in_order(library) {
+    for service in services {
         let id = service.id.to_string();
         for message in service.messages() {
-            let prefix = fields::prefix(&message.name);
+            let prefix = prefix(&message.name);
             let field = fields.field(prefix.clone(), &message.name, Kind::None, None);
             let sections = shapes::sections(message, &prefix, fields);
             let layouts = by_code.entry(message.code).or_default();
@@ -127,6 +147,11 @@ fn in_order(library: &Library) -> Vec<&Service> {
     services
 }
 
+/// Whether a service is one of the Reference Architecture.
+fn is_of_ra(service: &&Service) -> bool {
+    catalogue::find(&service.id).is_some_and(Entry::of_reference_architecture)
+}
+
 fn introduction(library: &Library, layouts: usize) -> String {
     let mut out = format!(
         "-- A Wireshark dissector for JAUS, made by `jaus jsidl lua` from {} services with {layouts}\n\
@@ -135,7 +160,8 @@ fn introduction(library: &Library, layouts: usize) -> String {
          --\n\
          -- Filters: jaus.source == \"101.1.1\", jaus.address, jaus.destination.subsystem, jaus.code,\n\
          -- jaus.message == \"ReportIdentification\", jaus.reportidentification.identification, and so\n\
-         -- on for every field; jaus.malformed for what does not fit its definition.\n\
+         -- on for every field; jaus.ra for messages of the Reference Architecture (OpenJAUS 3.x), as\n\
+         -- in jaus.ra.reportglobalpose.latitude; jaus.malformed for what does not fit its definition.\n\
          --\n-- Services:\n",
         library.services().count(),
     );

@@ -21,10 +21,10 @@ pub(crate) enum Content {
 
 pub(crate) type Field = (String, Content);
 
-/// All fields of a message.
-pub(crate) fn fields(message: &Message, value: &Value) -> Vec<Field> {
+/// All fields of a message, whose names begin with `prefix`.
+pub(crate) fn fields(prefix: &str, message: &Message, value: &Value) -> Vec<Field> {
     let mut walk = Walk {
-        prefix: format!("jaus.{}", plain(&message.name)),
+        prefix: format!("{prefix}{}", plain(&message.name)),
         fields: Vec::new(),
     };
     let Some(body) = &message.body else {

@@ -14,6 +14,30 @@ use crate::packets::Packets;
 use crate::support::{self, golden};
 use crate::tshark;
 
+/// Whose messages they are, which their headers tell.
+#[derive(Clone, Copy)]
+pub(crate) enum Family {
+    Services,
+    ReferenceArchitecture,
+}
+
+impl Family {
+    /// What the names of all its messages and fields begin with.
+    const fn prefix(self) -> &'static str {
+        match self {
+            Self::Services => "jaus.",
+            Self::ReferenceArchitecture => "jaus.ra.",
+        }
+    }
+
+    fn add(self, packets: &mut Packets, octets: &[u8]) -> usize {
+        match self {
+            Self::Services => packets.message(octets),
+            Self::ReferenceArchitecture => packets.ra_message(octets),
+        }
+    }
+}
+
 /// How the dissector is to read a message: by the newest definition that fits.
 fn read<'l>(library: &'l Library, octets: &[u8]) -> Option<(&'l Message, Value)> {
     let code = u16::from_le_bytes(*octets.first_chunk()?);
@@ -26,7 +50,12 @@ fn read<'l>(library: &'l Library, octets: &[u8]) -> Option<(&'l Message, Value)>
 }
 
 /// What is different, if anything is.
-fn compare(packet: Node<'_, '_>, message: &Message, value: &Value) -> Result<(), String> {
+fn compare(
+    packet: Node<'_, '_>,
+    family: Family,
+    message: &Message,
+    value: &Value,
+) -> Result<(), String> {
     let items = tshark::messages(packet);
     let [item] = items[..] else {
         return Err(format!("{} messages in one packet", items.len()));
@@ -35,12 +64,12 @@ fn compare(packet: Node<'_, '_>, message: &Message, value: &Value) -> Result<(),
     if called != Some(&message.name) {
         return Err(format!("{called:?} instead of {}", message.name));
     }
-    let prefix = format!("jaus.{}", message.name.to_ascii_lowercase());
+    let prefix = format!("{}{}", family.prefix(), message.name.to_ascii_lowercase());
     let body = item
         .children()
         .find(|child| tshark::name(*child).starts_with(&prefix))
         .ok_or("no body")?;
-    let (mut found, wanted) = (Vec::new(), fields(message, value));
+    let (mut found, wanted) = (Vec::new(), fields(family.prefix(), message, value));
     shown(body, &format!("{prefix}."), &mut found);
     for (item, field) in found.iter().zip(&wanted) {
         if !agrees(*item, field) {
@@ -68,7 +97,8 @@ fn tshark_prints_the_values_of_every_golden_message() {
             .iter()
             .map(|row| golden::octets_of(&row["hex"]))
             .collect();
-        check_source(&golden::load(&shared, source), source, &vectors)
+        let library = golden::load(&shared, source);
+        check_source(&library, source, Family::Services, &vectors)
     };
     let total: usize = thread::scope(|scope| {
         let running: Vec<_> = sources
@@ -82,14 +112,19 @@ fn tshark_prints_the_values_of_every_golden_message() {
 }
 
 /// Answers how many messages were compared.
-pub(crate) fn check_source(library: &Library, source: &str, vectors: &[Vec<u8>]) -> usize {
+pub(crate) fn check_source(
+    library: &Library,
+    source: &str,
+    family: Family,
+    vectors: &[Vec<u8>],
+) -> usize {
     let directory = tshark::directory(source);
     let capture = directory.join("golden.pcap");
     let mut packets = Packets::new();
     let known: Vec<_> = vectors
         .iter()
         .filter_map(|octets| Some((octets, read(library, octets)?)))
-        .map(|(octets, read)| (packets.message(octets), read))
+        .map(|(octets, read)| (family.add(&mut packets, octets), read))
         .collect();
     packets.write(&capture);
     let pdml = tshark::pdml(library, &directory, &capture);
@@ -98,7 +133,7 @@ pub(crate) fn check_source(library: &Library, source: &str, vectors: &[Vec<u8>])
     let differences: Vec<_> = known
         .iter()
         .filter_map(|(place, (message, value))| {
-            let problem = compare(packets[*place], message, value).err()?;
+            let problem = compare(packets[*place], family, message, value).err()?;
             Some(format!(
                 "{source}, packet {}, {}: {problem}",
                 place + 1,

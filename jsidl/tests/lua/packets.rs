@@ -50,6 +50,29 @@ impl Packets {
         self.count - 1
     }
 
+    /// The same with headers of the Reference Architecture.
+    pub(crate) fn ra_message(&mut self, octets: &[u8]) -> usize {
+        let (code, data) = octets.split_at(2);
+        let pieces: Vec<_> = data.chunks(LONGEST_PAYLOAD).collect();
+        let last = pieces.len().saturating_sub(1);
+        for index in 0..=last {
+            let flag: u16 = match index {
+                _ if last == 0 => 0,
+                0 => 1,
+                _ if index == last => 8,
+                _ => 2,
+            };
+            let piece = pieces.get(index).copied().unwrap_or_default();
+            self.sequence = self.sequence.wrapping_add(1);
+            let control = flag << 12 | u16::try_from(piece.len()).unwrap();
+            let ids = [1, 1, 1, 10, 1, 35, 1, 20];
+            let (control, sequence) = (control.to_le_bytes(), self.sequence.to_le_bytes());
+            let parts: [&[u8]; 7] = [b"JAUS01.0", &[6, 2], code, &ids, &control, &sequence, piece];
+            self.datagram(&parts.concat());
+        }
+        self.count - 1
+    }
+
     /// Adds a datagram from and to the JAUS port.
     pub(crate) fn datagram(&mut self, payload: &[u8]) {
         let mut packet = vec![0x45, 0];

@@ -4,7 +4,7 @@
 use jsidl::Loader;
 use jsidl::dynamic::{arbitrary, encode};
 
-use crate::golden::check_source;
+use crate::golden::{Family, check_source};
 use crate::tshark;
 
 /// Octets that look random and are always the same (an xorshift generator).
@@ -21,16 +21,17 @@ fn entropy(seed: u64) -> Vec<u8> {
 
 #[test]
 fn tshark_prints_the_values_of_random_messages_of_every_built_in_type() {
-    check_random("random", Loader::catalogue, 200);
+    check_random("random", Loader::catalogue, Family::Services, 200);
 }
 
 #[test]
 fn tshark_prints_the_values_of_random_messages_of_the_reference_architecture() {
-    check_random("random_ra", Loader::reference_architecture, 100);
+    let load = Loader::reference_architecture;
+    check_random("random_ra", load, Family::ReferenceArchitecture, 100);
 }
 
 /// Messages of every type that is loaded, more than `least`.
-fn check_random(name: &str, load: fn(&mut Loader) -> &mut Loader, least: usize) {
+fn check_random(name: &str, load: fn(&mut Loader) -> &mut Loader, family: Family, least: usize) {
     if !tshark::is_there() {
         return;
     }
@@ -43,6 +44,6 @@ fn check_random(name: &str, load: fn(&mut Loader) -> &mut Loader, least: usize) 
         .filter_map(|(seed, message)| encode(message, &arbitrary(message, &entropy(seed))).ok())
         .collect();
     assert!(vectors.len() > least, "{} messages", vectors.len());
-    let checked = check_source(&library, name, &vectors);
+    let checked = check_source(&library, name, family, &vectors);
     assert_eq!(checked, vectors.len());
 }

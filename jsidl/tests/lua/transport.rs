@@ -14,7 +14,7 @@ const QUERY: &[u8] = b"\x00\x2B\x02";
 
 fn library() -> Library {
     let mut loader = jsidl::Loader::new();
-    loader.catalogue();
+    loader.catalogue().reference_architecture();
     loader.load().library
 }
 
@@ -91,6 +91,52 @@ fn older_headers_are_read() {
         tshark::experts(packets[2], "jaus.malformed"),
         ["the header is compressed"]
     );
+}
+
+/// As recorded of OpenJAUS: all bits of a presence vector are set, and a name ends early.
+#[test]
+fn messages_of_the_reference_architecture_are_read_by_its_own_definitions() {
+    let mut packets = Packets::new();
+    let header = |code: &[u8; 2], length: u8| {
+        let ids = b"\x01\x01\x01\x0A\x01\x23\x01\x14";
+        [b"\x06\x02", &code[..], ids, &[length, 0, 0, 0]].concat()
+    };
+    let confirmed = b"\xFF\x00\x01\x4B\x00\x00\x00\x00";
+    let named = b"\x02\x00\x00\x00OJ";
+    let prefix = [1, 0, 0, 0, 22];
+    packets.datagram(&[b"JAUS01.0", &header(b"\xF3\x01", 8)[..], confirmed].concat());
+    packets.datagram(&[&prefix, &header(b"\x00\x4B", 6)[..], named].concat());
+    packets.datagram(&[b"JAUS01.0", &header(b"\x23\xD1", 1)[..], b"\x07"].concat());
+    packets.datagram(&[b"JAUS01.0", &header(b"\x02\x44", 3)[..], b"\x01\x00\xAA"].concat());
+    let Some(pdml) = dissect("reference-architecture", &packets) else {
+        return;
+    };
+    let pdml = Document::parse(&pdml).unwrap();
+    let ids = "20.1.35.1 -> 10.1.1.1";
+    assert_eq!(
+        summaries(&pdml).concat(),
+        [
+            format!("JAUS, ConfirmEventRequest {ids}"),
+            format!("JAUS, ReportIdentification {ids}"),
+            format!("JAUS, RA message D123h {ids}"),
+            format!("JAUS, ReportGlobalPose {ids}"),
+        ]
+    );
+    let packets = tshark::packets(&pdml);
+    for (packet, field, shown) in [
+        (0, "jaus.ra.confirmeventrequest.reportcode", "19201"),
+        (0, "jaus.service", "urn:jaus-rs:ra33:Events 3.3"),
+        (1, "jaus.ra.reportidentification.identification", "OJ"),
+        (1, "jaus.source", "20.1.35.1"),
+        (1, "jaus.source.component", "35"),
+        (1, "jaus.source.instance", "1"),
+    ] {
+        assert_eq!(tshark::show(packets[packet], field), Some(shown), "{field}");
+    }
+    let faults = packets
+        .iter()
+        .map(|it| tshark::experts(*it, "jaus.malformed").len());
+    assert_eq!(faults.collect::<Vec<_>>(), [0, 0, 0, 1]);
 }
 
 #[test]

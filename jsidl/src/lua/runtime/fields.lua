@@ -70,11 +70,13 @@ local parts = {
         subsystem = ProtoField.uint16("jaus.source.subsystem", "Subsystem"),
         node = ProtoField.uint8("jaus.source.node", "Node"),
         component = ProtoField.uint8("jaus.source.component", "Component"),
+        instance = ProtoField.uint8("jaus.source.instance", "Instance"),
     },
     destination = {
         subsystem = ProtoField.uint16("jaus.destination.subsystem", "Subsystem"),
         node = ProtoField.uint8("jaus.destination.node", "Node"),
         component = ProtoField.uint8("jaus.destination.component", "Component"),
+        instance = ProtoField.uint8("jaus.destination.instance", "Instance"),
     },
 }
 
@@ -109,16 +111,25 @@ do
     jaus.experts = all_experts
 end
 
--- The definitions of a message code, the one to be tried first in front.
-local messages_by_code = {}
-for _, entry in ipairs(message_table) do
-    local code = entry[1]
-    local known = messages_by_code[code] or {}
-    known[#known + 1] = {
-        name = entry[2],
-        field = body_fields[entry[3]],
-        services = entry[4],
-        sections = entry[5],
-    }
-    messages_by_code[code] = known
+-- The definitions of each message code, the one to be tried first in front.
+local function by_code(entries)
+    local messages = {}
+    for _, entry in ipairs(entries) do
+        local code = entry[1]
+        local known = messages[code] or {}
+        known[#known + 1] = {
+            name = entry[2],
+            field = body_fields[entry[3]],
+            services = entry[4],
+            sections = entry[5],
+        }
+        messages[code] = known
+    end
+    return messages
 end
+
+-- The two families of messages, which share codes. What peers of the Reference Architecture write
+-- amiss is forgiven: presence vectors with bits that no field has, a text at the end that is shorter
+-- than it should be, and a vector of one bit where definitions have a tag.
+local of_services = { messages = by_code(message_table) }
+local of_ra = { messages = by_code(ra_message_table), forgiving = true }

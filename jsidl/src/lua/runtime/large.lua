@@ -120,11 +120,11 @@ local function add_fragment(frame, octets, frame_number)
 end
 
 -- The message in a whole: of its readings the first that fits its definition.
-local function read_whole(whole)
+local function read_whole(whole, family)
     local chosen
     for _, octets in ipairs(whole.octets) do
         local tvb = ByteArray.new(octets, true):tvb("JAUS message")
-        local message = read_message(tvb, 0, tvb:len(), 0)
+        local message = read_message(tvb, 0, tvb:len(), 0, family)
         if not chosen or not message.problem then
             chosen = message
         end

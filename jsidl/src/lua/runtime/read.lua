@@ -165,7 +165,7 @@ local function members(reader, presence_size, shapes)
             optional = optional + (shape[1] == "optional" and 1 or 0)
         end
         local width = 8 * presence_size
-        if optional < width and bits(value, optional, width - 1) ~= 0
+        if not reader.family.forgiving and optional < width and bits(value, optional, width - 1) ~= 0
             and bits(value, optional, width - 1) ~= UInt64.new(0) then
             fault(at, string.format("the presence vector has bits above the %d that are defined", optional))
         end
@@ -218,8 +218,11 @@ end
 readers["variant"] = function(reader, node, shape)
     local at = reader.position
     local tag = count(reader, shape[3])
-    node.value = tag
     local alternatives = shape[4]
+    if reader.family.forgiving and tag > 1 and not alternatives[tag + 1] then
+        tag = tag % 2
+    end
+    node.value = tag
     local chosen = alternatives[tag + 1]
     if chosen then
         inside(reader, node, function()
@@ -263,8 +266,12 @@ local function text(reader, at, length)
 end
 
 readers["fixed string"] = function(reader, node, shape)
-    local at = take(reader, shape[3])
-    node.value = text(reader, at, shape[3])
+    local length = shape[3]
+    if reader.family.forgiving then
+        length = math.min(length, reader.limit - reader.position)
+    end
+    local at = take(reader, length)
+    node.value = text(reader, at, length)
 end
 
 readers["string"] = function(reader, node, shape)
@@ -282,7 +289,7 @@ local function blob(reader, node, size, min, max, is_message)
     local at = take(reader, length)
     node.octets = { at = at, length = length }
     if is_message and length > 0 then
-        node.message = read_message(reader.tvb, at, at + length, reader.depth + 1)
+        node.message = read_message(reader.tvb, at, at + length, reader.depth + 1, reader.family)
     end
 end
 
@@ -312,8 +319,10 @@ readers["measure"] = function(reader, node, shape)
 end
 
 -- The body by one definition: nodes, and the fault if there is one.
-local function read_by(definition, tvb, at, limit, depth)
-    local reader = { tvb = tvb, position = at, limit = limit, depth = depth, nodes = {}, empty = 0 }
+local function read_by(definition, tvb, at, limit, depth, family)
+    local reader = {
+        tvb = tvb, position = at, limit = limit, depth = depth, family = family, nodes = {}, empty = 0,
+    }
     local nodes = reader.nodes
     local fine, problem = pcall(function()
         for _, section in ipairs(definition.sections) do
@@ -336,11 +345,11 @@ local function read_by(definition, tvb, at, limit, depth)
     return nodes, problem
 end
 
--- A message whose code is known and whose body lies between `at` and `limit`.
-local function read_body(tvb, code, at, limit, depth)
+-- A message of a family whose code is known and whose body lies between `at` and `limit`.
+local function read_body(tvb, code, at, limit, depth, family)
     local message = { tvb = tvb, code = code, at = at, limit = limit }
-    for _, definition in ipairs(messages_by_code[code] or {}) do
-        local nodes, problem = read_by(definition, tvb, at, limit, depth)
+    for _, definition in ipairs(family.messages[code] or {}) do
+        local nodes, problem = read_by(definition, tvb, at, limit, depth, family)
         if not problem or not message.definition then
             message.definition, message.nodes, message.problem = definition, nodes, problem
         end
@@ -352,12 +361,30 @@ local function read_body(tvb, code, at, limit, depth)
 end
 
 -- A message that begins with its code; nil if it has none or lies too deep.
-read_message = function(tvb, at, limit, depth)
+read_message = function(tvb, at, limit, depth, family)
     if limit - at < 2 or depth > DEEPEST_MESSAGE then
         return nil
     end
     local code = tvb:range(at, 2):le_uint()
-    local message = read_body(tvb, code, at + 2, limit, depth)
+    local message = read_body(tvb, code, at + 2, limit, depth, family)
     message.code_at = at
     return message
+end
+
+-- The message of a frame: of the families that it may belong to by its header, the one whose
+-- definition fits. `read` reads by one of them. Nil for what may not be read by the services'
+-- definitions, and is unknown to the Reference Architecture.
+local function read_by_header(frame, read)
+    local message = frame.ra and read(of_ra)
+    local is_known = message and message.definition
+    if is_known and (frame.version == 0 or not message.problem) then
+        return message
+    elseif frame.version == 0 then
+        return nil
+    end
+    -- Through the header of AS5669 a message of the services may come from a subsystem that looks
+    -- like one of the Reference Architecture.
+    local other = read(of_services)
+    local fits = other and other.definition and not other.problem
+    return is_known and not fits and message or other
 end

@@ -3,10 +3,10 @@
 local AS5669A_LEAST, RA_HEADER = 14, 16
 local RA_DATA_CONTROLS = { [0] = 0, [1] = 1, [2] = 2, [4] = 2, [8] = 3 }
 
--- An id as people write it. RA 3.x has four numbers.
-local function id_of(tvb, at, version)
+-- An id as people write it, the Reference Architecture's with four numbers.
+local function id_of(tvb, at, has_four)
     local component, node = tvb:range(at, 1):uint(), tvb:range(at + 1, 1):uint()
-    if version == 0 then
+    if has_four then
         return string.format("%d.%d.%d.%d", tvb:range(at + 3, 1):uint(), tvb:range(at + 2, 1):uint(),
             node, component)
     end
@@ -46,7 +46,7 @@ local function parse_as5669a(tvb, at)
         version = 2, at = at, limit = at + size, kind = kind, extra = extra, flags_at = at + 3 + extra,
         broadcast = bits(flags, 2, 3), acknowledgement = bits(flags, 4, 5), data_control = bits(flags, 6, 7),
         destination_at = at + 4 + extra, source_at = at + 8 + extra,
-        destination = id_of(tvb, at + 4 + extra, 2), source = id_of(tvb, at + 8 + extra, 2),
+        destination = id_of(tvb, at + 4 + extra), source = id_of(tvb, at + 8 + extra),
         sequence = tvb:range(at + size - 2, 2):le_uint(), sequence_at = at + size - 2,
         body_at = at + 12 + extra, body_limit = at + size - 2,
     }
@@ -66,12 +66,18 @@ local function parse_ra(tvb, at, version)
         return problem_at(at + 12, string.format("the data size is %d; octets left: %d", size,
             available - RA_HEADER))
     end
+    -- The older headers carry messages of the services as well. But the first of the four numbers of
+    -- an id in the Reference Architecture is never 0, and among ids with three numbers only those of
+    -- subsystems from 256 on have another octet there.
+    local ra = tvb:range(at + 11, 1):uint() ~= 0
+    local has_four = version == 0 or ra
     return {
         version = version, at = at, limit = at + RA_HEADER + size, flags_at = at, kind = 0, broadcast = 0,
+        ra = ra,
         acknowledgement = bits(tvb:range(at, 1):uint(), 4, 5), data_control = data_control,
         code = tvb:range(at + 2, 2):le_uint(), code_at = at + 2,
         destination_at = at + 4, source_at = at + 8,
-        destination = id_of(tvb, at + 4, version), source = id_of(tvb, at + 8, version),
+        destination = id_of(tvb, at + 4, has_four), source = id_of(tvb, at + 8, has_four),
         sequence = tvb:range(at + 14, 2):le_uint(), sequence_at = at + 14,
         body_at = at + RA_HEADER, body_limit = at + RA_HEADER + size,
     }
@@ -84,6 +90,10 @@ local function show_id(tree, tvb, role, at, id)
         item:add(parts[role].subsystem, tvb:range(at + 2, 2), tonumber(subsystem))
         item:add(parts[role].node, tvb:range(at + 1, 1), tonumber(node))
         item:add(parts[role].component, tvb:range(at, 1), tonumber(component))
+    else
+        for place, part in ipairs({ "instance", "component", "node", "subsystem" }) do
+            item:add(parts[role][part], tvb:range(at + place - 1, 1))
+        end
     end
     tree:add(header.address, tvb:range(at, 4), id):set_hidden()
 end
@@ -137,10 +147,12 @@ local function show_fragment(tree, tvb, frame, frame_number)
     for _, number_of_frame in ipairs(known.whole.frames) do
         tree:add(header.fragment, body, number_of_frame):set_generated()
     end
-    if frame.version == 0 then
+    local message = read_by_header(frame, function(family)
+        return read_whole(known.whole, family)
+    end)
+    if not message then
         return summary
     end
-    local message = read_whole(known.whole)
     show_message(tree, message)
     return string.format("%s (from %d fragments)", name_of(message), #known.whole.frames)
 end
@@ -153,20 +165,21 @@ local function show_payload(tree, tvb, frame, frame_number)
         return acknowledgements[frame.acknowledgement]
     elseif frame.data_control ~= 0 then
         return show_fragment(tree, tvb, frame, frame_number)
-    elseif frame.version == 0 then
+    end
+    local message = read_by_header(frame, function(family)
+        if not frame.code then
+            return read_message(tvb, frame.body_at, frame.body_limit, 0, family)
+        end
+        local found = read_body(tvb, frame.code, frame.body_at, frame.body_limit, 0, family)
+        found.code_at = frame.code_at
+        return found
+    end)
+    if not message and frame.version == 0 then
         -- The Reference Architecture's messages share codes with the services' but not layouts.
         tree:add_le(header.code, tvb:range(frame.code_at, 2))
         tree:add(header.data, tvb:range(frame.body_at, length))
         return string.format("RA message %04Xh", frame.code)
-    end
-    local message
-    if frame.code then
-        message = read_body(tvb, frame.code, frame.body_at, frame.body_limit, 0)
-        message.code_at = frame.code_at
-    else
-        message = read_message(tvb, frame.body_at, frame.body_limit, 0)
-    end
-    if not message then
+    elseif not message then
         local item = tree:add(header.data, tvb:range(frame.body_at, length))
         item:add_proto_expert_info(experts.malformed, "a message begins with the two octets of its code")
         return "no message"

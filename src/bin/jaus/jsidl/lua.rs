@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use jaus::cli::failure::Failure;
 use jaus::cli::output::Output;
+use jsidl::{Library, Loader};
 
 use super::sources::{self, Sources};
 
@@ -15,8 +16,9 @@ const FILE: &str = "jaus.lua";
 /// Write a Wireshark dissector (Lua) for the built-in definitions and your own
 ///
 /// It reads JAUS over UDP and TCP, puts large messages together, and knows every field by name:
-/// jaus.<message>.<field>, in lower case. Where your definition and a built-in one share a message
-/// code, yours is tried first.
+/// jaus.<message>.<field>, in lower case. Messages of the Reference Architecture (OpenJAUS 3.x) are
+/// told by their headers: jaus.ra.<message>.<field>. Where your definition and a built-in one share a
+/// message code, yours is tried first.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     jaus jsidl lua -o ~/.local/lib/wireshark/plugins\n  \
@@ -44,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let library = if arguments.only {
         sources::own(&loaded)
     } else {
-        loaded.library
+        with_reference_architecture(loaded.library)
     };
     if arguments.only && library.services().next().is_none() {
         return Err(Failure::new(
@@ -61,6 +63,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
         Output::new().line(format_args!("{}: {summary}", path.display()))?;
     }
     Ok(ExitCode::from(u8::from(!sound)))
+}
+
+fn with_reference_architecture(mut library: Library) -> Library {
+    let mut loader = Loader::new();
+    loader.reference_architecture();
+    for service in loader.load().library.services() {
+        library.insert(service.clone());
+    }
+    library
 }
 
 /// The file that is meant: a directory, or what is not there and has no extension, gets a file.
