@@ -58,7 +58,7 @@ use std::hash::RandomState;
 use std::time::Instant;
 
 pub use access::{Access, AccessError, Network, Subsystems};
-pub use config::{Config, PAYLOAD_LIMITS, StaticPeer};
+pub use config::{Config, PAYLOAD_LIMITS, StaticPeer, first_sequence_at};
 pub use counters::{Counter, Counters};
 pub use delivery::FlowStatus;
 pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};

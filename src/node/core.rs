@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use tokio::sync::{broadcast, watch};
 
@@ -19,7 +19,9 @@ use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
 use super::tap::Taps;
 use crate::address::JausId;
-use crate::endpoint::{AttachError, Endpoint, Event, MessageHandle, Outgoing, Received};
+use crate::endpoint::{
+    AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, first_sequence_at,
+};
 use crate::link::Slab;
 use crate::link::local::Process;
 use crate::wire::Priority;
@@ -51,7 +53,7 @@ pub(super) struct Shared {
 
 impl Shared {
     pub(super) fn new(config: &Config, links: Links) -> Self {
-        let endpoint = Endpoint::new(config.endpoint(random()));
+        let endpoint = Endpoint::new(config.endpoint(first_sequence()));
         let core = Core::new(endpoint, links, config.mailbox);
         Self {
             core: Mutex::new(core),
@@ -65,10 +67,15 @@ impl Shared {
     }
 }
 
-/// Enough chance for a first sequence number; the standard library seeds its hashers with it.
-fn random() -> u16 {
-    use std::hash::{BuildHasher, RandomState};
-    (RandomState::new().hash_one(()) & 0xFFFF) as u16
+/// Where the sequence numbers begin.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the node is the owner that has the clock"
+)]
+fn first_sequence() -> u16 {
+    let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    // A clock that stands before 1970 was never set: then all starts are the same to it.
+    first_sequence_at(since_1970.unwrap_or_default())
 }
 
 #[derive(Debug)]

@@ -267,14 +267,25 @@ departures! {
     BeginsWithOne = Entry {
         name: "begins with 1 again",
         peers: &[Junior, Jts, Fkie],
-        does: "begins with number 1 in each process, and takes a restarted peer's first messages \
-               for duplicates of earlier ones",
+        does: "begins with number 1 in each process",
         source: Source::Provoked,
         told: Told::NeedNotBe,
-        ours: "content counts, not the number alone, and only for a short time; we begin at a \
-               number by chance",
+        ours: "content counts, not the number alone, and only for a short time",
         place: "src/endpoint/receive.rs",
         test: "a_restarted_peer_does_not_lose_its_first_messages",
+    };
+    /// Duplicates are known by their numbers alone.
+    RemembersNumbers = Entry {
+        name: "remembers numbers",
+        peers: &[Junior, Jts],
+        does: "acknowledges and drops what has a number that it heard of the same id within 3 s, \
+               also of a node that was started again since: a fragment of it, and a large message \
+               never arrives",
+        source: Source::Recorded,
+        told: Told::NeedNotBe,
+        ours: "a node begins at a number that the clock tells, ahead of those that it used before",
+        place: "src/endpoint/config.rs",
+        test: "a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers",
     };
     /// One id for each TCP connection.
     OneIdPerConnection = Entry {

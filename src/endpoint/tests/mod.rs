@@ -8,6 +8,7 @@ mod delivery;
 mod flood;
 mod fragments;
 mod identity;
+mod junior;
 mod output;
 mod profiles;
 mod receiving;

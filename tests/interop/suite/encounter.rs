@@ -227,13 +227,13 @@ impl Encounter<'_> {
     fn mix(&self, side: Side, act: &str) -> Result<(), String> {
         let end =
             Instant::now() + Duration::from_secs(crate::suite::number("JAUS_INTEROP_MIXED", 10));
+        let most = crate::suite::number("JAUS_INTEROP_MIXED_OCTETS", usize::MAX as u64) as usize;
         let (actor, answerer) = (self.actor.party, self.answerer.party);
         let can = |scenario: &Scenario| {
             let excuse = actor.excuse_of_actor(*scenario);
             let excuse = excuse.or(answerer.excuse_of_answerer(*scenario));
             let act = scenario.act().filter(|act| actor.act.contains_key(*act));
-            let is_small = scenario.octets() <= Scenario::Mixed.octets();
-            let is_hopeful = is_small && !self.failed.contains(scenario);
+            let is_hopeful = scenario.octets() <= most && !self.failed.contains(scenario);
             is_hopeful && scenario.side() == Some(side) && excuse.is_none() && act.is_some()
         };
         let others: Vec<Scenario> = Scenario::all().into_iter().filter(can).collect();
