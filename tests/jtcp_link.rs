@@ -8,6 +8,7 @@
     reason = "a test with sockets"
 )]
 
+use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::task::Poll;
 use std::time::{Duration, Instant};
@@ -177,4 +178,28 @@ async fn what_is_sent_before_the_first_connection_waits_for_it_and_later_it_does
     })
     .await;
     assert!(link.poll_timeout().unwrap() > later);
+}
+
+#[tokio::test]
+async fn a_peer_that_still_writes_when_the_link_hangs_up_is_not_cut_off() {
+    let mut link = listening(1);
+    let mut peer = TcpStream::connect(link.local().unwrap()).unwrap();
+    peer.set_read_timeout(Some(LIMIT)).unwrap();
+    let now = Instant::now();
+    peer.write_all(&message(20)).unwrap();
+    turns(&mut link, now, |link| link.counters().received == 1).await;
+
+    assert!(
+        link.hang_up().is_pending(),
+        "the peer may have something to say"
+    );
+    assert_eq!(peer.read(&mut [0]).unwrap(), 0, "it is told");
+    for received in 2..6 {
+        // The stream's version octet came with the first.
+        peer.write_all(&message(20)[1..]).unwrap();
+        turns(&mut link, now, |link| link.counters().received == received).await;
+    }
+    drop(peer);
+    turns(&mut link, now, |link| link.connections().count() == 0).await;
+    assert!(link.hang_up().is_ready());
 }

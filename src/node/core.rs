@@ -239,7 +239,7 @@ impl Core {
         let flushed = self.flush(cx, now);
         if self
             .stop_at
-            .is_some_and(|deadline| flushed || deadline <= now)
+            .is_some_and(|deadline| flushed && self.hang_up() || deadline <= now)
         {
             self.finish();
             return Poll::Ready(());
@@ -337,6 +337,15 @@ impl Core {
             flushed &= link.poll_flush(cx, now).is_ready();
         }
         flushed
+    }
+
+    /// Takes leave; whether the others have done so too.
+    fn hang_up(&mut self) -> bool {
+        let mut hung_up = true;
+        for (_, link) in self.links.iter_mut() {
+            hung_up &= link.hang_up().is_ready();
+        }
+        hung_up
     }
 
     /// Closes everything; harmless when repeated.

@@ -105,6 +105,14 @@ impl Link {
         }
     }
 
+    /// Takes leave of those who are at the other end, where that means anything to them.
+    pub(super) fn hang_up(&mut self) -> Poll<()> {
+        match self {
+            Self::Tcp(link) => link.hang_up(),
+            _ => Poll::Ready(()),
+        }
+    }
+
     /// When the link wants a turn, if nothing arrives before.
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         match self {

@@ -257,8 +257,8 @@ impl Node {
         }
     }
 
-    /// Stops the node: sends what waits (for a quarter of a second at most), closes the links,
-    /// and lets every [`Port::recv`] end once its mailbox is read.
+    /// Stops the node: sends what waits, takes leave on its connections (both for a quarter of a
+    /// second at most), closes the links, and lets every [`Port::recv`] end once its mailbox is read.
     pub async fn shutdown(self) {
         let mut stopped = self.shared().stopped.subscribe();
         self.shared().lock().stop();

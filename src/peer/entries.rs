@@ -301,6 +301,20 @@ departures! {
         place: "src/link/tcp/mod.rs",
         test: "each_id_is_answered_on_the_connection_on_which_it_was_heard_last",
     };
+    /// Hanging up ends its engine.
+    EndsWithConnections = Entry {
+        name: "ends with a connection",
+        peers: &[Junior, Jts, Fkie],
+        does: "writes to a TCP connection that was reset as to any other, and is ended by the \
+               signal SIGPIPE: its engine, with all that are on its host",
+        source: Source::Recorded,
+        told: Told::NeedNotBe,
+        ours: "a node that stops says so on its connections and takes in what still comes, and \
+               repeats nothing on them within 200 ms, which would be acknowledged late. Nothing \
+               helps when a node of ours is killed; start the engine with that signal ignored",
+        place: "src/link/tcp/mod.rs",
+        test: "a_peer_that_still_writes_when_the_link_hangs_up_is_not_cut_off",
+    };
     /// Header compression flags from the wrong end.
     CompressionBits = Entry {
         name: "compression flags from the wrong end",

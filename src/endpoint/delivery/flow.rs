@@ -23,6 +23,10 @@ const SEEKING: usize = 1;
 /// The longest wait before sending again to somebody whose address is unknown. Whoever hears it
 /// remembers such a message for a short time only.
 const SEEKING_TIMEOUT: Duration = Duration::from_millis(400);
+/// The shortest wait before sending again on a connection, which loses nothing: only a receiver that
+/// was busy makes repeating of use. Twice what Junior waits; what comes to it twice it acknowledges
+/// twice, also to those who have hung up since, and its engine may end of that.
+const CONNECTED_TIMEOUT: Duration = Duration::from_millis(200);
 /// So many more than the window allows may be on their way if they are urgent, by priority: what
 /// is urgent does not wait for the answers to what is not.
 const RESERVE: [usize; Priority::ALL.len()] = [0, 0, 8, 32];
@@ -90,6 +94,8 @@ pub(super) struct Flow {
     silent: bool,
     /// Whether the address is known.
     pub(super) known: bool,
+    /// Whether it is at the other end of a connection.
+    pub(super) connected: bool,
     /// By priority, whether it stands in the list of those that have something to send.
     pub(super) listed: [bool; Priority::ALL.len()],
     /// Messages of which a packet was sent as often as is allowed.
@@ -119,6 +125,7 @@ impl Flow {
             active: now,
             silent: false,
             known: false,
+            connected: false,
             listed: Default::default(),
             exhausted: Vec::new(),
             floor: 0,
@@ -379,10 +386,10 @@ impl Flow {
     /// When all that is on its way counts as lost.
     fn repetition(&self) -> Option<Instant> {
         let timeout = self.round_trip.timeout();
-        let timeout = if self.known {
-            timeout
-        } else {
-            timeout.min(SEEKING_TIMEOUT)
+        let timeout = match (self.known, self.connected) {
+            (false, _) => timeout.min(SEEKING_TIMEOUT),
+            (true, false) => timeout,
+            (true, true) => timeout.max(CONNECTED_TIMEOUT),
         };
         self.armed.map(|armed| armed + timeout)
     }

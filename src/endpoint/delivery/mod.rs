@@ -28,7 +28,7 @@ use super::{
     Config, Counter, Endpoint, Event, MessageHandle, Outgoing, SendError, Transmit, Unacknowledged,
 };
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Priority, Version};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, Priority, Version};
 use flow::{Flow, Progress};
 use parcel::Parcel;
 
@@ -295,8 +295,10 @@ impl Endpoint {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
         let cutting = self.cutting(destination, version);
+        let connected = route.is_some_and(|(path, _)| self.framing(path.link) == Framing::Jtcp);
         let flow = self.deliveries.flows.get_mut(&destination)?;
         flow.known = route.is_some();
+        flow.connected = connected;
         let begin = |length| (cutting.cut(length), version);
         let (mut frame, tries) = flow.take(now, priority, &mut self.numbers, begin)?;
         frame.destination = destination;

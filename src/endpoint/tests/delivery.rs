@@ -273,3 +273,40 @@ fn a_message_whose_numbers_are_still_under_way_waits_and_holds_up_nobody() {
     assert_eq!(rig.events(), [told]);
     assert_eq!(rig.transmits().len(), 2);
 }
+
+#[test]
+fn on_a_connection_nothing_is_sent_again_for_want_of_a_quick_answer() {
+    const CONNECTIONS: LinkId = LinkId(1);
+    let mut rig = Rig::new();
+    let stream = LinkProfile {
+        framing: crate::wire::Framing::Jtcp,
+        ..LinkProfile::default()
+    };
+    rig.endpoint.add_link(CONNECTIONS, stream);
+    let connection = Path {
+        link: CONNECTIONS,
+        peer: SocketAddr::from(([10, 0, 0, PEER_HOST], 33_918)).into(),
+    };
+    let hear = |rig: &mut Rig, flags, sequence, payload| {
+        let frame = Frame {
+            flags,
+            sequence,
+            ..from_peer(payload)
+        };
+        rig.endpoint.handle_frame(rig.now, connection, &frame);
+    };
+    let positive = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    hear(&mut rig, Flags::default(), 900, QUERY_HEARTBEAT);
+    rig.send(reliable(large(1425 * 3))).unwrap();
+    assert_eq!(rig.transmits().len(), 3);
+    rig.pass(Duration::from_millis(1));
+    hear(&mut rig, positive, 1, b"");
+    // As recorded: Junior's engine pauses for 15 ms amid a large message.
+    for _millisecond in 0..150 {
+        rig.pass(Duration::from_millis(1));
+        assert_eq!(rig.transmits(), []);
+    }
+    // A receiver that was busy has acknowledged nothing, and never will unless it is asked again.
+    rig.pass(Duration::from_millis(100));
+    assert_eq!(rig.transmits().len(), 2);
+}

@@ -67,6 +67,8 @@ pub(super) struct Connection {
     /// Messages lost, and no octet taken, since when; `None` in it until the clock is known.
     stuck: Option<Option<Instant>>,
     failed: Option<io::Error>,
+    /// Whether we have said that nothing more comes.
+    hung_up: bool,
 }
 
 impl Connection {
@@ -89,6 +91,7 @@ impl Connection {
             overflows: 0,
             stuck: None,
             failed: None,
+            hung_up: false,
         })
     }
 
@@ -108,7 +111,7 @@ impl Connection {
             });
             version
         });
-        if spoken != version {
+        if spoken != version || self.hung_up {
             return false;
         }
         let octets = message.len();
@@ -173,6 +176,16 @@ impl Connection {
         if self.leaving.is_empty() {
             // An idle connection holds no memory.
             self.leaving = BytesMut::new();
+        }
+    }
+
+    /// Says that nothing more comes, once nothing waits any more. What the other side still has to
+    /// say is to be read: closing at once would tell it that something was lost.
+    pub(super) fn hang_up(&mut self) {
+        if !self.hung_up && self.leaving.is_empty() && self.backlog.is_empty() {
+            self.hung_up = true;
+            // Where that fails there is nobody any more.
+            let _ = SockRef::from(&self.stream).shutdown(std::net::Shutdown::Write);
         }
     }
 

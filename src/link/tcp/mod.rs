@@ -236,6 +236,23 @@ impl TcpLink {
         flushed
     }
 
+    /// Says on each connection that nothing more comes, and opens no new ones. Ready when the other
+    /// sides have closed theirs too, which [`receive`](Self::receive) finds out.
+    ///
+    /// A connection that is closed while something is on its way to us is reset, and whoever writes
+    /// then gets a signal that ends it, unless it has thought of that. Junior's run-time engine has
+    /// not.
+    pub fn hang_up(&mut self) -> Poll<()> {
+        self.listener = None;
+        self.dials.clear();
+        self.connections.values_mut().for_each(Connection::hang_up);
+        if self.connections.is_empty() {
+            Poll::Ready(())
+        } else {
+            Poll::Pending
+        }
+    }
+
     /// Opens connections and takes in what has arrived on them; whether some had more than their
     /// share.
     pub fn receive(

@@ -31,10 +31,16 @@ fn test(size: usize) -> Bytes {
     message.into()
 }
 
-/// Sends a message, and gets it back as it was.
+/// Sends a message, gets it back as it was, and takes leave.
 pub(super) async fn send(told: &Told) -> Outcome {
+    let (node, port) = open(told)?;
+    let outcome = there_and_back(port, told).await;
+    node.shutdown().await;
+    outcome
+}
+
+async fn there_and_back(mut port: Port, told: &Told) -> Outcome {
     let is_acknowledged = told.by != "unacknowledged";
-    let mut port = open(told)?;
     greet(&mut port, told).await?;
     let message = test(told.size);
     loop {
@@ -57,7 +63,7 @@ pub(super) async fn send(told: &Told) -> Outcome {
 
 /// Has messages come back again and again, and tells of each.
 pub(super) async fn keep(told: &Told) -> Outcome {
-    let mut port = open(told)?;
+    let (_node, mut port) = open(told)?;
     let message = test(GREETING);
     loop {
         let outgoing = Outgoing::new(port.id(), told.other, message.clone());
@@ -107,7 +113,7 @@ pub(super) async fn echo(told: &Told) -> Outcome {
     }
 }
 
-fn open(told: &Told) -> Result<Port, String> {
+fn open(told: &Told) -> Result<(Node, Port), String> {
     let config = if told.by == "tcp" {
         let peer = format!("{}@{}:3794", told.other, told.address);
         let peer = peer.parse().map_err(|error| format!("{peer}: {error}"))?;
@@ -116,8 +122,10 @@ fn open(told: &Told) -> Result<Port, String> {
         told.config()?
     };
     let node = Node::start(config).map_err(|error| error.to_string())?;
-    node.attach(told.id.component())
-        .map_err(|error| error.to_string())
+    let port = node
+        .attach(told.id.component())
+        .map_err(|error| error.to_string())?;
+    Ok((node, port))
 }
 
 /// Makes both known to each other, so that what is large does not go to everybody.
