@@ -4,20 +4,23 @@
 //! The captures are in the directory that `JAUS_SHARED` names (default: `../shared`). Without them
 //! nothing is tested, loudly; with `CI` set that is a failure.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::net::{IpAddr, SocketAddr};
 use std::time::Duration;
 
-use bytes::{Bytes, BytesMut};
+use bytes::{Buf, Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::gateway::{Counter, Settings};
 use jaus::ra::RaId;
+use jaus::service::ground::WorldStore;
 use jaus::service::mobility::Vehicle;
 use jaus::service::{AccessControl, Kind, Service, Stack};
 use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 use jaus::view::{Capture, Network};
 use jaus::wire::judp;
+use jaus::world;
+use redb::backends::InMemoryBackend;
 
 use crate::shared;
 use crate::world::{World, address, stack};
@@ -133,6 +136,93 @@ fn in_place_of_a_node_manager_every_question_of_the_other_is_answered() {
         assert!(asked >= 5, "{file}: {asked}");
         assert!(world.attached().contains(&"10.1.35".to_owned()), "{file}");
     }
+}
+
+/// What a Report Services lists: the types with the codes that they understand.
+fn services(mut data: Bytes) -> Vec<(u16, Vec<u16>)> {
+    let commands = |data: &mut Bytes| {
+        let code = |data: &mut Bytes| (data.get_u16_le(), data.get_u32_le()).0;
+        (0..data.get_u8()).map(|_| code(data)).collect::<Vec<_>>()
+    };
+    let listed = (0..data.get_u8()).map(|_| {
+        let service = (data.get_u16_le(), commands(&mut data));
+        commands(&mut data);
+        service
+    });
+    listed.collect()
+}
+
+/// Whether a message answers the question with what OpenJAUS can list.
+fn is_of_use(question: &Said, answer: &Said) -> bool {
+    let (asked, data) = (&question.data, &answer.data);
+    let back = (question.destination, question.source) == (answer.source, answer.destination);
+    back && match (question.code, answer.code) {
+        // The same kind of name, and one that is not empty.
+        (0x2B00, 0x4B00) => data.len() == 84 && data[0] == asked[0] && data[4] != 0,
+        (0x2B01, 0x4B01) => lists_all_components(data),
+        (0x2B03, 0x4B03) => lists_what_belongs_to(question.destination.component, data),
+        // The event is confirmed.
+        (0x01F0, 0x01F3) => data[2..4] == asked[2..4] && data.last() == Some(&0),
+        _ => false,
+    }
+}
+
+/// One node, with its manager, its communicator and both parts of the component.
+fn lists_all_components(configuration: &Bytes) -> bool {
+    let (nodes, listed) = configuration.split_at(3);
+    let listed: BTreeSet<&[u8]> = listed.chunks(2).collect();
+    let parts: [&[u8]; 4] = [&[1, 1], &[33, 1], &[35, 1], &[61, 1]];
+    nodes == [1, 1, 4] && listed == BTreeSet::from(parts)
+}
+
+fn lists_what_belongs_to(part: u8, report: &Bytes) -> bool {
+    let listed = services(report.clone());
+    let has = |kind: u16, code: u16| listed.iter().any(|it| it.0 == kind && it.1.contains(&code));
+    match part {
+        33 => has(0, 0x000D) && has(33, 0x0405),
+        61 => has(0, 0x000D) && has(61, 0x2A23),
+        _ => has(0, 0x2B00),
+    }
+}
+
+#[test]
+fn what_openjaus_asks_a_newcomer_is_answered_so_that_it_can_list_all_of_it() {
+    let Some(recorded) = recorded("openjaus33-peer-wire.pcap", judp::PORT) else {
+        return;
+    };
+    let openjaus: IpAddr = [10, 77, 0, 1].into();
+    let of_it = recorded.into_iter().filter(|it| it.from.ip() == openjaus);
+    let of_it: Vec<_> = of_it.map(|it| (it.time, it.octets)).collect();
+    let mut world = World::new(Settings::default());
+    // As the newcomer of the recording: a primitive driver and a knowledge store.
+    let driver = Vehicle::new(Pilot::new(
+        SkidSteer::new(SkidSteerConfig::default()),
+        Frame::at(52.5, 13.4),
+    ));
+    let objects = world::World::on(InMemoryBackend::new()).unwrap();
+    let store = WorldStore::new(objects, Frame::at(52.5, 13.4), |error| panic!("{error}"));
+    let offers: Vec<Box<dyn Service>> = vec![
+        Box::new(driver.primitive_driver()),
+        Box::new(store.vector_knowledge_store()),
+    ];
+    world.add_jaus(stack(JausId::new(30, 1, 1), Kind::Vehicle, "Rover", offers));
+    world.run(Duration::from_secs(5));
+    replay(&mut world, &of_it);
+
+    let said: Vec<Said> = world.sent.iter().map(read).collect();
+    let questions = of_it.iter().map(|(_, octets)| read(octets));
+    let questions = questions.filter(|it| it.code == 0x01F0 || (0x2000..0x3000).contains(&it.code));
+    let mut asked = 0;
+    for question in questions {
+        asked += 1;
+        assert!(
+            said.iter().any(|it| is_of_use(&question, it)),
+            "{question:?}"
+        );
+    }
+    assert_eq!(asked, 12);
+    // And what it answers is enough for its own components to be shown.
+    assert_eq!(world.attached(), ["10.1.1", "10.1.35", "250.1.1"]);
 }
 
 /// A message between components of one host, as it would come over the network to our vehicle.
