@@ -168,6 +168,7 @@ impl Stack {
     /// A message for this component has arrived.
     pub fn handle_message(&mut self, now: Instant, message: &Received) {
         self.discovery.hear(now, message.source);
+        self.subscriptions.hear(now, message.source);
         let answered = self.inquiries.handle_message(now, message, &mut self.out);
         let mut handled = self.discovery.handle_message(now, message, &mut self.out);
         if handled == Handled::No {

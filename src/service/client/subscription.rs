@@ -49,6 +49,8 @@ pub(super) struct Subscription {
     lifetime_asked: u32,
     /// When the last sign of the event came.
     heard: Instant,
+    /// When the peer said anything last.
+    peer_heard: Instant,
     /// The last report's number, since the last confirmation.
     sequence: Option<u8>,
     /// An event that came before its confirmation.
@@ -83,6 +85,8 @@ impl Subscription {
     const LEAST_SILENCE: Duration = Duration::from_millis(500);
     /// The longest pause between two attempts to bring an event back.
     const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+    /// A peer that says something after so long a silence may have been away.
+    const ABSENCE: Duration = Duration::from_secs(1);
 
     pub(super) fn new(now: Instant, order: Order, out: &mut Outbox) -> Self {
         let mut new = Self {
@@ -103,6 +107,7 @@ impl Subscription {
             lifetime: None,
             lifetime_asked: 0,
             heard: now,
+            peer_heard: now,
             sequence: None,
             early: None,
             last: None,
@@ -283,6 +288,16 @@ impl Subscription {
         if self.state == State::Down {
             self.asked = 0;
             self.next_ask = Some(now);
+        }
+    }
+
+    /// The peer has said something, whatever it was: if it was silent, it is asked at once rather
+    /// than when the next attempt is due. Only then, for a peer may talk all the time and not answer.
+    pub(super) fn handle_sign_of_life(&mut self, now: Instant) {
+        let silence = now.saturating_duration_since(self.peer_heard);
+        self.peer_heard = now;
+        if self.state == State::Down && silence >= Self::ABSENCE {
+            self.next_ask = self.next_ask.map(|next| next.min(now));
         }
     }
 

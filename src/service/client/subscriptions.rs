@@ -151,6 +151,13 @@ impl Subscriptions {
         self.leaving.push_back(leaving);
     }
 
+    /// A component has said something.
+    pub(in crate::service) fn hear(&mut self, now: Instant, peer: JausId) {
+        for subscription in self.alive.values_mut().filter(|it| it.peer == peer) {
+            subscription.handle_sign_of_life(now);
+        }
+    }
+
     pub(in crate::service) fn handle_message(
         &mut self,
         now: Instant,

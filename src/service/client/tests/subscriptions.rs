@@ -349,6 +349,30 @@ fn when_discovery_loses_the_peer_it_is_down_and_asked_for_when_the_peer_is_found
 }
 
 #[test]
+fn a_peer_that_speaks_again_after_a_silence_is_asked_at_once_and_not_for_every_word() {
+    let (mut bench, _) = up(When::hz(10.0));
+    fire(&mut bench, 7, 0);
+    bench.run_ms(6000);
+    bench.sent.clear();
+    // Among the pauses between two attempts, which have become long.
+    bench.hear(PEER, &QueryStatus {});
+    bench.run_ms(0);
+    let asked = bench.sent::<CreateEvent>();
+    assert_eq!(asked.len(), 1);
+    for _ in 0..40 {
+        bench.hear(PEER, &QueryStatus {});
+        bench.run_ms(100);
+    }
+    assert!(bench.sent::<CreateEvent>().len() <= 1);
+    confirm(&mut bench, asked[0].request_id, 7, 10.0);
+    assert_eq!(
+        told(&mut bench)[2..],
+        [Told::Up(Some(10))],
+        "after the report and its end"
+    );
+}
+
+#[test]
 fn a_peer_that_restarted_and_does_not_offer_the_report_yet_is_asked_again() {
     let (mut bench, _) = up(When::OnChange);
     bench.run_ms(20_000);
