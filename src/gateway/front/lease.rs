@@ -30,7 +30,16 @@ pub(super) struct Lease {
     /// Whether the next rejection is about a hold of ours that a request of ours with more authority
     /// has ended: OpenJAUS rejects whom it takes control from, and then confirms.
     outranked_ourselves: bool,
+    /// A release that is said again, because nothing answers it.
+    farewell: Option<Farewell>,
     said: Said,
+}
+
+/// How often a release is still to be said, and when next.
+#[derive(Debug, Clone, Copy)]
+struct Farewell {
+    left: u8,
+    next: Instant,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,6 +72,9 @@ impl Lease {
     const RETRY: Duration = Duration::from_millis(300);
     /// Renewals of clients are passed on as seldom as this.
     const RENEWAL: Duration = Duration::from_secs(5);
+    /// How often a release is said again. One that got lost would leave the component to us for ever;
+    /// whoever is not controlled by us any more ignores it.
+    const FAREWELLS: u8 = 2;
 
     pub(super) fn new(patience: Duration, most: u8) -> Self {
         Self {
@@ -70,6 +82,7 @@ impl Lease {
             patience,
             most,
             outranked_ourselves: false,
+            farewell: None,
             said: Said::default(),
         }
     }
@@ -138,12 +151,12 @@ impl Lease {
     }
 
     /// A client gives control back.
-    pub(super) fn release(&mut self, client: JausId) {
+    pub(super) fn release(&mut self, now: Instant, client: JausId) {
         match self.state {
             State::Held { client: it, .. } | State::Asking { client: it, .. }
                 if it.id == client =>
             {
-                self.let_go();
+                self.let_go(now);
                 self.reject(client, Rejection::CONTROL_RELEASED);
             }
             // Whoever asks again, because the answer got lost, gets it again.
@@ -153,12 +166,12 @@ impl Lease {
     }
 
     /// A client is gone.
-    pub(super) fn forget(&mut self, client: JausId) {
+    pub(super) fn forget(&mut self, now: Instant, client: JausId) {
         match self.state {
             State::Held { client: it, .. } | State::Asking { client: it, .. }
                 if it.id == client =>
             {
-                self.let_go();
+                self.let_go(now);
             }
             State::Free | State::Held { .. } | State::Asking { .. } => {}
         }
@@ -183,7 +196,7 @@ impl Lease {
             }
             (State::Held { .. }, 0) => {}
             // It thinks that we control it.
-            (State::Free, _) => self.let_go(),
+            (State::Free, _) => self.let_go(now),
         }
     }
 
@@ -192,6 +205,7 @@ impl Lease {
         if std::mem::take(&mut self.outranked_ourselves) {
             return;
         }
+        self.farewell = None;
         match std::mem::replace(&mut self.state, State::Free) {
             State::Asking { client, .. } => {
                 self.confirm(client.id, Confirmation::INSUFFICIENT_AUTHORITY);
@@ -202,6 +216,10 @@ impl Lease {
     }
 
     pub(super) fn handle_timeout(&mut self, now: Instant) {
+        if let Some(farewell) = self.farewell.filter(|it| it.next <= now) {
+            self.said.to_ra.push((RELEASE, Bytes::new()));
+            self.say_again(now, farewell.left - 1);
+        }
         let State::Asking {
             client,
             next,
@@ -212,7 +230,7 @@ impl Lease {
         };
         if now >= until {
             // Its answer may be what was lost.
-            self.let_go();
+            self.let_go(now);
             self.confirm(client.id, Confirmation::NOT_AVAILABLE);
         } else if now >= next {
             let next = (now + Self::RETRY).min(until);
@@ -225,15 +243,18 @@ impl Lease {
         }
     }
 
-    pub(super) const fn poll_timeout(&self) -> Option<Instant> {
-        match self.state {
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        let asking = match self.state {
             State::Asking { next, .. } => Some(next),
             State::Free | State::Held { .. } => None,
-        }
+        };
+        let farewell = self.farewell.map(|it| it.next);
+        asking.into_iter().chain(farewell).min()
     }
 
     fn ask(&mut self, now: Instant, client: Controller) {
         let until = now + self.patience;
+        self.farewell = None;
         self.state = State::Asking {
             client,
             next: (now + Self::RETRY).min(until),
@@ -247,10 +268,16 @@ impl Lease {
         self.said.to_ra.push((REQUEST, body));
     }
 
-    fn let_go(&mut self) {
+    fn let_go(&mut self, now: Instant) {
         self.state = State::Free;
         self.outranked_ourselves = false;
         self.said.to_ra.push((RELEASE, Bytes::new()));
+        self.say_again(now, Self::FAREWELLS);
+    }
+
+    fn say_again(&mut self, now: Instant, left: u8) {
+        let next = now + Self::RETRY;
+        self.farewell = (left > 0).then_some(Farewell { left, next });
     }
 
     fn confirm(&mut self, client: JausId, response_code: Confirmation) {
@@ -360,14 +387,42 @@ mod tests {
             lease.handle_confirm(now, 0);
             lease.take_said();
             if gone {
-                lease.forget(CLIENT);
+                lease.forget(now, CLIENT);
             } else {
-                lease.release(CLIENT);
+                lease.release(now, CLIENT);
             }
             let said = lease.take_said();
             assert_eq!(said.to_ra, [(RELEASE, Bytes::new())]);
             assert_eq!(told(&said).len(), usize::from(!gone));
             assert!(lease.controller().is_none());
+        }
+    }
+
+    #[test]
+    fn a_release_is_said_thrice_unless_somebody_asks_again() {
+        for asked_again in [false, true] {
+            let (mut lease, now) = lease();
+            lease.request(now, CLIENT, 100);
+            lease.handle_confirm(now, 0);
+            lease.release(now, CLIENT);
+            let mut releases = 0;
+            if asked_again {
+                lease.request(now, RIVAL, 50);
+                lease.handle_confirm(now, 0);
+            }
+            releases += lease
+                .take_said()
+                .to_ra
+                .iter()
+                .filter(|it| it.0 == RELEASE)
+                .count();
+            while let Some(wake) = lease.poll_timeout() {
+                lease.handle_timeout(wake);
+                let said = lease.take_said().to_ra;
+                releases += said.iter().filter(|it| it.0 == RELEASE).count();
+            }
+            assert_eq!(releases, if asked_again { 1 } else { 3 });
+            assert_eq!(lease.obeys(RIVAL), asked_again);
         }
     }
 

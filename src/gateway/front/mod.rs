@@ -160,7 +160,7 @@ impl Front {
                     self.lease.request(now, client, set.authority_code);
                 }
             }
-            Some(ReleaseControl::CODE) => self.lease.release(client),
+            Some(ReleaseControl::CODE) => self.lease.release(now, client),
             Some(CreateEvent::CODE) => {
                 let created = CreateEvent::decode(&message.payload);
                 let wanted = created.map(|it| (hz_of(&it), it.query_message));
@@ -376,7 +376,7 @@ impl Front {
 
     /// A JAUS client is gone.
     pub(super) fn forget(&mut self, now: Instant, client: JausId, tally: &mut Tally) {
-        self.lease.forget(client);
+        self.lease.forget(now, client);
         self.stack.forget(now, client);
         self.held.retain(|it| it.message.source != client);
         self.relayed.retain(|it| it.client != client);
@@ -444,7 +444,7 @@ impl Front {
     /// Ends what runs with the RA component, because we stop.
     pub(super) fn take_leave(&mut self, now: Instant, tally: &mut Tally) {
         if let Some(controller) = self.lease.controller() {
-            self.lease.release(controller.id);
+            self.lease.release(now, controller.id);
         }
         let nothing = BTreeMap::new();
         self.streams.want(now, &nothing, &mut self.connections);
