@@ -2,6 +2,8 @@
 #![cfg(feature = "cli")]
 #![allow(
     clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::disallowed_methods,
     clippy::disallowed_types,
     reason = "a test, with sockets that are in the way"
 )]
@@ -9,6 +11,8 @@
 mod cli_support;
 
 use std::net::UdpSocket;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use cli_support::{Running, own_group, run};
 use serde_json::Value as Json;
@@ -47,6 +51,38 @@ fn a_sound_network_is_found_sound_and_the_neighbours_are_named() {
     );
     let ids = of(&report, "ids");
     assert_eq!(ids[0]["what"], "nobody else has the id 108.1.1");
+}
+
+/// Nobody who speaks AS5669A hears OpenJAUS: it has a group of its own.
+#[test]
+fn a_system_of_the_reference_architecture_is_named_with_the_way_to_it() {
+    // Report Heartbeat Pulse of 20.1.35.1 to all node managers, as OpenJAUS sends it each second.
+    let beat = b"JAUS01.0\x06\x02\x02\x42\x01\x01\xFF\xFF\x01\x23\x01\x14\0\0\0\0";
+    let heart = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let over = AtomicBool::new(false);
+    let group = own_group(3);
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let (status, report) = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !over.load(Ordering::Relaxed) {
+                heart.send_to(beat, "224.1.0.1:3794").unwrap();
+                std::thread::sleep(Duration::from_millis(100));
+            }
+        });
+        let examined = examine(&network);
+        over.store(true, Ordering::Relaxed);
+        examined
+    });
+    let neighbours = of(&report, "neighbours");
+    let told = neighbours.iter().find(|it| {
+        it["what"]
+            .as_str()
+            .unwrap()
+            .contains("subsystem 20 of the Ref")
+    });
+    let advice = told.expect("OpenJAUS")["advice"].as_str().unwrap();
+    assert!(advice.contains("jaus-ra-gateway"), "{advice}");
+    assert_ne!(status, 2, "{report}");
 }
 
 #[test]

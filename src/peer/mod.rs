@@ -120,6 +120,14 @@ impl Peer {
         }
     }
 
+    /// Whose fork it is, if it is one: what gives that away is seen of it too.
+    pub(crate) const fn fork_of(self) -> Option<Self> {
+        match self {
+            Self::Jts | Self::Fkie => Some(Self::Junior),
+            _ => None,
+        }
+    }
+
     /// Where it departs from the standard.
     pub fn departures(self) -> impl Iterator<Item = Departure> {
         let all = Departure::ALL.iter().copied();

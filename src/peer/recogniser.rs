@@ -157,6 +157,17 @@ impl Recogniser {
         self.note(Sign::RepeatedVersion);
     }
 
+    /// Takes note that of the reserved message types some were acknowledged, and not those that have
+    /// one of the two lowest bits.
+    pub fn handle_misread_type(&mut self) {
+        self.note(Sign::MisreadType);
+    }
+
+    /// Takes note that something was acknowledged that was for an id with a 0.
+    pub fn handle_answer_for_zero(&mut self) {
+        self.note(Sign::AnswersForZero);
+    }
+
     /// Who it is, as far as can be told.
     #[must_use]
     pub fn verdict(&self) -> Verdict {

@@ -30,6 +30,11 @@ pub enum Sign {
     CallsUnknownIds,
     /// The first message that was heard has the number 1.
     BeginsWithOne,
+    /// Reserved message types that are acknowledged, but for those that read as header compression
+    /// from the wrong end. It has to be provoked.
+    MisreadType,
+    /// An acknowledgement of what was for an id with a 0. It has to be provoked.
+    AnswersForZero,
     /// Sequence numbers that count on for each destination by itself.
     NumbersByDestination,
     /// Questions to all components of one node, as global broadcasts.
@@ -42,7 +47,7 @@ pub enum Sign {
 
 impl Sign {
     /// All of them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::RepeatedCode,
         Self::StaleOctets,
         Self::RegistersAcrossSubsystems,
@@ -54,6 +59,8 @@ impl Sign {
         Self::LongFragments,
         Self::CallsUnknownIds,
         Self::BeginsWithOne,
+        Self::MisreadType,
+        Self::AnswersForZero,
         Self::NumbersByDestination,
         Self::AsksWholeNodes,
         Self::ZeroInDestination,
@@ -74,7 +81,9 @@ impl Sign {
             Self::PriorityFault
             | Self::LongFragments
             | Self::CallsUnknownIds
-            | Self::BeginsWithOne => Peer::Junior,
+            | Self::BeginsWithOne
+            | Self::MisreadType => Peer::Junior,
+            Self::AnswersForZero => Peer::Jts,
             Self::NumbersByDestination | Self::AsksWholeNodes => Peer::OpenJausSdk,
             Self::ZeroInDestination | Self::IopService => Peer::Iop,
         }
@@ -86,11 +95,13 @@ impl Sign {
             Self::RepeatedCode
             | Self::JausPlusPlusService
             | Self::PriorityFault
+            | Self::MisreadType
             | Self::IopService => 4,
             Self::StaleOctets
             | Self::RegistersAcrossSubsystems
             | Self::RepeatedVersion
             | Self::LongFragments
+            | Self::AnswersForZero
             | Self::NumbersByDestination
             | Self::AsksWholeNodes
             | Self::ZeroInDestination => 2,
@@ -101,8 +112,8 @@ impl Sign {
         }
     }
 
-    const fn bit(self) -> u16 {
-        1 << self as u16
+    const fn bit(self) -> u32 {
+        1 << self as u32
     }
 }
 
@@ -125,6 +136,8 @@ impl fmt::Display for Sign {
                 "a message for one component went to everybody and wants an acknowledgement"
             }
             Self::BeginsWithOne => "the first message that was heard of it has the number 1",
+            Self::MisreadType => "it takes bits of the message type for header compression",
+            Self::AnswersForZero => "it answers for an id with a 0 in it",
             Self::NumbersByDestination => "its sequence numbers count for each destination",
             Self::AsksWholeNodes => {
                 "it asks all components of a node, in global broadcasts, what others ask one"
@@ -137,7 +150,7 @@ impl fmt::Display for Sign {
 
 /// A set of signs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Signs(u16);
+pub(super) struct Signs(u32);
 
 impl Signs {
     /// Says whether it is new.
@@ -153,9 +166,14 @@ impl Signs {
             .filter(move |sign| self.0 & sign.bit() != 0)
     }
 
-    /// How much they say for a peer.
+    /// How much they say for a peer. What speaks for Junior speaks for a fork of it as well, if
+    /// anything speaks for that one alone.
     pub(super) fn weight(self, peer: Peer) -> u8 {
         let of_it = self.iter().filter(|sign| sign.peer() == peer);
-        of_it.map(Sign::weight).sum()
+        let alone = of_it.map(Sign::weight).sum();
+        match peer.fork_of() {
+            Some(original) if alone > 0 => alone + self.weight(original),
+            _ => alone,
+        }
     }
 }

@@ -183,6 +183,22 @@ fn junior_is_likely_by_its_first_call_and_certain_by_its_fault() {
 }
 
 #[test]
+fn what_speaks_for_junior_speaks_for_a_fork_that_gives_itself_away() {
+    let mut recogniser = Recogniser::new();
+    recogniser.handle_answer_for_zero();
+    let guessed = recogniser.verdict();
+    assert_eq!(
+        (guessed.peer, guessed.certainty),
+        (Peer::Jts, Certainty::Likely)
+    );
+    recogniser.handle_misread_type();
+    assert_eq!(recogniser.certain(), Peer::Jts);
+    let mut recogniser = Recogniser::new();
+    recogniser.handle_misread_type();
+    assert_eq!(recogniser.certain(), Peer::Junior);
+}
+
+#[test]
 fn the_judging_tool_is_told_by_how_it_counts_and_whom_it_asks() {
     let node = US.whole_node();
     let mut frames = Vec::new();

@@ -7,6 +7,7 @@ mod host;
 mod neighbours;
 mod peer;
 mod port;
+mod ra;
 
 use std::time::Duration;
 

@@ -14,6 +14,7 @@ use jaus::node::{Config, Events, LinkReport, Node};
 use jaus::wire::Version;
 
 use super::finding::Finding;
+use super::ra::RaSystems;
 
 /// Peers that are named one by one.
 const MOST: usize = 12;
@@ -22,11 +23,12 @@ const MOST: usize = 12;
 /// that the node to come is to have.
 pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration) -> Vec<Finding> {
     const CHECK: &str = "network";
-    let node = match Node::start(config.or_any_free_port()) {
+    let node = match Node::start(config.clone().or_any_free_port()) {
         Ok(node) => node,
         Err(error) => return vec![Finding::problem(CHECK, error)],
     };
     let mut events = node.events();
+    let mut elders = RaSystems::open(&config);
     let started = Component::builder(Kind::OtherSubsystem, "jaus doctor").attach(&node, 1);
     let component = match started {
         Ok(component) => component,
@@ -36,6 +38,7 @@ pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration)
     tokio::select! {
         () = runtime::end(Some(time)) => {}
         () = watch(&mut events, &mut moved) => {}
+        () = elders.listen() => {}
     }
     let own = component.id();
     let (directory, peers, links) = (component.directory(), node.peers(), node.links());
@@ -43,7 +46,11 @@ pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration)
     node.shutdown().await;
     let peers: Vec<Peer> = peers.into_iter().filter(|peer| peer.id != own).collect();
     let mut findings: Vec<Finding> = links.iter().filter_map(came_back).collect();
-    findings.extend(who(&peers, &directory));
+    let elders: Vec<Finding> = elders.findings().collect();
+    if elders.is_empty() || !peers.is_empty() {
+        findings.extend(who(&peers, &directory));
+    }
+    findings.extend(elders);
     findings.extend(moved.iter().map(|(&id, places)| two_of(id, places)));
     findings.extend(wanted.map(|id| is_free(id, &peers)));
     findings
@@ -86,7 +93,8 @@ fn who(peers: &[Peer], directory: &Directory) -> Vec<Finding> {
         return vec![Finding::ok(CHECK, "nobody else was heard").advice(
             "if somebody should be: is it on the same network and group, does its firewall let \
              UDP 3794 in, does the switch or access point pass multicast (IGMP snooping without \
-             a querier does not)? `jaus doctor --peer ADDRESS` looks at one host",
+             a querier does not)? `jaus doctor --peer ADDRESS` looks at one host, also at one \
+             that answers no calls (Junior)",
         )];
     }
     let one = |peer: &Peer| {

@@ -11,6 +11,7 @@ use jaus::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version};
 
 use super::exchange::{Exchange, Mark, Trial, Verdict};
 use super::large::Transfer;
+use super::reserved::Reserved;
 use super::seen::{Heard, Seen};
 use super::target::Target;
 
@@ -128,6 +129,8 @@ pub(super) struct Case {
     pub(super) in_control: bool,
     /// A large message on its way to the peer.
     pub(super) transfer: Option<Transfer>,
+    /// What it does with what is reserved.
+    pub(super) reserved: Reserved,
     /// Whether somebody there sends back what nobody acts on.
     pub(super) echoes: bool,
     pub(super) unsent: VecDeque<Send>,
@@ -149,6 +152,7 @@ impl Case {
             open_events: Vec::new(),
             in_control: false,
             transfer: None,
+            reserved: Reserved::default(),
             echoes: false,
             unsent: VecDeque::new(),
             sequence: 0,

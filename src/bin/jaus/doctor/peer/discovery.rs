@@ -59,10 +59,18 @@ pub(super) fn not_identified(case: &Case, mark: usize) -> Verdict {
             format!("examine that: --peer {other}@{}", heard.from),
         );
     }
+    let what = format!("{id} does not answer Query Identification");
+    let cause = "the component offers no Discovery service (a bare Junior client has no services)";
+    if case.told(0).next().is_some() {
+        return Verdict::failed(
+            what,
+            cause,
+            "ask its node's discovery component, if it has one",
+        );
+    }
     Verdict::failed(
-        format!("{id} does not answer Query Identification"),
-        "the component offers no Discovery service (a bare Junior client has no services), or the \
-         id is not the one that it has",
+        what,
+        format!("{cause}, or the id is not the one that it has"),
         "ask its node's discovery component; look at the id in the peer's settings",
     )
 }

@@ -155,9 +155,12 @@ pub(super) fn arrived(case: &mut Case, mark: usize) -> Judgement {
     Judgement::Over(Verdict::ok(format!("{rate:.1} Hz")))
 }
 
-/// When the reports of the first open event came.
+/// When the reports of the first open event came; several that come at once are one, which JAUS++
+/// sends up to four times.
 fn times(case: &Case, mark: usize) -> Vec<Duration> {
     use jaus::codec::Message;
+
+    const AT_ONCE: Duration = Duration::from_millis(25);
     let Some(event) = case.open_events.first() else {
         return Vec::new();
     };
@@ -165,12 +168,14 @@ fn times(case: &Case, mark: usize) -> Vec<Duration> {
     let all = case
         .told(mark)
         .filter(|heard| heard.code() == Some(Event::CODE));
-    all.filter_map(|heard| {
+    let came = all.filter_map(|heard| {
         let told = Event::decode(&heard.frame.payload).ok()?;
         let of_it = report.is_some_and(|code| told.report_message.starts_with(&code));
         (told.event_id == event.id && of_it).then_some(heard.at)
-    })
-    .collect()
+    });
+    let mut times: Vec<_> = came.collect();
+    times.dedup_by(|later, before| later.saturating_sub(*before) < AT_ONCE);
+    times
 }
 
 pub(super) fn not_arrived(case: &Case, mark: usize) -> Verdict {

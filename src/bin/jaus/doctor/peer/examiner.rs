@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::case::{Case, Question, Send, Settings};
 use super::exchange::{Exchange, Trial, Verdict};
 use super::seen::{Arrival, Refusal, TcpAnswer};
-use super::{discovery, events, large, manners, ra, reach, standing};
+use super::{discovery, events, large, manners, ra, reach, reserved, standing};
 
 /// What an exchange begins with.
 pub(super) enum Begin {
@@ -39,7 +39,7 @@ struct Running {
 /// One examination.
 pub(super) struct Examiner {
     case: Case,
-    plan: std::array::IntoIter<Exchange, 32>,
+    plan: std::array::IntoIter<Exchange, 33>,
     running: Option<Running>,
     /// Trials that were given out.
     told: usize,
@@ -232,6 +232,7 @@ fn begin(exchange: Exchange, case: &mut Case, now: Duration) -> Begin {
         Exchange::LargeBack => large::from_peer(case),
         Exchange::Tcp => manners::tcp(case),
         Exchange::Rate => manners::rate(case),
+        Exchange::Reserved => reserved::begin(case),
         Exchange::Sequence => Begin::Over(manners::sequence(case)),
         Exchange::Stacks => Begin::Over(manners::stacks(case)),
         Exchange::Ids => Begin::Over(manners::ids(case)),
@@ -266,6 +267,7 @@ fn judge(exchange: Exchange, case: &mut Case, mark: usize, stage: u8, now: Durat
         Exchange::LargeBack => large::came_back(case, mark, stage),
         Exchange::Tcp => manners::tcp_answered(case),
         Exchange::Rate => manners::all_answered(case, mark),
+        Exchange::Reserved => reserved::acknowledged(case, mark, stage),
         Exchange::Sequence | Exchange::Stacks | Exchange::Ids => Judgement::Wait,
     }
 }
@@ -302,6 +304,7 @@ fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Ve
         Exchange::LargeBack => large::not_back(case, mark, stage),
         Exchange::Tcp => manners::tcp_silent(case),
         Exchange::Rate => manners::some_answered(case, mark),
+        Exchange::Reserved => reserved::over(case, mark, stage),
         Exchange::Sequence | Exchange::Stacks | Exchange::Ids => Verdict::skipped("not asked"),
     }
 }

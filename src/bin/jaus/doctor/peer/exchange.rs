@@ -50,11 +50,13 @@ pub(super) enum Exchange {
     Stacks,
     Ids,
     Rate,
+    /// What does it do with a message type that the standard reserves?
+    Reserved,
 }
 
 impl Exchange {
     /// All of them, in the order of the trials.
-    pub(super) const ALL: [Self; 32] = [
+    pub(super) const ALL: [Self; 33] = [
         Self::Find,
         Self::Reach,
         Self::Answer,
@@ -84,6 +86,7 @@ impl Exchange {
         Self::LargeBack,
         Self::Tcp,
         Self::Rate,
+        Self::Reserved,
         Self::Sequence,
         Self::Stacks,
         Self::Ids,
@@ -123,6 +126,7 @@ impl Exchange {
             Self::LargeBack => "large from it",
             Self::Tcp => "JTCP port",
             Self::Rate => "many at once",
+            Self::Reserved => "reserved type",
             Self::Sequence => "sequence numbers",
             Self::Stacks => "stacks there",
             Self::Ids => "ids",

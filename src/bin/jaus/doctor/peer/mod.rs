@@ -15,6 +15,7 @@ mod profile;
 mod ra;
 mod reach;
 mod report;
+mod reserved;
 mod seen;
 mod sockets;
 mod standing;
@@ -34,6 +35,7 @@ use tokio::time::{Instant, sleep_until};
 
 use self::case::Settings;
 use self::examiner::Examiner;
+pub(super) use self::sockets::RA_GROUP;
 use self::sockets::{Happening, Sockets};
 pub(super) use self::target::Target;
 

@@ -18,8 +18,20 @@ pub(super) enum Profile {
 }
 
 impl Case {
-    /// Who it is, by all that was heard of it.
+    /// Who it is, by all that was heard of it and what it did with what was sent to find out.
     pub(super) fn recognise(&self) -> Verdict {
+        let mut recogniser = self.unprovoked();
+        if self.reserved.misreads_type {
+            recogniser.handle_misread_type();
+        }
+        if self.reserved.answers_for_zero {
+            recogniser.handle_answer_for_zero();
+        }
+        recogniser.verdict()
+    }
+
+    /// What a node would learn of it too, which provokes nothing.
+    fn unprovoked(&self) -> Recogniser {
         let mut recogniser = Recogniser::new();
         let all = self.seen.all().iter();
         for heard in all.filter(|heard| Some(heard.frame.source) == self.id) {
@@ -29,7 +41,7 @@ impl Case {
             let offers = offers.iter();
             recogniser.handle_services(offers.map(|o| (o.urn.as_str(), o.major, o.minor)));
         }
-        recogniser.verdict()
+        recogniser
     }
 
     /// Whether the fragments of what we send are each to begin with the message code.
@@ -88,11 +100,15 @@ impl Profile {
                 .iter()
                 .map(|reason| format!("because {reason}")),
         );
-        if verdict.certainty < Certainty::Certain {
+        if case.unprovoked().certain() != peer {
             let id = case.id.map_or_else(String::new, |id| id.to_string());
+            let once = match verdict.certainty {
+                Certainty::Certain => "it has said enough by itself",
+                _ => "that is certain",
+            };
             lines.push(format!(
-                "→ a node treats it so once that is certain, or if its settings say: [[profile]] \
-                 id = \"{id}\", profile = \"{peer}\""
+                "→ a node treats it so once {once}, or if its settings say: [[profile]] id = \
+                 \"{id}\", profile = \"{peer}\""
             ));
         }
         let departures: Vec<_> = peer.departures().map(|d| d.entry().name).collect();

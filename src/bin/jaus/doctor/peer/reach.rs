@@ -8,6 +8,7 @@ use jaus::address::JausId;
 use jaus::messages::core::{
     QueryHeartbeatPulse, QueryIdentification, query_identification::QueryType,
 };
+use jaus::wire::ra::RaId;
 use jaus::wire::{Frame, Version, judp};
 
 use super::case::{Case, Question, Send, octets};
@@ -86,10 +87,21 @@ fn others(case: &Case) -> Vec<String> {
         .all()
         .iter()
         .filter(|heard| Some(heard.frame.source) != case.id);
-    let set: BTreeSet<(JausId, SocketAddr)> =
-        all.map(|heard| (heard.frame.source, heard.from)).collect();
+    let set: BTreeSet<(JausId, bool, SocketAddr)> = all
+        .map(|heard| (heard.frame.source, is_of_ra(heard), heard.from))
+        .collect();
     let named = set.iter().take(SOME);
-    named.map(|(id, from)| format!("{id} at {from}")).collect()
+    named
+        .map(|(id, of_ra, from)| match of_ra {
+            true => format!("{} at {from} (Reference Architecture)", RaId::from(*id)),
+            false => format!("{id} at {from}"),
+        })
+        .collect()
+}
+
+/// Whether an id has the four numbers of the Reference Architecture.
+fn is_of_ra(heard: &Heard) -> bool {
+    heard.frame.version != Version::As5669a && RaId::from(heard.frame.source).subsystem != 0
 }
 
 /// Asks whether the port refuses, from a passing socket, so that no answer is expected there.
@@ -194,7 +206,11 @@ fn any_sign(case: &mut Case, address: SocketAddr) -> Question {
             let padding = case.wanting_acknowledgement(id);
             vec![Send::To(address, query), Send::To(address, padding)]
         }
-        None => vec![case.ask_all_at(address, &query)],
+        None => {
+            // Junior, whose components have no id that we know, acknowledges even that.
+            let padding = case.wanting_acknowledgement(JausId::EVERYONE);
+            vec![case.ask_all_at(address, &query), Send::To(address, padding)]
+        }
     };
     Question {
         sends,
@@ -211,7 +227,7 @@ pub(super) fn answered(case: &mut Case, mark: usize) -> Judgement {
     let to_us = |heard: &&Heard| {
         let of_it = match case.id {
             Some(id) => heard.frame.source == id,
-            None => heard.from.ip() == address.ip(),
+            None => heard.from.ip() == address.ip() && heard.frame.source.is_unicast(),
         };
         of_it && heard.frame.destination == own && heard.door == Door::Unicast
     };

@@ -14,12 +14,12 @@ use std::pin::Pin;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use bytes::Bytes;
+use bytes::{Bytes, BytesMut};
 use jaus::cli::failure::Failure;
 use jaus::link::udp::PortTaken;
 use jaus::link::{Group6, Interface};
 use jaus::node::Config;
-use jaus::wire::{Frame, judp};
+use jaus::wire::{Frame, Kind, judp};
 use socket2::{Domain, InterfaceIndexOrAddress, Protocol, SockRef, Socket, Type};
 use tokio::io::ReadBuf;
 use tokio::net::{TcpStream, UdpSocket};
@@ -29,7 +29,8 @@ use super::case::Send;
 use super::seen::{Arrival, Door, Refusal, TcpAnswer};
 
 /// The group of the Reference Architecture.
-const RA_GROUP: SocketAddrV4 = SocketAddrV4::new(Ipv4Addr::new(224, 1, 0, 1), judp::PORT);
+pub(in crate::doctor) const RA_GROUP: SocketAddrV4 =
+    SocketAddrV4::new(Ipv4Addr::new(224, 1, 0, 1), judp::PORT);
 
 /// Something that happened.
 pub(super) enum Happening {
@@ -156,6 +157,12 @@ impl Sockets {
             return Poll::Ready(Happening::Tcp(answer));
         }
         if let Some(probe) = &self.probe {
+            // The runtime wakes nobody for an error alone.
+            let error = SockRef::from(probe).take_error().ok().flatten();
+            if let Some(happening) = error.and_then(|error| refusal::<()>(Err(error))) {
+                self.probe = None;
+                return Poll::Ready(happening);
+            }
             match receive(probe, &mut self.buffer, cx) {
                 Poll::Ready(Ok((from, datagram))) => {
                     let link = 0;
@@ -310,7 +317,24 @@ fn connected(own: IpAddr, to: SocketAddr) -> io::Result<UdpSocket> {
     let socket = new(to)?;
     socket.bind(&SocketAddr::new(own, 0).into())?;
     socket.connect(&to.into())?;
+    hear_of_hosts(&socket, to)?;
     UdpSocket::from_std(socket.into())
+}
+
+/// Lets the socket hear that nobody has the address, which is told otherwise to nobody.
+#[cfg(target_os = "linux")]
+fn hear_of_hosts(socket: &Socket, to: SocketAddr) -> io::Result<()> {
+    use nix::sys::socket::{setsockopt, sockopt};
+    Ok(match to {
+        SocketAddr::V4(_) => setsockopt(socket, sockopt::Ipv4RecvErr, &true),
+        SocketAddr::V6(_) => setsockopt(socket, sockopt::Ipv6RecvErr, &true),
+    }?)
+}
+
+#[cfg(not(target_os = "linux"))]
+#[expect(clippy::unnecessary_wraps, reason = "elsewhere it may fail")]
+fn hear_of_hosts(_: &Socket, _: SocketAddr) -> io::Result<()> {
+    Ok(())
 }
 
 fn new(like: SocketAddr) -> io::Result<Socket> {
@@ -324,7 +348,20 @@ fn new(like: SocketAddr) -> io::Result<Socket> {
 
 fn encoded(frame: &Frame) -> Bytes {
     // What is asked here fits its header.
-    judp::encode(frame).unwrap_or_default()
+    let plain = Frame {
+        kind: Kind::default(),
+        ..frame.clone()
+    };
+    let datagram = judp::encode(&plain).unwrap_or_default();
+    if frame.kind == plain.kind {
+        return datagram;
+    }
+    // A type that nothing else here ever sends.
+    let mut typed = BytesMut::from(&datagram[..]);
+    if let Some(kind) = typed.get_mut(1) {
+        *kind = frame.kind.0;
+    }
+    typed.freeze()
 }
 
 /// Sends at once: a fresh socket's readiness is not known to the runtime yet.

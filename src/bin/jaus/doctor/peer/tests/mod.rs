@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::cli::failure::Outcome;
+use jaus::peer::{Certainty, Peer};
 
 use super::case::Settings;
 use super::exchange::Exchange;
@@ -202,9 +203,43 @@ fn junior_without_services_acknowledges_and_no_more() {
         &mut Vehicle::junior(),
     );
     assert_eq!(outcome, Outcome::Incomplete);
-    // Nobody there says an id.
+    // Its acknowledgement tells its id.
     let first = first_failure(settings("10.0.0.2"), &mut Vehicle::junior());
-    assert_eq!(first, Some(Exchange::Answer));
+    assert_eq!(first, Some(Exchange::Identification));
+}
+
+/// As seen of the three forks, of JAUS++ and our own, and as somebody might who does not look at the
+/// type at all.
+#[test]
+fn junior_is_told_by_the_message_types_that_it_takes_and_its_fork_by_zeros() {
+    type Knob = fn(&mut Vehicle);
+    let juniors: fn(u8) -> bool = |kind| kind & 0b11 == 0;
+    let cases: [(Knob, Peer, Certainty); 5] = [
+        (|_| {}, Peer::Standard, Certainty::Unknown),
+        (
+            |v| v.takes_type = |_| true,
+            Peer::Standard,
+            Certainty::Unknown,
+        ),
+        (|v| v.zero_is_all = true, Peer::Standard, Certainty::Unknown),
+        (|_| {}, Peer::Junior, Certainty::Certain),
+        (|v| v.zero_is_all = true, Peer::Jts, Certainty::Certain),
+    ];
+    for (number, (knob, peer, certainty)) in cases.into_iter().enumerate() {
+        let mut scripted = Vehicle::sound();
+        scripted.events_of_services = false;
+        if number > 2 {
+            scripted.takes_type = juniors;
+        }
+        knob(&mut scripted);
+        let examiner = examine(settings("10.0.0.2"), &mut scripted);
+        let verdict = examiner.case().recognise();
+        assert_eq!(
+            (verdict.peer, verdict.certainty),
+            (peer, certainty),
+            "{number}"
+        );
+    }
 }
 
 #[test]

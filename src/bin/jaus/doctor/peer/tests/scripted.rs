@@ -56,6 +56,12 @@ pub(super) struct Vehicle {
     pub(super) old_services: bool,
     /// Sends back what nobody acts on, of up to so many fragments.
     pub(super) echoes_up_to: usize,
+    /// The message types that it takes.
+    pub(super) takes_type: fn(u8) -> bool,
+    /// Takes a 0 in an id for "all".
+    pub(super) zero_is_all: bool,
+    /// How often it sends the first report of an event besides, at once.
+    pub(super) first_copies: usize,
     /// Octets that stay behind its messages.
     pub(super) stale: usize,
     pub(super) events: BTreeMap<u8, Subscription>,
@@ -100,6 +106,9 @@ impl Vehicle {
             twin: None,
             old_services: false,
             echoes_up_to: 0,
+            takes_type: |kind| kind == 0,
+            zero_is_all: false,
+            first_copies: 0,
             stale: 0,
             events: BTreeMap::new(),
             heard_codes: Vec::new(),
@@ -117,6 +126,7 @@ impl Vehicle {
             wildcard: false,
             old_services: true,
             events_of_services: false,
+            first_copies: 4,
             stale: 40,
             number: 0,
             ..Self::sound()
@@ -127,6 +137,7 @@ impl Vehicle {
     pub(super) fn junior() -> Self {
         Self {
             echoes_up_to: 50,
+            takes_type: |kind| kind & 0b11 == 0,
             calls: false,
             identifies: false,
             beats: false,
@@ -303,7 +314,19 @@ impl Vehicle {
             kind: create.event_type,
             query: create.query_message,
         };
+        for _copy in 0..self.first_copies {
+            self.fire(id, client, air);
+        }
         self.events.insert(id, subscription);
+    }
+
+    fn fire(&mut self, event_id: u8, client: JausId, air: &mut Air) {
+        let event = Event {
+            event_id,
+            sequence_number: 0,
+            report_message: ReportStatus::default().encode().unwrap(),
+        };
+        self.tell(client, &event, air);
     }
 
     fn cancel(&mut self, to: JausId, payload: &Bytes, air: &mut Air) {
@@ -336,7 +359,7 @@ impl Vehicle {
             self.fragments += 1;
         }
         if self.acknowledges && self.fragments <= self.most_fragments {
-            let flags = Flags::new(Priority::Standard);
+            let flags = Flags::new(frame.flags.priority());
             let answer = Frame {
                 flags: flags.with_acknowledgement(Acknowledgement::Positive),
                 sequence: frame.sequence,
@@ -347,7 +370,11 @@ impl Vehicle {
     }
 
     fn take(&mut self, frame: &Frame, air: &mut Air) {
-        if !frame.destination.matches(self.id) {
+        let destination = match self.zero_is_all {
+            true => frame.destination.with_zeros_for_all(),
+            false => frame.destination,
+        };
+        if !destination.matches(self.id) || !(self.takes_type)(frame.kind.0) {
             return;
         }
         if frame.flags.acknowledgement() == Acknowledgement::Request {
@@ -430,13 +457,7 @@ impl Scripted for Vehicle {
         for (event_id, it) in events {
             let periodic = it.kind == create_event::EventType::PERIODIC_SC;
             if periodic && it.to == self.address {
-                let report = ReportStatus::default().encode().unwrap();
-                let event = Event {
-                    event_id,
-                    sequence_number: 0,
-                    report_message: report,
-                };
-                self.tell(it.client, &event, air);
+                self.fire(event_id, it.client, air);
             }
         }
     }

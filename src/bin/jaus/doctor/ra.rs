@@ -1,0 +1,85 @@
+//! Who speaks the Reference Architecture, and is therefore seen by nobody who speaks AS5669A: such
+//! systems beat on a multicast group of their own.
+
+use std::collections::BTreeMap;
+use std::future::poll_fn;
+use std::net::SocketAddr;
+use std::task::Poll;
+
+use jaus::link::udp::{Settings, UdpLink};
+use jaus::link::{Group, Slab};
+use jaus::node::Config;
+use jaus::wire::ra::RaId;
+use jaus::wire::{Version, judp};
+
+use super::finding::Finding;
+use super::peer::RA_GROUP;
+
+/// Subsystems that are named one by one.
+const MOST: usize = 12;
+
+/// What is heard in the group of the Reference Architecture.
+pub(super) struct RaSystems {
+    links: Vec<UdpLink>,
+    slab: Slab,
+    /// For each subsystem, where it was heard.
+    heard: BTreeMap<u8, SocketAddr>,
+}
+
+impl RaSystems {
+    /// Joins the group on each interface of the settings, unless they want none; where that cannot
+    /// be, nothing is heard.
+    pub(super) fn open(config: &Config) -> Self {
+        let settings = Settings {
+            port: 0,
+            group: Group::At(RA_GROUP),
+            ..Settings::default()
+        };
+        let chosen = match config.group {
+            Group::Off => Vec::new(),
+            Group::At(_) => config.interfaces.choose(config.ip).unwrap_or_default(),
+        };
+        let links = chosen.iter();
+        Self {
+            links: links
+                .filter_map(|interface| UdpLink::open(interface, &settings).ok())
+                .collect(),
+            slab: Slab::new(),
+            heard: BTreeMap::new(),
+        }
+    }
+
+    /// Listens, without end.
+    pub(super) async fn listen(&mut self) {
+        loop {
+            let (links, slab) = (&mut self.links, &mut self.slab);
+            let (from, datagram) = poll_fn(|cx| {
+                let mut all = links.iter_mut().map(|link| link.poll_recv(cx, slab));
+                all.find(Poll::is_ready).unwrap_or(Poll::Pending)
+            })
+            .await;
+            let Ok(frames) = judp::frames(datagram) else {
+                continue;
+            };
+            for frame in frames.map_while(Result::ok) {
+                let subsystem = RaId::from(frame.source).subsystem;
+                if frame.version != Version::As5669a && subsystem != 0 && self.heard.len() < MOST {
+                    self.heard.insert(subsystem, from);
+                }
+            }
+        }
+    }
+
+    /// What was heard, in words.
+    pub(super) fn findings(&self) -> impl Iterator<Item = Finding> {
+        self.heard.iter().map(|(subsystem, from)| {
+            let what = format!(
+                "subsystem {subsystem} of the Reference Architecture (OpenJAUS 3.x) is at {from}"
+            );
+            Finding::ok("neighbours", what).advice(
+                "it does not read AS5669A: `jaus-ra-gateway` makes its components AS5669A ones \
+                 (docs/ra-gateway.md)",
+            )
+        })
+    }
+}
