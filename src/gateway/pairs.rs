@@ -38,6 +38,8 @@ pub(super) struct State {
 
 /// Pose: three coordinates and their deviation, three angles and theirs, time.
 const POSE: &[usize] = &[4, 4, 4, 4, 2, 2, 2, 2, 4];
+/// Global vector: speed, altitude, heading, roll, pitch.
+const VECTOR: &[usize] = &[2, 4, 2, 2, 2];
 /// Efforts: six propulsive ones, six resistive ones.
 const EFFORT: &[usize] = &[2, 2, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1];
 
@@ -49,8 +51,8 @@ const STATES: &[State] = &[
     State { report: 0x4403, presence: 2, all: 0xFF, fields: POSE },
     State { report: 0x4404, presence: 2, all: 0xFF, fields: POSE },
     State { report: 0x4405, presence: 2, all: 0xFFF, fields: EFFORT },
-    State { report: 0x4407, presence: 1, all: 0xFF, fields: &[] },
-    State { report: 0x4408, presence: 1, all: 0xFF, fields: &[] },
+    State { report: 0x4407, presence: 1, all: 0xFF, fields: VECTOR },
+    State { report: 0x4408, presence: 0, all: 0, fields: &[] },
     State { report: 0x440A, presence: 0, all: 0, fields: &[] },
     State { report: 0x440E, presence: 0, all: 0, fields: &[] },
 ];
@@ -117,6 +119,8 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ra::convert::{Context, to_jaus_with, to_ra_with};
+    use crate::ra::ids::RaComponent;
 
     fn bytes(hex: &str) -> Bytes {
         let octet = |at: usize| u8::from_str_radix(&hex[at..at + 2], 16).unwrap();
@@ -148,6 +152,31 @@ mod tests {
         assert_eq!(state(0x4002).unwrap().query_for_all(), bytes(""));
         assert_eq!(state(0x4407).unwrap().wanted(&[7]), Some(7));
         assert_eq!(state(0x4405).unwrap().wanted(&[7]), None);
+    }
+
+    #[test]
+    fn every_query_and_every_cut_has_the_octets_that_its_definition_has() {
+        for state in STATES {
+            let context = Context {
+                part: Some(RaComponent::LOCAL_PATH_SEGMENT_DRIVER),
+                ..Context::default()
+            };
+            let query = state.query_for_all();
+            let ours = to_jaus_with(context, state.query(), &query).unwrap();
+            let (_, again) = to_ra_with(context, &ours).unwrap();
+            assert_eq!(again.len(), query.len(), "{:04X}h", state.query());
+
+            if state.fields.is_empty() {
+                continue;
+            }
+            let fields: u32 = (1 << state.fields.len()) - 1;
+            let mut whole = state.query_for(fields).to_vec();
+            whole.resize(state.presence + state.fields.iter().sum::<usize>(), 0);
+            let ours = to_jaus_with(context, state.report, &whole);
+            assert!(ours.is_ok(), "{:04X}h: {ours:?}", state.report);
+            let whole = Bytes::from(whole);
+            assert_eq!(state.narrow(&whole, fields), whole);
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@
     reason = "a test in virtual time"
 )]
 
+mod drivers;
 mod hostile;
 mod jaus_vehicle;
 mod knowledge;
