@@ -6,11 +6,14 @@
 //! address and framing, is acknowledged if that is wanted, and comes out as a [`Message`] as soon
 //! as it is whole. What does not pass is counted.
 //!
+//! Large messages are sent a few parts at a time, so that a peer's receive buffer holds them.
+//!
 //! Everything is sent to the port of [`Settings::port`], as OpenJAUS expects. What is for everybody
 //! goes to the group, in the framings that somebody was heard to use and, more rarely then, in the
 //! others of [`Settings::group_dialects`].
 
 mod addresses;
+mod pace;
 mod packet;
 mod parts;
 mod settings;
@@ -33,6 +36,7 @@ use crate::endpoint::Buckets;
 use crate::wire::Acknowledgement;
 use crate::wire::ra::{Fields, Header};
 use addresses::Addresses;
+use pace::Pace;
 use packet::Packet;
 use parts::{Key, Parts, Place};
 
@@ -46,6 +50,7 @@ pub struct Carrier {
     messages: Option<Buckets<IpAddr>>,
     parts: Parts,
     transmits: VecDeque<Transmit>,
+    pace: Pace,
     /// How much each subsystem here has sent to everybody.
     group_sent: BTreeMap<u8, u32>,
     counters: Counters,
@@ -62,6 +67,7 @@ impl Carrier {
             messages: settings.messages.map(buckets),
             parts: Parts::new(&settings),
             transmits: VecDeque::new(),
+            pace: Pace::default(),
             group_sent: BTreeMap::new(),
             counters: Counters::default(),
             settings,
@@ -221,12 +227,19 @@ impl Carrier {
     /// Time has passed.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.parts.expire(now, &mut self.counters);
+        self.transmits.extend(self.pace.take_due(now));
+    }
+
+    /// Says what time it is, after something was sent: what waits for its turn waits from now on.
+    pub fn settle(&mut self, now: Instant) {
+        self.pace.start(now);
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout).
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        self.parts.poll_timeout()
+        let parts = self.parts.poll_timeout();
+        parts.into_iter().chain(self.pace.poll_timeout()).min()
     }
 
     /// Forgets where a subsystem is, because it is gone.

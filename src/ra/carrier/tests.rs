@@ -201,11 +201,48 @@ fn large_messages_are_cut_as_openjaus_does_and_put_together_again() {
         assert_eq!(carrier.unfinished(), 0);
         let back = Message::new(US, PEER, 0x4402, Bytes::from(data));
         carrier.send(&back).unwrap();
-        let sent: Vec<_> = std::iter::from_fn(|| carrier.poll_transmit()).collect();
+        let sent = bursts(&mut carrier, start()).concat();
         let same = sent.iter().zip(&parts);
         let same = same.filter(|(sent, part)| sent.datagram[20 + 4..] == part[20 + 4..]);
         assert_eq!(same.count(), parts.len(), "flags, numbers and data");
     }
+}
+
+/// What is sent, each time at once, until nothing is left.
+fn bursts(carrier: &mut Carrier, mut now: Instant) -> Vec<Vec<Transmit>> {
+    let mut bursts = Vec::new();
+    carrier.settle(now);
+    loop {
+        bursts.push(std::iter::from_fn(|| carrier.poll_transmit()).collect());
+        let Some(wake) = carrier.pace.poll_timeout() else {
+            return bursts;
+        };
+        assert!(
+            wake <= now + Duration::from_millis(4),
+            "without long pauses"
+        );
+        now = wake;
+        carrier.handle_timeout(now);
+    }
+}
+
+#[test]
+fn a_large_message_leaves_in_bursts_and_others_do_not_wait_for_it() {
+    let mut carrier = carrier(Settings::default());
+    hear(&mut carrier, start(), 1, &packet(fields(), &[]));
+    let large = Message::new(US, PEER, 0x4A23, vec![7; 30 * MAX_DATA].into());
+    let small = Message::new(US, PEER, 0x4402, Bytes::new());
+    for message in [&large, &large, &small] {
+        carrier.send(message).unwrap();
+    }
+    let bursts = bursts(&mut carrier, start());
+    assert_eq!(bursts[0].len(), 9, "the small one is among the first");
+    assert!(bursts[1..].iter().all(|burst| burst.len() <= 8));
+    let all = bursts.concat().into_iter();
+    let parts = all.filter(|it| it.datagram.len() > MAX_DATA);
+    let numbers: Vec<u8> = parts.map(|it| it.datagram[22]).collect();
+    let once: Vec<u8> = (0..30).collect();
+    assert_eq!(numbers, [once.clone(), once].concat());
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 
 use bytes::Bytes;
 
+use super::pace::Pace;
 use super::{Carrier, Dialect, packet, parts};
 use crate::ra::message::BadId;
 use crate::ra::{Counter, Message, RaId};
@@ -60,7 +61,8 @@ pub enum SendError {
 
 impl Carrier {
     /// Sends a message of a component that is here. A large one is numbered part by part from 0,
-    /// which OpenJAUS insists on; another keeps its number.
+    /// which OpenJAUS insists on, and its first parts are sent at once, the others when
+    /// [`settle`](Carrier::settle) has said what time it is. Another message keeps its number.
     ///
     /// # Errors
     /// See [`SendError`]; nothing is sent then.
@@ -79,14 +81,22 @@ impl Carrier {
         }
         let ways = self.ways(message.source.subsystem, message.destination.subsystem)?;
         let packets = length.div_ceil(crate::wire::ra::MAX_DATA).max(1) * ways.len();
-        if self.transmits.len() + packets > self.settings.queue_limit {
+        if self.transmits.len() + self.pace.len() + packets > self.settings.queue_limit {
             self.counters.add(Counter::TransmitQueueFull);
             return Err(SendError::QueueFull);
         }
         for (to, dialect) in ways {
             for (place, number, data) in parts::cut(&message.data) {
                 let header = header(message, place, number, data.len());
-                self.push(to, packet::datagram(dialect, &header, data))?;
+                let datagram = packet::datagram(dialect, &header, data);
+                match place {
+                    parts::Place::Single => self.push(to, datagram)?,
+                    // In their order, so behind those that wait already.
+                    _ if self.pace.len() > 0 || usize::from(number) >= Pace::BURST => {
+                        self.pace.push(Transmit { to, datagram });
+                    }
+                    _ => self.push(to, datagram)?,
+                }
             }
         }
         self.counters.add(Counter::MessagesSent);

@@ -212,8 +212,10 @@ impl RaNode {
     /// # Errors
     /// A source that is not ours, a destination whose address is not known, too much data, or too
     /// much to send at once.
-    pub fn send(&mut self, _now: Instant, message: &Message) -> Result<(), SendError> {
-        self.carrier.send(message)
+    pub fn send(&mut self, now: Instant, message: &Message) -> Result<(), SendError> {
+        self.carrier.send(message)?;
+        self.carrier.settle(now);
+        Ok(())
     }
 
     /// The next datagram to be sent.

@@ -155,7 +155,7 @@ fn messages_go_between_components_large_ones_too() {
     let mut large = Message::new(from, to, 0x4402, data);
     large.connection = true;
     world.hosts[0].node.send(world.now, &large).unwrap();
-    world.exchange();
+    world.seconds(1);
     let [Event::Message(arrived)] = &world.events(1)[..] else {
         panic!()
     };
