@@ -13,6 +13,7 @@ use bytes::Bytes;
 use super::large::Cut;
 use super::{Config, LinkId, To};
 use crate::address::JausId;
+use crate::peer::Intake;
 use crate::wire::{Flags, Frame, Priority, Version};
 
 /// Other ends whose buckets are remembered before the full ones are forgotten.
@@ -45,13 +46,11 @@ impl Default for Pacing {
 }
 
 impl Pacing {
-    /// The same for a receiver with a small buffer that it empties slowly. Measured with Junior as
-    /// it is shipped: its 140000 octets must hold what comes while its run-time engine sleeps, and
-    /// that hands over to an application ten datagrams in a turn.
-    pub(super) fn gentle(self) -> Self {
+    /// The same for a receiver that takes less.
+    pub(super) fn within(self, intake: Intake) -> Self {
         Self {
-            burst: self.burst.min(64_000),
-            rate: self.rate.min(10_000_000),
+            burst: self.burst.min(intake.burst),
+            rate: self.rate.min(intake.rate),
         }
     }
 

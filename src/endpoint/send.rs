@@ -284,8 +284,8 @@ impl Endpoint {
     /// How fast the fragments of a large message may leave for `destination`.
     fn pacing(&self, destination: JausId) -> Option<Pacing> {
         let usual = self.config.pacing?;
-        let is_slow = self.peers.profile(destination).overflows_early();
-        Some(if is_slow { usual.gentle() } else { usual })
+        let intake = self.peers.profile(destination).intake();
+        Some(intake.map_or(usual, |intake| usual.within(intake)))
     }
 
     fn check_length(

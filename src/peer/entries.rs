@@ -78,6 +78,20 @@ departures! {
         place: "src/endpoint/large/split.rs",
         test: "to_jauspp_no_packet_is_longer_than_it_takes_and_numbers_do_not_go_round",
     };
+    /// One datagram in a millisecond.
+    SlowReader = Entry {
+        name: "slow reader",
+        peers: &[JausPlusPlus],
+        does: "reads one datagram in a millisecond, so that what comes faster overflows its \
+               receive buffer: 200 kB without acknowledgements never arrive",
+        source: Source::Provoked,
+        told: Told::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
+        ours: "the fragments of a large message that is not acknowledged leave at 600 in a second; \
+               what is acknowledged goes no faster than it reads anyway. What one of its components \
+               has to send must fit 655 350 octets",
+        place: "src/endpoint/send.rs",
+        test: "to_jauspp_large_messages_leave_no_faster_than_it_reads_datagrams",
+    };
     /// Event numbers that are given twice.
     SharedEventNumbers = Entry {
         name: "event numbers given twice",

@@ -14,6 +14,15 @@ pub enum LargeStyle {
     RepeatedCode,
 }
 
+/// How fast a receiver empties its receive buffer, in octets of what datagrams occupy there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Intake {
+    /// What it may be given at once, in octets.
+    pub burst: usize,
+    /// What it empties, in octets each second.
+    pub rate: u64,
+}
+
 impl Peer {
     /// How it cuts large messages and wants them cut; `None` for somebody of whom that is not
     /// known.
@@ -52,10 +61,15 @@ impl Peer {
         }
     }
 
-    /// Whether its receive buffer, as it is shipped, is too small for the bursts that others take.
+    /// What it takes of a large message at once and in time, as it is shipped, if that is less than
+    /// others take.
     #[must_use]
-    pub const fn overflows_early(self) -> bool {
-        matches!(self, Self::Junior | Self::Jts | Self::Fkie)
+    pub const fn intake(self) -> Option<Intake> {
+        match self {
+            Self::JausPlusPlus => Some(JAUSPP_INTAKE),
+            Self::Junior | Self::Jts | Self::Fkie => Some(JUNIOR_INTAKE),
+            Self::Standard | Self::OpenJausSdk | Self::Iop => None,
+        }
     }
 
     /// Whether a 0 in its destinations stands for "all of them", as 65535 and 255 do with others.
@@ -97,7 +111,20 @@ fn same_octets(one: JausId, other: JausId) -> bool {
 pub(crate) const JAUSPP_FRAGMENT: usize = 1573;
 /// The longest payload that JAUS++ sends whole, in octets.
 const JAUSPP_PAYLOAD: usize = 1425;
+/// JAUS++ reads one datagram and sleeps for a millisecond, then for another one before its component
+/// gets it: at most some 900 datagrams in a second, each of 2304 octets for one of its fragments.
+/// Two thirds of that leave it time for others.
+const JAUSPP_INTAKE: Intake = Intake {
+    burst: 64_000,
+    rate: 1_400_000,
+};
 /// The payload of Junior's fragments but for the last, in octets, unless `MTU_Size` is set lower.
 pub(crate) const JUNIOR_PAYLOAD: usize = 4079;
 /// The fragments that Junior keeps with the `MaxMsgHistory` that it is shipped with.
 const JUNIOR_FRAGMENTS: usize = 50;
+/// Measured with Junior: its 140000 octets must hold what comes while its run-time engine sleeps,
+/// and that hands over to an application ten datagrams in a turn.
+const JUNIOR_INTAKE: Intake = Intake {
+    burst: 64_000,
+    rate: 10_000_000,
+};

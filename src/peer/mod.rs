@@ -9,7 +9,7 @@
 //! Most of what we do suits everybody and is done for everybody: what strict peers get is never
 //! less for a peer that is not strict. What would not suit everybody hangs on the [`Peer`] that
 //! somebody is known to be, and is a method of it: [`Peer::large_style`],
-//! [`Peer::payload_limit`], [`Peer::reads_zero_as_wildcard`],
+//! [`Peer::payload_limit`], [`Peer::intake`], [`Peer::reads_zero_as_wildcard`],
 //! [`Peer::is_deaf_on_its_connections`].
 //!
 //! A [`Recogniser`] is fed with what one peer sends and says who that is, how sure that is, and
@@ -53,7 +53,7 @@ pub use assignment::Assignment;
 pub use departure::{Entry, Source, Told, table};
 pub use entries::Departure;
 pub(crate) use habits::JAUSPP_FRAGMENT;
-pub use habits::LargeStyle;
+pub use habits::{Intake, LargeStyle};
 pub(crate) use recogniser::is_priority_fault;
 pub use recogniser::{Certainty, Reason, Recogniser, Verdict};
 pub use sign::Sign;

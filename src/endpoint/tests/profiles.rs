@@ -397,3 +397,15 @@ fn to_junior_large_messages_leave_no_faster_than_its_buffer_is_emptied() {
     let expected = Duration::from_millis(10)..Duration::from_millis(40);
     assert!(expected.contains(&gentle), "{gentle:?}");
 }
+
+#[test]
+fn to_jauspp_large_messages_leave_no_faster_than_it_reads_datagrams() {
+    let (fragments, time) = fragments_to(Known::JausPlusPlus, false);
+    // Those that fit its buffer leave at once; the others at less than its 900 a second.
+    let later = fragments.len() as u32 - 28;
+    let fastest = Duration::from_secs(1) / 900 * later;
+    assert!(
+        (fastest..fastest * 2).contains(&time),
+        "{later} in {time:?}"
+    );
+}
