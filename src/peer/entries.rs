@@ -203,7 +203,8 @@ departures! {
     ClearEmergencyFault = Entry {
         name: "Clear Emergency is Set Emergency",
         peers: &[JausPlusPlus],
-        does: "sends Set Emergency (0006h) for Clear Emergency, and does not know 0007h",
+        does: "sends Set Emergency (0006h) for Clear Emergency, and does not know 0007h: of its own \
+               emergencies Reset (0005h) alone is the end",
         source: Source::Provoked,
         told: Told::NeedNotBe,
         ours: "it is taken at its word: the emergency stays, however often it is set. One Clear \
