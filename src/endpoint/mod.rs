@@ -1,8 +1,8 @@
 //! The protocol core of a node: who is here, who is where, what to send and what to deliver.
 //!
 //! An [`Endpoint`] does no I/O and reads no clock. Its owner says what happened
-//! ([`Endpoint::handle_datagram`] or, where a link has read the frames itself,
-//! [`Endpoint::handle_frame`]; [`Endpoint::handle_timeout`]), what is wanted
+//! ([`Endpoint::handle_datagram`], [`Endpoint::handle_datagram_to_all`] or, where a link has read
+//! the frames itself, [`Endpoint::handle_frame`]; [`Endpoint::handle_timeout`]), what is wanted
 //! ([`Endpoint::attach`], [`Endpoint::send`]), and then polls until there is no more:
 //! [`Endpoint::poll_transmit`] for datagrams to send, [`Endpoint::poll_event`] for messages to
 //! deliver and news, [`Endpoint::poll_timeout`] for when to call `handle_timeout`.
@@ -97,6 +97,8 @@ pub struct Endpoint {
     credit: usize,
     /// Octets of memory that a payload of what is being received holds on to.
     held_by_payload: usize,
+    /// Whether what is being received went to everybody.
+    to_all: bool,
     /// For what is passed on to many.
     broadcasts: Bucket,
     heard: Recent,
@@ -135,6 +137,7 @@ impl Endpoint {
             gate: Gate::new(&config.rates, config.max_peers),
             credit: 0,
             held_by_payload: 0,
+            to_all: false,
             broadcasts: Bucket::default(),
             heard: Recent::new(config.max_recent, longest, keys.clone()),
             sent_to_group: Recent::new(config.max_recent, config.echo_window, keys),

@@ -246,6 +246,17 @@ impl Peers {
         assigned.or_else(recognised).unwrap_or_default()
     }
 
+    /// The same, or what it may be taken for where it does little harm if it is something else.
+    pub(super) fn presumed(&self, id: JausId) -> peer::Peer {
+        let recognised = || {
+            self.learned
+                .get(&id)
+                .map(|known| known.recogniser.presumed())
+        };
+        let assigned = Assignment::find(&self.assigned, id);
+        assigned.or_else(recognised).unwrap_or_default()
+    }
+
     /// How a peer cuts large messages, if that is known. Who is configured to be no particular peer
     /// keeps to the standard.
     pub(super) fn large_style(&self, id: JausId) -> Option<LargeStyle> {

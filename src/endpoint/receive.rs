@@ -38,6 +38,17 @@ impl Endpoint {
     /// news come out of [`poll_event`](Self::poll_event) and
     /// [`poll_transmit`](Self::poll_transmit).
     pub fn handle_datagram(&mut self, now: Instant, from: Path, data: Bytes) {
+        self.receive_datagram(now, from, data, false);
+    }
+
+    /// The same for a datagram that went to everybody: to the link's group, or to what it has
+    /// instead.
+    pub fn handle_datagram_to_all(&mut self, now: Instant, from: Path, data: Bytes) {
+        self.receive_datagram(now, from, data, true);
+    }
+
+    fn receive_datagram(&mut self, now: Instant, from: Path, data: Bytes, to_all: bool) {
+        self.to_all = to_all;
         self.latest = Some(now);
         self.counters.add(Counter::DatagramsReceived);
         if let Err(reason) = self.check_path(from) {
@@ -84,6 +95,7 @@ impl Endpoint {
             self.counters.add(Counter::MessagesReceived);
             return self.counters.add(reason);
         }
+        self.to_all = false;
         // Whoever is at the other end has shown that it is there.
         self.credit = usize::MAX;
         self.held_by_payload = usize::MAX;
@@ -171,7 +183,10 @@ impl Endpoint {
             }
         }
         // Before learning: a copy that came another way must not move the peer there and back.
-        let novelty = self.recall(now, from, frame, seen);
+        let novelty = match self.recall(now, from, frame, seen) {
+            Novelty::Repeated if self.reassembly.awaits(frame) => Novelty::New,
+            novelty => novelty,
+        };
         if novelty != Novelty::New {
             self.peers.note_duplicate(frame.source);
             if passes && novelty == Novelty::Repeated {
@@ -183,6 +198,10 @@ impl Endpoint {
             self.counters.add(Counter::NotTheWayBack);
         } else {
             self.learn(now, from, frame)?;
+            if self.is_unmarked_call(frame) {
+                self.peers
+                    .recognise(frame.source, peer::Recogniser::handle_call);
+            }
             if passes {
                 self.pass_on(now, from, frame);
             }
@@ -404,11 +423,28 @@ impl Endpoint {
 
     /// For how long the same message is taken for a duplicate.
     fn duplicate_window(&self, frame: &Frame) -> Duration {
-        match (frame.flags.acknowledgement(), frame.flags.broadcast()) {
-            (Acknowledgement::None, _) => self.config.duplicate_window,
-            (_, Some(Broadcast::None)) => self.config.retransmission_window,
-            _ => self.config.first_contact_window,
+        if frame.flags.acknowledgement() == Acknowledgement::None {
+            return self.config.duplicate_window;
         }
+        let is_call = frame.flags.broadcast() != Some(Broadcast::None);
+        if is_call || self.is_unmarked_call(frame) || self.repeats_soon(frame.source) {
+            self.config.first_contact_window
+        } else {
+            self.config.retransmission_window
+        }
+    }
+
+    /// Whether a message for one of us went to everybody and wants an acknowledgement, and does not
+    /// say that it went to everybody.
+    fn is_unmarked_call(&self, frame: &Frame) -> bool {
+        self.to_all
+            && frame.destination.is_unicast()
+            && frame.flags.acknowledgement() == Acknowledgement::Request
+            && frame.flags.broadcast() == Some(Broadcast::None)
+    }
+
+    fn repeats_soon(&self, source: JausId) -> bool {
+        self.peers.profile(source).repeats_soon()
     }
 
     /// Queues a whole message for its receivers.

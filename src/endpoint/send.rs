@@ -273,18 +273,19 @@ impl Endpoint {
     pub(super) fn cutting(&self, destination: JausId, version: Version) -> Cutting {
         let profile = self.peers.profile(destination);
         let (longest, limit) = (profile.payload_limit(), self.config.payload_limit);
+        let presumed = self.peers.presumed(destination);
         Cutting {
             limit: longest.map_or(limit, |longest| longest.min(limit)),
             repeat_code: version != Version::As5669a
                 || self.peers.large_style(destination) == Some(LargeStyle::RepeatedCode),
-            kept: profile.fragments_kept().zip(longest),
+            kept: presumed.fragments_kept().zip(presumed.payload_limit()),
         }
     }
 
     /// How fast the fragments of a large message may leave for `destination`.
     fn pacing(&self, destination: JausId) -> Option<Pacing> {
         let usual = self.config.pacing?;
-        let intake = self.peers.profile(destination).intake();
+        let intake = self.peers.presumed(destination).intake();
         Some(intake.map_or(usual, |intake| usual.within(intake)))
     }
 

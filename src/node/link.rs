@@ -141,7 +141,11 @@ impl Link {
                     };
                     let path = from(Remote::Socket(peer));
                     taps.datagram(path, &datagram);
-                    endpoint.handle_datagram(now, path, datagram);
+                    if link.went_to_all() {
+                        endpoint.handle_datagram_to_all(now, path, datagram);
+                    } else {
+                        endpoint.handle_datagram(now, path, datagram);
+                    }
                 }
                 true
             }

@@ -265,6 +265,18 @@ departures! {
         place: "src/endpoint/receive.rs",
         test: "a_call_of_junior_is_acknowledged_by_the_one_alone_from_its_own_address",
     };
+    /// Calls that do not say what they are.
+    UnmarkedCalls = Entry {
+        name: "calls without the flag",
+        peers: &[Fkie],
+        does: "its node manager in Python sends the same without the broadcast flag",
+        source: Source::Recorded,
+        told: Told::By(&[Sign::CallsUnknownIds]),
+        ours: "a message for one id that comes by the group and wants an acknowledgement is such a \
+               call",
+        place: "src/endpoint/receive.rs",
+        test: "a_call_without_its_flag_is_known_by_the_way_that_it_came",
+    };
     /// All flags set for priority 0.
     PriorityFault = Entry {
         name: "priority 0 sets all flags",
@@ -285,9 +297,11 @@ departures! {
         does: "begins with number 1 in each process",
         source: Source::Provoked,
         told: Told::NeedNotBe,
-        ours: "content counts, not the number alone, and only for a short time",
+        ours: "content counts, not the number alone, and only for a short time: of who is known to \
+               be Junior 0.9 s, because it gives up repeating sooner; and a fragment that a message \
+               which is being put together lacks is taken in any case",
         place: "src/endpoint/receive.rs",
-        test: "a_restarted_peer_does_not_lose_its_first_messages",
+        test: "a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_come_again",
     };
     /// Duplicates are known by their numbers alone.
     RemembersNumbers = Entry {

@@ -72,6 +72,13 @@ impl Peer {
         }
     }
 
+    /// Whether it sends again within half a second what was not acknowledged, or never. What comes
+    /// again later is of a process that was started again, and begins with the same numbers.
+    #[must_use]
+    pub const fn repeats_soon(self) -> bool {
+        matches!(self, Self::Junior | Self::Jts | Self::Fkie)
+    }
+
     /// Whether a 0 in its destinations stands for "all of them", as 65535 and 255 do with others.
     #[must_use]
     pub const fn reads_zero_as_wildcard(self) -> bool {

@@ -127,6 +127,12 @@ impl Recogniser {
         self.note(Sign::StaleOctets);
     }
 
+    /// Takes note that a message for one component, which wants an acknowledgement, went to everybody
+    /// without saying so.
+    pub fn handle_call(&mut self) {
+        self.note(Sign::CallsUnknownIds);
+    }
+
     /// Takes the style of a large message that was put together.
     pub fn handle_large(&mut self, style: LargeStyle) {
         if style == LargeStyle::RepeatedCode {
@@ -184,6 +190,21 @@ impl Recogniser {
     #[must_use]
     pub const fn certain(&self) -> Peer {
         self.certain
+    }
+
+    /// Who it is for sure, or else whom it may be taken for where it does little harm if it is
+    /// somebody else: Junior is who begins with number 1, and then calls an id that it does not know
+    /// or sends fragments of its length. A node of ours may do either, but does not begin with 1.
+    #[must_use]
+    pub fn presumed(&self) -> Peer {
+        let has = |sign| self.signs.has(sign);
+        let is_like_junior =
+            has(Sign::BeginsWithOne) && (has(Sign::CallsUnknownIds) || has(Sign::LongFragments));
+        if self.certain == Peer::Standard && is_like_junior && self.best().0 == Peer::Junior {
+            Peer::Junior
+        } else {
+            self.certain
+        }
     }
 
     /// For whom most speaks, and how much; of equals the first.

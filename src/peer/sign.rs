@@ -160,6 +160,10 @@ impl Signs {
         new
     }
 
+    pub(super) const fn has(self, sign: Sign) -> bool {
+        self.0 & sign.bit() != 0
+    }
+
     pub(super) fn iter(self) -> impl Iterator<Item = Sign> {
         Sign::ALL
             .into_iter()

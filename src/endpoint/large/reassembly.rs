@@ -260,6 +260,18 @@ impl Reassembly {
         }
     }
 
+    /// Whether this fragment is the next one of a message that is being put together, and not in it
+    /// yet. Then it is none that was sent again: its sender has begun anew with the same numbers.
+    pub(in crate::endpoint) fn awaits(&self, frame: &Frame) -> bool {
+        let continues = matches!(frame.flags.data(), DataControl::Middle | DataControl::Last);
+        let number = frame.sequence.wrapping_sub(1);
+        let run = self.senders.get(&frame.source).and_then(|sender| {
+            let place = sender.at_or_before(frame.destination, number)?;
+            sender.runs.get(&place).filter(|run| !sender.is_stale(run))
+        });
+        continues && run.is_some_and(|run| run.begins && !run.ends && run.last == number)
+    }
+
     /// Takes the number of a whole message, and gives the large one before it, with its receiver
     /// and priority, that has just lacked the mark of its end: JAUS++ gives the number of the last
     /// fragment to the next message again. See

@@ -5,8 +5,15 @@ use std::collections::HashMap;
 
 use super::*;
 use crate::peer::{Assignment, Peer as Known};
+use crate::wire::DataControl;
 
 const CODE: [u8; 2] = [0xF0, 0xD7];
+/// Octets of a fragment of Junior's.
+const FRAGMENT: usize = 4079;
+/// The flags of Junior's, as recorded: standard priority, and an acknowledgement wanted.
+const WANTED: Flags = Flags(0x11);
+/// The same, as a global broadcast.
+const CALL: Flags = Flags(0x19);
 
 /// For how long Junior takes a number for one that it has heard before, with its settings file and
 /// without.
@@ -75,4 +82,160 @@ fn a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers()
         }
         assert_eq!(junior.dropped, 0, "remembered for {time:?}");
     }
+}
+
+/// What a process of Junior sends of an acknowledged message that has these numbers; the first of
+/// all goes to everybody, because its engine has just begun too.
+fn of_junior(first: u16, message: &Bytes) -> Vec<Frame> {
+    let pieces = message.chunks(FRAGMENT).enumerate();
+    let last = message.len().div_ceil(FRAGMENT) - 1;
+    let frame = |(index, piece): (usize, &[u8])| {
+        let sequence = first + index as u16;
+        let data = match index {
+            _ if last == 0 => DataControl::Single,
+            0 => DataControl::First,
+            _ if index == last => DataControl::Last,
+            _ => DataControl::Middle,
+        };
+        let flags = if sequence == 1 { CALL } else { WANTED };
+        Frame {
+            flags: flags.with_data(data),
+            sequence,
+            payload: Bytes::copy_from_slice(piece),
+            ..from_peer(b"")
+        }
+    };
+    pieces.map(frame).collect()
+}
+
+/// Whether everything has come, by the acknowledgements; what was delivered.
+fn lengths_of(rig: &mut Rig, frames: &[Frame]) -> Vec<usize> {
+    for frame in frames {
+        rig.hear(frame);
+        rig.pass(Duration::from_millis(2));
+    }
+    let acknowledged = rig
+        .sent()
+        .iter()
+        .filter(|(_, it)| it.flags == Flags(0x31))
+        .count();
+    assert_eq!(acknowledged, frames.len());
+    rig.received().iter().map(|it| it.payload.len()).collect()
+}
+
+#[test]
+fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_come_again() {
+    let mut rig = Rig::new();
+    // As recorded: three times 10 KiB, and 3.07 s later another process with 100 KiB of which the
+    // second fragment is the same.
+    let small = [1, 4, 7]
+        .map(|first| of_junior(first, &message(10_240)))
+        .concat();
+    assert_eq!(lengths_of(&mut rig, &small), [10_240; 3]);
+    rig.pass(Duration::from_millis(3070) - Duration::from_millis(18));
+    let large = of_junior(1, &message(102_400));
+    assert_eq!(lengths_of(&mut rig, &large), [102_400]);
+    // And once more the same, all of it.
+    rig.pass(Duration::from_millis(2500));
+    assert_eq!(lengths_of(&mut rig, &large), [102_400]);
+}
+
+#[test]
+fn what_junior_sends_again_is_delivered_once_also_while_the_message_is_put_together() {
+    let mut rig = Rig::new();
+    let frames = of_junior(1, &message(102_400));
+    // Each of them four times, as when no acknowledgement arrives.
+    for frame in &frames {
+        for _try in 0..4 {
+            rig.hear(frame);
+            rig.pass(Duration::from_millis(100));
+        }
+    }
+    let lengths: Vec<_> = rig.received().iter().map(|it| it.payload.len()).collect();
+    assert_eq!(lengths, [102_400]);
+    // The end once more, when the message has been delivered.
+    for frame in &frames[24..] {
+        rig.hear(frame);
+    }
+    assert_eq!(rig.received(), []);
+    assert_eq!(rig.endpoint.unfinished(), 0);
+}
+
+#[test]
+fn a_program_of_junior_that_is_started_again_beside_its_engine_is_heard() {
+    for (profile, heard) in [(Known::Junior, 2), (Known::Fkie, 2), (Known::Standard, 1)] {
+        let mut rig = Rig::with(Config {
+            profiles: vec![Assignment { id: PEER, profile }],
+            ..Config::default()
+        });
+        // Its engine knows where we are: nothing goes to everybody.
+        let first = Frame {
+            flags: WANTED,
+            ..from_peer(QUERY_HEARTBEAT)
+        };
+        rig.hear(&first);
+        for _repeated in 0..3 {
+            rig.pass(Duration::from_millis(100));
+            rig.hear(&first);
+        }
+        rig.pass(Duration::from_millis(2000));
+        rig.hear(&first);
+        assert_eq!(rig.received().len(), heard, "{profile}");
+    }
+}
+
+#[test]
+fn a_call_without_its_flag_is_known_by_the_way_that_it_came() {
+    // As recorded of fkie's node manager in Python.
+    let call = Frame {
+        flags: WANTED,
+        ..from_peer(QUERY_HEARTBEAT)
+    };
+    let datagram = judp::encode(&call).unwrap();
+    for (to_all, heard) in [(true, 2), (false, 1)] {
+        let mut rig = Rig::new();
+        for _process in 0..2 {
+            let octets = datagram.clone();
+            if to_all {
+                rig.endpoint
+                    .handle_datagram_to_all(rig.now, path(PEER_HOST), octets);
+            } else {
+                rig.endpoint
+                    .handle_datagram(rig.now, path(PEER_HOST), octets);
+            }
+            rig.pass(Duration::from_millis(1500));
+        }
+        assert_eq!(rig.received().len(), heard, "to everybody: {to_all}");
+        assert_eq!(rig.sent().len(), 2, "both are acknowledged");
+    }
+}
+
+#[test]
+fn who_calls_without_the_flag_and_begins_with_1_gets_fragments_as_junior_does() {
+    let fragments = |to_all: bool, first: u16| {
+        let mut rig = Rig::new();
+        let call = Frame {
+            flags: WANTED,
+            sequence: first,
+            ..from_peer(QUERY_HEARTBEAT)
+        };
+        let datagram = judp::encode(&call).unwrap();
+        if to_all {
+            rig.endpoint
+                .handle_datagram_to_all(rig.now, path(PEER_HOST), datagram);
+        } else {
+            rig.endpoint
+                .handle_datagram(rig.now, path(PEER_HOST), datagram);
+        }
+        rig.sent();
+        rig.send(Outgoing {
+            payload: message(102_400),
+            ..to_peer()
+        })
+        .unwrap();
+        rig.sent()[0].1.payload.len()
+    };
+    assert_eq!(fragments(true, 1), FRAGMENT);
+    assert_eq!(fragments(true, 2), 1425, "anybody may call");
+    assert_eq!(fragments(false, 1), 1425, "anybody may begin with 1");
 }

@@ -79,6 +79,8 @@ pub struct UdpLink {
     arrived: VecDeque<(SocketAddr, Bytes)>,
     /// The socket that is read first the next time.
     turn: usize,
+    /// The socket that the latest came from.
+    fetched_from: usize,
     last_error: Option<io::ErrorKind>,
     counters: Counters,
 }
@@ -121,6 +123,7 @@ impl UdpLink {
             batch,
             arrived: VecDeque::new(),
             turn: 0,
+            fetched_from: 0,
             last_error: None,
             counters: Counters::default(),
         })

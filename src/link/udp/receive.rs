@@ -30,6 +30,13 @@ impl UdpLink {
         }
     }
 
+    /// Whether the latest datagram that was received went to everybody.
+    #[must_use]
+    pub const fn went_to_all(&self) -> bool {
+        // The first socket is that for unicast. On Windows the others may get unicast too.
+        self.fetched_from > 0 && !cfg!(windows)
+    }
+
     /// Fetches what has arrived at one of the sockets.
     fn poll_fetch(&mut self, cx: &mut Context<'_>, slab: &mut Slab) -> Poll<()> {
         // Turn about, so that a flood on one socket does not silence the others.
@@ -37,6 +44,7 @@ impl UdpLink {
         for i in 0..self.sockets.len() {
             let socket = (self.turn + i) % self.sockets.len();
             if self.poll_fetch_from(socket, cx, slab).is_ready() {
+                self.fetched_from = socket;
                 return Poll::Ready(());
             }
         }

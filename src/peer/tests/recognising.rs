@@ -239,3 +239,38 @@ fn what_speaks_for_somebody_else_is_told_too() {
     assert!(reasons[0].ends_with("as JAUS++ does"), "{reasons:?}");
     assert!(reasons[1].ends_with("as Junior does"), "{reasons:?}");
 }
+
+#[test]
+fn who_begins_with_1_and_calls_may_be_taken_for_junior_and_no_node_of_ours() {
+    let call = |sequence| Frame {
+        flags: Flags::default()
+            .with_broadcast(Broadcast::Global)
+            .with_acknowledgement(Acknowledgement::Request),
+        ..frame(sequence, QUERY)
+    };
+    let long = |sequence| Frame {
+        flags: Flags::default().with_data(DataControl::First),
+        payload: vec![1; 4079].into(),
+        ..frame(sequence, b"")
+    };
+    let presumed = |frames: &[Frame]| {
+        let mut recogniser = Recogniser::new();
+        for frame in frames {
+            recogniser.handle_frame(frame, 0);
+        }
+        (recogniser.presumed(), recogniser.certain())
+    };
+    let likely = (Peer::Junior, Peer::Standard);
+    assert_eq!(presumed(&[call(1), frame(2, QUERY)]), likely);
+    assert_eq!(presumed(&[frame(1, QUERY), long(2)]), likely);
+    assert_eq!(presumed(&[call(1), long(2)]).1, Peer::Junior);
+    // A node of ours that makes its packets as long as they may be, and seeks somebody.
+    let ours = [call(31_361), long(31_362), frame(31_363, QUERY)];
+    assert_eq!(presumed(&ours), (Peer::Standard, Peer::Standard));
+    // JAUS++ and others may begin with 1 too.
+    assert_eq!(presumed(&[frame(1, QUERY)]).0, Peer::Standard);
+    let mut recogniser = Recogniser::new();
+    recogniser.handle_frame(&call(1), 206);
+    recogniser.handle_repeated_version();
+    assert_eq!(recogniser.presumed(), Peer::JausPlusPlus);
+}
