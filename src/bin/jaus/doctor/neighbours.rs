@@ -28,7 +28,7 @@ pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration)
         Err(error) => return vec![Finding::problem(CHECK, error)],
     };
     let mut events = node.events();
-    let mut elders = RaSystems::open(&config);
+    let mut ra = RaSystems::open(&config);
     let started = Component::builder(Kind::OtherSubsystem, "jaus doctor").attach(&node, 1);
     let component = match started {
         Ok(component) => component,
@@ -38,7 +38,7 @@ pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration)
     tokio::select! {
         () = runtime::end(Some(time)) => {}
         () = watch(&mut events, &mut moved) => {}
-        () = elders.listen() => {}
+        () = ra.listen() => {}
     }
     let own = component.id();
     let (directory, peers, links) = (component.directory(), node.peers(), node.links());
@@ -46,11 +46,11 @@ pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration)
     node.shutdown().await;
     let peers: Vec<Peer> = peers.into_iter().filter(|peer| peer.id != own).collect();
     let mut findings: Vec<Finding> = links.iter().filter_map(came_back).collect();
-    let elders: Vec<Finding> = elders.findings().collect();
-    if elders.is_empty() || !peers.is_empty() {
+    let of_ra: Vec<Finding> = ra.findings().collect();
+    if of_ra.is_empty() || !peers.is_empty() {
         findings.extend(who(&peers, &directory));
     }
-    findings.extend(elders);
+    findings.extend(of_ra);
     findings.extend(moved.iter().map(|(&id, places)| two_of(id, places)));
     findings.extend(wanted.map(|id| is_free(id, &peers)));
     findings

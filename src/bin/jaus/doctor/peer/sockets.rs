@@ -321,7 +321,7 @@ fn connected(own: IpAddr, to: SocketAddr) -> io::Result<UdpSocket> {
     UdpSocket::from_std(socket.into())
 }
 
-/// Lets the socket hear that nobody has the address, which is told otherwise to nobody.
+/// Lets the socket hear that nobody has the address: without this the system keeps it to itself.
 #[cfg(target_os = "linux")]
 fn hear_of_hosts(socket: &Socket, to: SocketAddr) -> io::Result<()> {
     use nix::sys::socket::{setsockopt, sockopt};
@@ -332,7 +332,6 @@ fn hear_of_hosts(socket: &Socket, to: SocketAddr) -> io::Result<()> {
 }
 
 #[cfg(not(target_os = "linux"))]
-#[expect(clippy::unnecessary_wraps, reason = "elsewhere it may fail")]
 fn hear_of_hosts(_: &Socket, _: SocketAddr) -> io::Result<()> {
     Ok(())
 }

@@ -62,9 +62,9 @@ impl Air {
             .push((self.now + WAY, Happening::Arrived(arrival)));
     }
 
-    pub(super) fn refuse(&mut self) {
+    pub(super) fn refuse(&mut self, refusal: Refusal) {
         self.flying
-            .push((self.now + WAY, Happening::Refused(Refusal::Port)));
+            .push((self.now + WAY, Happening::Refused(refusal)));
     }
 
     pub(super) fn answer_tcp(&mut self, answer: TcpAnswer) {

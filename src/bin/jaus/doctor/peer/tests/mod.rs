@@ -114,7 +114,17 @@ fn somebody_else_with_another_id_is_named() {
 fn a_silent_host_and_a_closed_port_are_told_apart() {
     let outcome = check("silent", settings("10.0.0.2"), &mut Silent::default());
     assert_eq!(outcome, Outcome::Broken);
-    let mut closed = Silent { refuses: true };
+    let mut gone = Silent {
+        gone: true,
+        ..Silent::default()
+    };
+    let (text, _) = words(settings("10.0.0.2"), &mut gone);
+    let told = "there is no way to 10.0.0.2, or nobody has that address";
+    assert!(text.contains(told), "{text}");
+    let mut closed = Silent {
+        refuses: true,
+        ..Silent::default()
+    };
     assert_eq!(
         check("closed", settings("10.0.0.2"), &mut closed),
         Outcome::Broken

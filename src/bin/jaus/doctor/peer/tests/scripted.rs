@@ -11,7 +11,7 @@ use jaus::messages::core::*;
 use jaus::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Priority, Version, judp};
 
 use super::super::case::Send;
-use super::super::seen::{Door, TcpAnswer};
+use super::super::seen::{Door, Refusal, TcpAnswer};
 use super::air::{Air, Scripted};
 
 /// An event that the vehicle has for its client.
@@ -433,7 +433,7 @@ impl Scripted for Vehicle {
             Send::Group(_) => {}
             Send::Probe(to, _) => {
                 if to.ip() == self.address.ip() && *to != self.address {
-                    air.refuse();
+                    air.refuse(Refusal::Port);
                 }
             }
             Send::Connect(_) => air.answer_tcp(TcpAnswer::Refused),
@@ -463,16 +463,20 @@ impl Scripted for Vehicle {
     }
 }
 
-/// A host that says nothing, or that nobody listens at the port.
+/// A host that says nothing, or that nobody listens at the port, or that is not there.
 #[derive(Default)]
 pub(super) struct Silent {
     pub(super) refuses: bool,
+    pub(super) gone: bool,
 }
 
 impl Scripted for Silent {
     fn hear(&mut self, send: &Send, air: &mut Air) {
-        if self.refuses && matches!(send, Send::Probe(..)) {
-            air.refuse();
+        match send {
+            Send::Probe(..) if self.refuses => air.refuse(Refusal::Port),
+            // The system has looked for the host meanwhile.
+            Send::To(..) if self.gone => air.refuse(Refusal::Host),
+            _ => {}
         }
     }
 }
