@@ -10,10 +10,10 @@ use jaus::codec::Message;
 use jaus::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version};
 
 use super::exchange::{Exchange, Mark, Trial, Verdict};
-use super::large::Transfer;
 use super::reserved::Reserved;
 use super::seen::{Heard, Seen};
 use super::target::Target;
+use super::transfer::Transfer;
 
 /// The code of messages that nobody acts on: user-defined (AS5710 leaves D000h and above to users).
 pub(super) const PADDING: u16 = 0xD7F0;

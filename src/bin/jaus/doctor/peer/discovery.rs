@@ -10,8 +10,8 @@ use jaus::messages::core::{
 };
 
 use super::case::{Case, Offer, Question};
-use super::examiner::{Begin, Judgement};
 use super::exchange::{Exchange, Mark, Verdict};
+use super::judgement::{Begin, Judgement};
 use super::reach::query_identification;
 use super::seen::{Door, Heard};
 

@@ -9,8 +9,8 @@ use jaus::messages::core::{
 
 use super::case::{Case, OpenEvent, Question, Send};
 use super::discovery::{malformed, shown};
-use super::examiner::{Begin, Judgement};
 use super::exchange::{Exchange, Mark, Verdict};
+use super::judgement::{Begin, Judgement};
 use super::standing::answered_query;
 
 /// The rate that is asked for, in hertz.

@@ -5,23 +5,9 @@ use std::time::Duration;
 
 use super::case::{Case, Question, Send, Settings};
 use super::exchange::{Exchange, Trial, Verdict};
+use super::judgement::{Begin, Judgement};
 use super::seen::{Arrival, Refusal, TcpAnswer};
 use super::{discovery, events, large, manners, ra, reach, reserved, standing};
-
-/// What an exchange begins with.
-pub(super) enum Begin {
-    Ask(Question),
-    /// It is judged by what is known already, or left out.
-    Over(Verdict),
-}
-
-/// What is made of what was heard.
-pub(super) enum Judgement {
-    Wait,
-    /// A next question of the same exchange.
-    Ask(Question),
-    Over(Verdict),
-}
 
 /// An exchange while it goes on.
 struct Running {

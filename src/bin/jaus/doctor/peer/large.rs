@@ -13,71 +13,12 @@ use jaus::wire::{Acknowledgement, DataControl, Flags, Frame, Priority, large};
 use super::case::{Case, OpenEvent, PADDING, Question, Send, octets};
 use super::discovery::node_seq;
 use super::events::{Reply, cancel_all, create, reply};
-use super::examiner::{Begin, Judgement};
 use super::exchange::{Exchange, Mark, Verdict};
+use super::judgement::{Begin, Judgement};
+use super::transfer::Transfer;
 
-/// Fragments that may be on their way: what the smallest known receive buffers hold.
-const WINDOW: usize = 8;
-/// When a fragment that was not acknowledged is sent again.
-const AGAIN: Duration = Duration::from_millis(250);
 /// How long nothing may be acknowledged.
 const PATIENCE: Duration = Duration::from_millis(1500);
-
-/// A large message on its way to the peer.
-#[derive(Debug)]
-pub(super) struct Transfer {
-    parts: Vec<Part>,
-    /// How much had been heard when it began.
-    since: usize,
-}
-
-#[derive(Debug)]
-struct Part {
-    frame: Frame,
-    sent: Option<Duration>,
-    acknowledged: bool,
-}
-
-impl Transfer {
-    fn new(frames: Vec<Frame>, since: usize) -> Self {
-        let part = |frame| Part {
-            frame,
-            sent: None,
-            acknowledged: false,
-        };
-        Self {
-            parts: frames.into_iter().map(part).collect(),
-            since,
-        }
-    }
-
-    fn done(&self) -> usize {
-        self.parts.iter().filter(|part| part.acknowledged).count()
-    }
-
-    fn take(&mut self, sequence: u16) {
-        let part = self
-            .parts
-            .iter_mut()
-            .find(|part| part.frame.sequence == sequence);
-        if let Some(part) = part {
-            part.acknowledged = true;
-        }
-    }
-
-    /// What is to be sent now: the next ones, and those that were not acknowledged in time.
-    fn due(&mut self, now: Duration) -> Vec<Frame> {
-        let open = self.parts.iter_mut().filter(|part| !part.acknowledged);
-        let mut due = Vec::new();
-        for part in open.take(WINDOW) {
-            if part.sent.is_none_or(|sent| now >= sent + AGAIN) {
-                part.sent = Some(now);
-                due.push(part.frame.clone());
-            }
-        }
-        due
-    }
-}
 
 pub(super) fn to_peer(case: &mut Case, size: u32, now: Duration) -> Begin {
     if let Some(skip) = case.nobody() {

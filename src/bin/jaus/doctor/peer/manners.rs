@@ -11,8 +11,8 @@ use jaus::wire::Version;
 
 use super::case::{Case, Question, Send};
 use super::discovery::shown;
-use super::examiner::{Begin, Judgement};
 use super::exchange::{Exchange, Mark, Verdict};
+use super::judgement::{Begin, Judgement};
 use super::seen::{Heard, TcpAnswer};
 
 pub(super) fn tcp(case: &mut Case) -> Begin {

@@ -9,6 +9,7 @@ mod discovery;
 mod events;
 mod examiner;
 mod exchange;
+mod judgement;
 mod large;
 mod manners;
 mod profile;
@@ -22,6 +23,7 @@ mod standing;
 mod target;
 #[cfg(test)]
 mod tests;
+mod transfer;
 
 use std::time::Duration;
 

@@ -9,8 +9,8 @@ use jaus::wire::ra::RaId;
 use jaus::wire::{Flags, Frame, Priority, Version, judp};
 
 use super::case::{Case, Question, Send};
-use super::examiner::{Begin, Judgement};
 use super::exchange::Verdict;
+use super::judgement::{Begin, Judgement};
 use super::seen::{Door, Heard};
 
 /// Who speaks for the subsystem: the communicator.

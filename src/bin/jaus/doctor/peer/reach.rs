@@ -12,8 +12,8 @@ use jaus::wire::ra::RaId;
 use jaus::wire::{Frame, Version, judp};
 
 use super::case::{Case, Question, Send, octets};
-use super::examiner::{Begin, Judgement};
 use super::exchange::Verdict;
+use super::judgement::{Begin, Judgement};
 use super::ra;
 use super::seen::{Door, Heard, Refusal};
 

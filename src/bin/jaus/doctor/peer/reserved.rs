@@ -12,8 +12,8 @@ use jaus::address::JausId;
 use jaus::wire::{Flags, Frame, Kind, Priority};
 
 use super::case::{Case, Question, Send};
-use super::examiner::{Begin, Judgement};
 use super::exchange::{Exchange, Verdict};
+use super::judgement::{Begin, Judgement};
 
 /// A type of which Junior passes all bits over.
 const PASSED_OVER: Kind = Kind(4);

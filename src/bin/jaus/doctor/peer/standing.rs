@@ -13,8 +13,8 @@ use jaus::wire::Acknowledgement;
 
 use super::case::{Case, Question, Send};
 use super::discovery::shown;
-use super::examiner::{Begin, Judgement};
 use super::exchange::{Exchange, Mark, Verdict};
+use super::judgement::{Begin, Judgement};
 
 fn ask(case: &mut Case, message: &impl jaus::codec::Message) -> Begin {
     match case.ask_peer(message) {
