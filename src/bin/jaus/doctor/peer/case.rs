@@ -10,8 +10,7 @@ use jaus::codec::Message;
 use jaus::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version};
 
 use super::exchange::{Exchange, Mark, Trial, Verdict};
-use super::reserved::Reserved;
-use super::seen::{Heard, Seen};
+use super::seen::{Heard, Reserved, Seen};
 use super::target::Target;
 use super::transfer::Transfer;
 

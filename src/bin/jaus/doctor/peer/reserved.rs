@@ -24,17 +24,6 @@ const TO_ZERO: Priority = Priority::SafetyCritical;
 /// How long to wait for acknowledgements.
 const PATIENCE: Duration = Duration::from_millis(700);
 
-/// What was seen of it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Reserved {
-    /// The first number of the second question.
-    second: u16,
-    /// It takes bits of the message type for header compression.
-    pub(super) misreads_type: bool,
-    /// It acknowledges what is for an id with a 0.
-    pub(super) answers_for_zero: bool,
-}
-
 pub(super) fn begin(case: &mut Case) -> Begin {
     if let Some(skip) = case.nobody() {
         return Begin::Over(skip);

@@ -199,3 +199,14 @@ impl Seen {
         Some((whole, fragments.len(), repeats))
     }
 }
+
+/// What the peer does with what the standard reserves.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reserved {
+    /// The first number of the second question.
+    pub(super) second: u16,
+    /// It takes bits of the message type for header compression.
+    pub(super) misreads_type: bool,
+    /// It acknowledges what is for an id with a 0.
+    pub(super) answers_for_zero: bool,
+}
