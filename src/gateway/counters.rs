@@ -39,6 +39,10 @@ counters! {
     TooManyWaiting = "refused: too many questions wait",
     /// Refused: more service connections than there is room for.
     TooManyConnections = "refused: too many service connections",
+    /// Refused: a change or an execution of a list that the other side's driver cannot follow.
+    NotListed = "refused: not possible with the other side's list",
+    /// Given without confirmation: places for an RA driver that does not tell them.
+    Unconfirmed = "places given without confirmation",
     /// Not answered: whoever was asked said nothing in time.
     Unanswered = "not answered in time",
     /// Dropped: a report that nobody waits for.

@@ -187,6 +187,9 @@ impl Gateway {
 
     /// A JAUS component says something to an RA component that is no answer to a query.
     fn handle_unasked(&mut self, now: Instant, front: &mut Front, message: &Received) {
+        if front.handle_entered(now, message, &mut self.tally) {
+            return;
+        }
         let code = code_of(&message.payload).unwrap_or_default();
         let mut parts = roles::reporting(code);
         let shown = |part: RaComponent| {

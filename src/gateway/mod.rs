@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`Gateway`] | both halves without I/O and without a clock: fed with datagrams, messages and time |
 //! | `front` | an RA component as a JAUS component: services that answer from what it reports |
+//! | `course` | lists of places across: elements here, numbers there |
 //! | `picture` | a JAUS subsystem as an RA subsystem: each component once for each of its services |
 //! | [`RaGateway`] | the running thing: sockets, node, timers |
 //!
@@ -18,6 +19,7 @@
 
 mod convert;
 mod counters;
+mod course;
 mod front;
 mod hall;
 mod pairs;

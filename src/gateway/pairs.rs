@@ -54,7 +54,6 @@ const STATES: &[State] = &[
     State { report: 0x4407, presence: 1, all: 0xFF, fields: VECTOR },
     State { report: 0x4408, presence: 0, all: 0, fields: &[] },
     State { report: 0x440A, presence: 0, all: 0, fields: &[] },
-    State { report: 0x440E, presence: 0, all: 0, fields: &[] },
 ];
 
 /// The state that the report with this code tells, if it tells one.

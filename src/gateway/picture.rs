@@ -70,18 +70,18 @@ impl Picture {
         let mut parts = BTreeMap::new();
         for offer in component.offered() {
             if let Some(role) = roles::of_service(&offer.urn) {
-                let minor = parts
-                    .entry(role.part)
-                    .or_insert((offer.minor, role.services()));
-                minor.0 = minor.0.max(offer.minor);
+                let part = parts.entry(role.part);
+                let (minor, lists, _) = part.or_insert((offer.minor, false, role.services()));
+                *minor = offer.minor.max(*minor);
+                *lists |= role.works_off(&offer.urn);
             }
         }
         if parts.is_empty() && commander {
             let core = vec![roles::core_service()];
-            parts.insert(RaComponent::SUBSYSTEM_COMMANDER, (0, core));
+            parts.insert(RaComponent::SUBSYSTEM_COMMANDER, (0, false, core));
         }
         let several = parts.len() > 1;
-        for (part, (minor, services)) in parts {
+        for (part, (minor, lists, services)) in parts {
             let shown = match ids.ra_id(component.id, part) {
                 Ok(shown) => shown,
                 Err(why) => {
@@ -92,6 +92,7 @@ impl Picture {
             let target = Target {
                 id: component.id,
                 minor,
+                lists,
             };
             self.routes.insert(shown, target);
             node.components.push(node::Component {

@@ -4,6 +4,7 @@
 use super::pairs;
 use crate::codec::ServiceId;
 use crate::messages::{ground, mobility};
+use crate::ra::convert::Places;
 use crate::ra::ids::RaComponent;
 use crate::ra::node;
 
@@ -14,6 +15,8 @@ pub(super) struct Role {
     pub(super) part: RaComponent,
     /// The service in the version that RA components are shown with.
     pub(super) service: ServiceId,
+    /// The service that works a list of places off, where that is another one.
+    pub(super) list: Option<ServiceId>,
     /// The commands and queries that it understands.
     inputs: &'static [u16],
     /// The reports that it gives.
@@ -37,8 +40,17 @@ const fn role(
     Role {
         part,
         service,
+        list: None,
         inputs,
         outputs,
+    }
+}
+
+/// The same with a service that works a list off.
+const fn with_list(role: Role, list: ServiceId) -> Role {
+    Role {
+        list: Some(first(list)),
+        ..role
     }
 }
 
@@ -50,10 +62,16 @@ const ROLES: &[Role] = &[
     role(RaComponent::VELOCITY_STATE_SENSOR, first(mobility::velocity_state_sensor::LATEST), &[0x2404], &[0x4404]),
     role(RaComponent::GLOBAL_VECTOR_DRIVER, mobility::global_vector_driver::LATEST, &[0x0407, 0x2407], &[0x4407]),
     role(RaComponent::LOCAL_VECTOR_DRIVER, mobility::local_vector_driver::LATEST, &[0x0408, 0x2408], &[0x4408]),
-    role(RaComponent::GLOBAL_WAYPOINT_DRIVER, first(mobility::global_waypoint_driver::LATEST), &[0x040A, 0x040C, 0x240A, 0x240C], &[0x440A, 0x440C]),
-    role(RaComponent::LOCAL_WAYPOINT_DRIVER, first(mobility::local_waypoint_driver::LATEST), &[0x040A, 0x040D, 0x240A, 0x240D], &[0x440A, 0x440D]),
-    role(RaComponent::GLOBAL_PATH_SEGMENT_DRIVER, first(mobility::global_path_segment_driver::LATEST), &[0x040A, 0x040F, 0x240A, 0x240F], &[0x440A, 0x440F]),
-    role(RaComponent::LOCAL_PATH_SEGMENT_DRIVER, first(mobility::local_path_segment_driver::LATEST), &[0x040A, 0x0410, 0x240A, 0x2410], &[0x440A, 0x4410]),
+    with_list(
+        role(RaComponent::GLOBAL_WAYPOINT_DRIVER, first(mobility::global_waypoint_driver::LATEST), &[0x040A, 0x040C, 0x240A, 0x240B, 0x240C], &[0x440A, 0x440B, 0x440C]),
+        mobility::global_waypoint_list_driver::LATEST,
+    ),
+    with_list(
+        role(RaComponent::LOCAL_WAYPOINT_DRIVER, first(mobility::local_waypoint_driver::LATEST), &[0x040A, 0x040D, 0x240A, 0x240B, 0x240D], &[0x440A, 0x440B, 0x440D]),
+        mobility::local_waypoint_list_driver::LATEST,
+    ),
+    role(RaComponent::GLOBAL_PATH_SEGMENT_DRIVER, first(mobility::global_path_segment_driver::LATEST), &[0x040A, 0x040F, 0x240A, 0x240E, 0x240F], &[0x440A, 0x440E, 0x440F]),
+    role(RaComponent::LOCAL_PATH_SEGMENT_DRIVER, first(mobility::local_path_segment_driver::LATEST), &[0x040A, 0x0410, 0x240A, 0x240E, 0x2410], &[0x440A, 0x440E, 0x4410]),
     role(RaComponent::VECTOR_KNOWLEDGE_STORE, ground::vector_knowledge_store::LATEST,
         &[0x0A20, 0x0A21, 0x0A24, 0x0A25, 0x2A21, 0x2A22, 0x2A23], &[0x4A20, 0x4A21, 0x4A22, 0x4A23, 0x4A24]),
 ];
@@ -77,7 +95,8 @@ pub(super) fn of_part(part: RaComponent) -> Option<&'static Role> {
 
 /// What a service is among component types, if it is any.
 pub(super) fn of_service(urn: &str) -> Option<&'static Role> {
-    ROLES.iter().find(|role| role.service.urn == urn)
+    let is_it = |role: &&Role| role.service.urn == urn || role.works_off(urn);
+    ROLES.iter().find(is_it)
 }
 
 /// The type to which a report with this code belongs.
@@ -87,6 +106,12 @@ pub(super) fn reporting(report: u16) -> impl Iterator<Item = RaComponent> {
 }
 
 impl Role {
+    /// Whether a service that this one stands for works a list of places off.
+    pub(super) fn works_off(&self, urn: &str) -> bool {
+        let is_path = Places::of(self.part).is_some_and(|places| places.is_path);
+        self.list.is_some_and(|list| list.urn == urn) || (is_path && self.service.urn == urn)
+    }
+
     /// What RA systems are told of it.
     pub(super) fn services(&self) -> Vec<node::Service> {
         let own = node::Service {

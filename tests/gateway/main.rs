@@ -12,6 +12,7 @@ mod drivers;
 mod hostile;
 mod jaus_vehicle;
 mod knowledge;
+mod lists;
 mod ra_vehicle;
 #[cfg(feature = "view")]
 mod replay;

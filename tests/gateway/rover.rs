@@ -23,6 +23,10 @@ pub(crate) struct Rover {
     pub(crate) controller: Option<(RaId, u8)>,
     /// Wrench efforts of the controller.
     pub(crate) efforts: Vec<Bytes>,
+    /// Waypoints in the order in which they came, as OpenJAUS keeps them.
+    pub(crate) waypoints: Vec<Bytes>,
+    /// Speeds of travel.
+    pub(crate) speeds: Vec<Bytes>,
     /// Rates that were asked for, by report.
     pub(crate) connections: BTreeMap<u16, f64>,
     streams: BTreeMap<u16, Stream>,
@@ -70,6 +74,18 @@ impl Rover {
             0x0007 => self.state = 2,
             0x0405 if self.controller.is_some_and(|(id, _)| id == from) => {
                 self.efforts.push(message.data.clone());
+            }
+            0x040C if self.controller.is_some_and(|(id, _)| id == from) => {
+                self.waypoints.push(message.data.clone());
+            }
+            0x040A if self.controller.is_some_and(|(id, _)| id == from) => {
+                self.speeds.push(message.data.clone());
+            }
+            0x240C => {
+                let mut waypoints = self.waypoints.iter();
+                if let Some(held) = waypoints.find(|held| held[1..3] == message.data[..2]) {
+                    self.said.push(message.answer(0x440C, held.clone()));
+                }
             }
             0x2002 => self.answer(message, 0x4002),
             0x2402 | 0x2404 | 0x2405 if !self.mute => {
@@ -133,7 +149,7 @@ impl Rover {
             .push(message.answer(0x000F, Bytes::from_static(&[0])));
         // It wants to know that its controller is ready, five times a second.
         let body = bytes("02402c0100000000");
-        let mut connect = Message::new(DRIVER, from, 0x0008, body);
+        let mut connect = Message::new(message.destination, from, 0x0008, body);
         connect.connection = true;
         self.said.push(connect);
     }

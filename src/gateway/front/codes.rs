@@ -1,8 +1,12 @@
 //! Which JAUS messages are an RA component's business, by their codes.
 
 /// Whether a message with this code is the RA component's business; all others are ours: transport,
-/// discovery, liveness, events, and who is in control.
+/// discovery, liveness, events, who is in control, and what JAUS drivers say of elements that the RA
+/// component has put into their lists.
 pub(super) const fn crosses(code: u16) -> bool {
+    if matches!(code, 0x041C | 0x041D) {
+        return false;
+    }
     is_management(code)
         || matches!(
             code,

@@ -8,11 +8,14 @@
 //! | asks for anything else | the query is relayed, and the next report that answers it goes to the client |
 //! | asks for control | [`Lease`] asks the RA component, and tells the client what that says |
 //! | commands | converted and passed on, if it is in control |
+//! | sets or executes a list | it is [kept here](listing), and given the RA driver when it is executed |
 //!
 //! The same stack is the RA component's voice among JAUS components: see [`Voice`].
 
 mod codes;
+mod entering;
 mod lease;
+mod listing;
 mod mirror;
 mod streams;
 mod voice;
@@ -25,6 +28,7 @@ use bytes::Bytes;
 
 use self::codes::{answer_to_command, crosses, is_management, needs_control};
 use self::lease::Lease;
+use self::listing::{Listed, Listing};
 use self::mirror::{Mirror, Mirrored};
 use self::streams::Streams;
 pub(super) use self::voice::{Target, Voice};
@@ -64,6 +68,8 @@ pub(super) struct Front {
     words: Words,
     mirror: Mirror,
     lease: Lease,
+    /// The list of places, of a driver that goes to such.
+    listing: Option<Listing>,
     streams: Streams,
     held: Vec<Held>,
     relayed: VecDeque<Relayed>,
@@ -113,11 +119,15 @@ impl Front {
             words: words.clone(),
             offers: offers(plan.ra, role),
         };
-        let services: Vec<Box<dyn Service>> = vec![
+        let listing = Listing::of(role, plan.patience);
+        let mut services: Vec<Box<dyn Service>> = vec![
             Box::new(Transport),
             Box::new(Liveness::new()),
             Box::new(mirrored),
         ];
+        if let (Some(listing), Some(&role)) = (listing.clone(), role) {
+            services.push(Box::new(Listed { listing, role }));
+        }
         Self {
             ra: plan.ra,
             stack: Stack::new(discovery, services),
@@ -127,6 +137,7 @@ impl Front {
             words,
             mirror,
             lease: Lease::new(plan.patience, plan.authority),
+            listing,
             streams: Streams::new(plan.ra, plan.own),
             held: Vec::new(),
             relayed: VecDeque::new(),
@@ -175,6 +186,7 @@ impl Front {
                 let wanted = updated.map(|it| (hz(&it), it.query_message));
                 self.subscribe(now, message, wanted.ok(), tally);
             }
+            Some(code) if self.is_listed(code) => self.handle_listed(now, message, code, tally),
             Some(code) if crosses(code) => self.cross(now, message, code, tally),
             _ => self.stack.handle_message(now, message),
         }
@@ -207,6 +219,7 @@ impl Front {
         };
         match pairs::report_of(ra_code) {
             Some(report) if pairs::state(report).is_some() => {
+                self.tell_given_speed(now, report);
                 if self.is_fresh(now, report) {
                     self.stack.handle_message(now, message);
                 } else {
@@ -224,6 +237,7 @@ impl Front {
             return tally.refuse(now, Counter::NotInControl, code, client);
         }
         tally.add(Counter::CommandsToRa);
+        self.note_command(code, &words.1);
         self.to_ra.push(words);
         if is_management(code) {
             self.mirror.outdate(STATUS);
@@ -328,7 +342,9 @@ impl Front {
             ..
         } = self;
         match event {
-            Event::Answer(inquiry, answer) => voice.handle_answer(now, inquiry, answer, tally),
+            Event::Answer(inquiry, answer) => {
+                voice.handle_answer(now, inquiry, answer, stack, tally);
+            }
             Event::Subscription(id, news) => {
                 voice.handle_subscription(now, (id, news), connections, tally);
             }
@@ -338,6 +354,9 @@ impl Front {
     }
 
     fn handle_report(&mut self, now: Instant, report: u16, data: &Bytes, tally: &mut Tally) {
+        if self.handle_place(now, report, data, tally) {
+            return tally.add(Counter::ReportsFromRa);
+        }
         let converted = match self.words.to_jaus(report, data) {
             Ok(converted) => converted,
             Err(refusal) => return convert::refuse(now, tally, report, &refusal),
@@ -393,6 +412,9 @@ impl Front {
         self.connections.handle_timeout(now);
         self.follow_connections(now, None, tally);
         self.to_ra.extend(self.streams.take_queries(now));
+        self.handle_list_timeout(now, tally);
+        let Self { voice, stack, .. } = self;
+        voice.handle_timeout(now, stack, tally);
         self.ask_again(now, tally);
         self.relayed.retain(|it| {
             let waits = now < it.until;
@@ -410,6 +432,7 @@ impl Front {
         if said.granted {
             tally.add(Counter::ControlOfRa);
         }
+        self.stop_list_without_controller(now, tally);
         self.to_ra.extend(said.to_ra);
         let before = self.mirror.controller_is(self.lease.controller());
         for (client, payload) in said.to_clients {
@@ -470,7 +493,10 @@ impl Front {
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         let held = self.held.iter().map(|it| it.next.min(it.until));
         let relayed = self.relayed.iter().map(|it| it.until);
+        let listing = self.listing.as_ref();
         [
+            self.voice.poll_timeout(),
+            listing.and_then(|it| it.lock().poll_timeout()),
             self.stack.poll_timeout(),
             self.lease.poll_timeout(),
             self.streams.poll_timeout(),

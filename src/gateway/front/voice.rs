@@ -15,9 +15,12 @@ use bytes::Bytes;
 
 use super::super::convert::{self, Ids, Words};
 use super::super::counters::{Counter, Tally};
+use super::super::course::Entries;
 use super::super::pairs;
+use super::entering::{element_query, place_report, places};
 use crate::address::JausId;
 use crate::ra::connection::{ConnectionId, Connections, Request, ResponseCode};
+use crate::ra::convert::Refusal;
 use crate::ra::{Message, RaId};
 use crate::service::{
     ControlId, ControlLost, ControlNews, Inquiry, NoAnswer, Patience, Stack, SubscriptionId,
@@ -27,11 +30,15 @@ use crate::service::{
 /// What an RA component wants of JAUS components.
 #[derive(Debug)]
 pub(in crate::gateway) struct Voice {
-    patience: Patience,
+    pub(super) patience: Patience,
     ids: Ids,
     asked: BTreeMap<Inquiry, (Message, Target)>,
     told: BTreeMap<SubscriptionId, Told>,
     grips: BTreeMap<ControlId, Grip>,
+    /// The places that it sets, by whom it sets them at.
+    pub(super) entries: BTreeMap<RaId, (Target, Entries)>,
+    /// Questions at which element a list is.
+    pub(super) active: BTreeMap<Inquiry, RaId>,
     /// Messages for the RA component, from those whom it asked.
     said: Vec<Message>,
 }
@@ -43,6 +50,8 @@ pub(in crate::gateway) struct Target {
     pub(in crate::gateway) id: JausId,
     /// The minor version of the service that is meant.
     pub(in crate::gateway) minor: u8,
+    /// Whether it works a list of places off.
+    pub(in crate::gateway) lists: bool,
 }
 
 /// A service connection of the RA component.
@@ -94,6 +103,8 @@ impl Voice {
             asked: BTreeMap::new(),
             told: BTreeMap::new(),
             grips: BTreeMap::new(),
+            entries: BTreeMap::new(),
+            active: BTreeMap::new(),
             said: Vec::new(),
         }
     }
@@ -140,8 +151,16 @@ impl Voice {
         stack: &mut Stack,
         tally: &mut Tally,
     ) {
+        if self.enter(now, request, peer, stack, tally) {
+            return;
+        }
         let words = self.words(request.destination, peer.minor);
-        let payload = match words.to_jaus(request.code, &request.data) {
+        let place = places(request, peer).filter(|it| it.query == request.code);
+        let payload = match place.and_then(|places| element_query(places, request)) {
+            Some(query) => Ok(query),
+            None => words.to_jaus(request.code, &request.data),
+        };
+        let payload = match payload {
             Ok(payload) => payload,
             Err(refusal) => return convert::refuse(now, tally, request.code, &refusal),
         };
@@ -171,38 +190,26 @@ impl Voice {
         now: Instant,
         inquiry: Inquiry,
         answer: Result<Bytes, NoAnswer>,
+        stack: &mut Stack,
         tally: &mut Tally,
     ) {
+        if self.handle_active(now, inquiry, &answer, stack, tally) {
+            return;
+        }
         let Some((request, peer)) = self.asked.remove(&inquiry) else {
             return;
         };
         match answer {
             Ok(report) => {
-                let told = self.report(now, (&request, peer.minor), &report, tally);
+                let place = places(&request, peer).filter(|it| it.query == request.code);
+                let told = match place {
+                    Some(places) => place_report(places, &report),
+                    None => self.words(request.destination, peer.minor).to_ra(&report),
+                };
+                let told = tell(now, &request, (&report, told), tally);
                 self.said.extend(told);
             }
             Err(none) => tally.refuse(now, Counter::Unanswered, request.code, none.peer),
-        }
-    }
-
-    /// A JAUS report as an answer to an RA message.
-    fn report(
-        &self,
-        now: Instant,
-        (request, minor): (&Message, u8),
-        report: &Bytes,
-        tally: &mut Tally,
-    ) -> Option<Message> {
-        match self.words(request.destination, minor).to_ra(report) {
-            Ok((code, data)) => {
-                tally.add(Counter::ReportsToRa);
-                Some(request.answer(code, data))
-            }
-            Err(refusal) => {
-                let code = code_of(report).unwrap_or_default();
-                convert::refuse(now, tally, code, &refusal);
-                None
-            }
         }
     }
 
@@ -216,7 +223,8 @@ impl Voice {
         tally: &mut Tally,
     ) {
         let request = Message::new(to, from, 0, Bytes::new());
-        let told = self.report(now, (&request, minor), report, tally);
+        let told = self.words(from, minor).to_ra(report);
+        let told = tell(now, &request, (report, told), tally);
         self.said.extend(told);
     }
 
@@ -395,6 +403,26 @@ impl Voice {
     /// OpenJAUS takes any confirmation for a yes, and says no by rejecting.
     fn reject_control(&mut self, request: &Message) {
         self.said.push(request.answer(REJECT_CONTROL, Bytes::new()));
+    }
+}
+
+/// A JAUS report, and what it became, as an answer to an RA message.
+fn tell(
+    now: Instant,
+    request: &Message,
+    (report, told): (&Bytes, Result<(u16, Bytes), Refusal>),
+    tally: &mut Tally,
+) -> Option<Message> {
+    match told {
+        Ok((code, data)) => {
+            tally.add(Counter::ReportsToRa);
+            Some(request.answer(code, data))
+        }
+        Err(refusal) => {
+            let code = code_of(report).unwrap_or_default();
+            convert::refuse(now, tally, code, &refusal);
+            None
+        }
     }
 }
 

@@ -51,6 +51,9 @@
 //! | 2404h 4404h | Query, Report Velocity State | same | same | refused: more than 65.534 m/s or 32.767 rad/s |
 //! | 0A20h to 4A24h | the twelve of the Vector Knowledge Store | same | same | nothing: they are ours octet by octet |
 //!
+//! Lists of waypoints and path segments are more than one message after the other: [`Places`] converts the
+//! places alone, for whoever keeps the list and gives the numbers, as the gateway does.
+//!
 //! What is not in the table has no counterpart: discrete devices, platform specifications, cameras,
 //! manipulators, payloads, missions; and what is no matter of conversion: discovery, service
 //! connections and events, which belong to the node and the connections.
@@ -61,6 +64,7 @@ mod control;
 mod effort;
 mod pair;
 mod path;
+mod places;
 mod pose;
 mod refusal;
 mod status;
@@ -76,6 +80,7 @@ use bytes::Bytes;
 
 pub use self::context::Context;
 pub use self::pair::Pair;
+pub use self::places::{Element, Places, speed_to_jaus, speed_to_ra};
 pub use self::refusal::{Reason, Refusal};
 
 /// The families.

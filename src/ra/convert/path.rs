@@ -7,7 +7,8 @@
 //! n + 1, which follows the element n, and for these drivers Set Travel Speed is Execute List: from
 //! the first element on at a speed above zero, whether or not the vehicle is under way, and without
 //! an element, which only changes the speed, at zero. Our list takes no second first element: another
-//! path is set after a Reset.
+//! path is set after a Reset. (Who knows what was set before says it otherwise: the gateway keeps the
+//! list, and has [`Places`](super::Places) convert its places alone.)
 //!
 //! The segment that ours reports is the one that is driven along; it is asked for and reported under
 //! the number 0. A limit of the path is refused in a command and left out in a report.

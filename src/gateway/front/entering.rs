@@ -1,0 +1,175 @@
+//! Places that an RA component sets at JAUS drivers: its voice puts them into their lists.
+
+use std::time::Instant;
+
+use bytes::Bytes;
+
+use super::Front;
+use super::listing::refuse;
+use super::voice::{Target, Voice};
+use crate::codec::Message as _;
+use crate::endpoint::Received;
+use crate::gateway::counters::{Counter, Tally};
+use crate::gateway::course::{Entries, Want};
+use crate::messages::core::{QueryElement, ReportElement};
+use crate::messages::mobility::ReportActiveElement;
+use crate::ra::convert::{Element, Places, Refusal};
+use crate::ra::ids::RaComponent;
+use crate::ra::{Message, RaId};
+use crate::service::{Inquiry, NoAnswer, Stack};
+
+/// Set Travel Speed.
+const SET_SPEED: u16 = 0x040A;
+/// Reset.
+const RESET: u16 = 0x0005;
+
+/// The places that a JAUS driver goes to, if it has a list of them.
+pub(super) fn places(request: &Message, peer: Target) -> Option<Places> {
+    let part = RaComponent(request.destination.component);
+    Places::of(part).filter(|_| peer.lists)
+}
+
+/// What stands for a query for a place: that for its element.
+pub(super) fn element_query(places: Places, request: &Message) -> Option<Bytes> {
+    let number = places.queried(&request.data)?;
+    let element_uid = number.checked_add(1)?;
+    QueryElement { element_uid }.encode().ok()
+}
+
+/// The code and data of the report of a place, for that of its element.
+pub(super) fn place_report(places: Places, report: &Bytes) -> Result<(u16, Bytes), Refusal> {
+    let report = ReportElement::decode(report)?;
+    let number = report.element_uid.saturating_sub(1);
+    let format =
+        crate::messages::core::set_element::ElementDataFormat(report.element_data.format.0);
+    let element = Element::new(format, report.element_data.data);
+    Ok((places.report(), places.to_ra(&element, number)?))
+}
+
+impl Voice {
+    /// The most lists that are entered.
+    const MOST_ENTRIES: usize = 16;
+
+    /// The RA component sets a place or a speed, if the message is one of those.
+    pub(super) fn enter(
+        &mut self,
+        now: Instant,
+        request: &Message,
+        peer: Target,
+        stack: &mut Stack,
+        tally: &mut Tally,
+    ) -> bool {
+        let Some(places) = places(request, peer) else {
+            return false;
+        };
+        let at = request.destination;
+        if request.code == RESET {
+            self.entries.remove(&at);
+            return false;
+        }
+        if request.code != places.set && request.code != SET_SPEED {
+            return false;
+        }
+        let is_new = !self.entries.contains_key(&at);
+        if is_new && self.entries.len() >= Self::MOST_ENTRIES {
+            tally.refuse(now, Counter::TooManyWaiting, request.code, request.source);
+            return true;
+        }
+        tally.add(Counter::CommandsFromRa);
+        let patience = self.patience.interval * self.patience.tries;
+        let new = || (peer, Entries::new(places, patience));
+        let (_, entries) = self.entries.entry(at).or_insert_with(new);
+        match request.code == SET_SPEED {
+            true => entries.handle_speed(now, request.code, &request.data),
+            false => entries.handle_set(now, &request.data),
+        }
+        self.follow_entries(now, at, stack, tally);
+        true
+    }
+
+    /// A JAUS driver has said at which element it is, if that was asked for a list.
+    pub(super) fn handle_active(
+        &mut self,
+        now: Instant,
+        inquiry: Inquiry,
+        answer: &Result<Bytes, NoAnswer>,
+        stack: &mut Stack,
+        tally: &mut Tally,
+    ) -> bool {
+        let Some(at) = self.active.remove(&inquiry) else {
+            return false;
+        };
+        let report = answer.as_ref().ok();
+        let report = report.and_then(|report| ReportActiveElement::decode(report).ok());
+        if let Some((_, entries)) = self.entries.get_mut(&at) {
+            entries.handle_active(now, report.map(|it| it.element_uid));
+        }
+        self.follow_entries(now, at, stack, tally);
+        true
+    }
+
+    /// Time has passed for the lists.
+    pub(super) fn handle_timeout(&mut self, now: Instant, stack: &mut Stack, tally: &mut Tally) {
+        let due =
+            |(_, entries): &(Target, Entries)| entries.poll_timeout().is_some_and(|due| due <= now);
+        let due: Vec<RaId> = self
+            .entries
+            .iter()
+            .filter(|(_, it)| due(it))
+            .map(|(&at, _)| at)
+            .collect();
+        for at in due {
+            if let Some((_, entries)) = self.entries.get_mut(&at) {
+                entries.handle_timeout(now);
+            }
+            self.follow_entries(now, at, stack, tally);
+        }
+    }
+
+    /// When there is something to do for the lists.
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        let entries = self.entries.values();
+        entries.filter_map(|(_, it)| it.poll_timeout()).min()
+    }
+
+    /// Carries out what a list wants.
+    fn follow_entries(&mut self, now: Instant, at: RaId, stack: &mut Stack, tally: &mut Tally) {
+        let Some((peer, entries)) = self.entries.get_mut(&at) else {
+            return;
+        };
+        for want in entries.take_wants() {
+            match want {
+                Want::Send(payload) => stack.send_octets(peer.id, payload),
+                Want::Ask(query) => {
+                    let report = ReportActiveElement::CODE;
+                    let inquiry = stack.ask(now, peer.id, query, report, self.patience);
+                    self.active.insert(inquiry, at);
+                }
+                Want::Refuse(code, why) => refuse(now, tally, code, &why),
+            }
+        }
+    }
+}
+
+impl Front {
+    /// A JAUS component says something that nobody asked for: says whether it confirms or refuses what
+    /// was put into its list.
+    pub(in crate::gateway) fn handle_entered(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        tally: &mut Tally,
+    ) -> bool {
+        let Self { voice, stack, .. } = self;
+        let mut of_it = Vec::new();
+        for (&at, (peer, entries)) in &mut voice.entries {
+            if peer.id == message.source && entries.handle_answer(now, &message.payload) {
+                of_it.push(at);
+            }
+        }
+        for &at in &of_it {
+            voice.follow_entries(now, at, stack, tally);
+        }
+        !of_it.is_empty()
+    }
+}

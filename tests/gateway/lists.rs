@@ -1,0 +1,196 @@
+//! Lists of places: a JAUS client's at an RA waypoint driver, and an RA client's at a JAUS one.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::codec::{FormattedBlob, Message as _};
+use jaus::gateway::{Counter, Settings};
+use jaus::messages::core::set_element::{ElementDataFormat, ElementRec};
+use jaus::messages::core::{QueryElementCount, ReportElementCount, SetElement, list_manager};
+use jaus::messages::mobility::{
+    ExecuteList, QueryActiveElement, QueryTravelSpeed, ReportActiveElement, ReportTravelSpeed,
+    SetGlobalWaypoint, global_waypoint_list_driver,
+};
+use jaus::ra::{Message, RaId};
+use jaus::service::mobility::Vehicle;
+use jaus::service::{Event, Kind, Management, Patience, Service};
+use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+
+use crate::rover::{Rover, SUBSYSTEM, bytes};
+use crate::world::{World, stack, subsystem};
+
+const JAUS_WAYPOINTS: JausId = JausId::new(20, 1, 45);
+const VEHICLE: JausId = JausId::new(101, 1, 7);
+const RA_WAYPOINTS: RaId = RaId::new(101, 1, 45, 7);
+/// The RA operator.
+const COMMANDER: RaId = RaId::new(30, 1, 32, 1);
+
+/// An element of a list with so many, which is the one with that number.
+fn element(uid: u16, count: u16, latitude: f64) -> ElementRec {
+    let mut waypoint = SetGlobalWaypoint::default();
+    waypoint.set_latitude_deg(latitude).unwrap();
+    waypoint.set_longitude_deg(13.4).unwrap();
+    ElementRec {
+        element_uid: uid,
+        previous_uid: uid - 1,
+        next_uid: if uid == count { 0 } else { uid + 1 },
+        element_data: FormattedBlob::new(
+            ElementDataFormat::JAUS_MESSAGE,
+            waypoint.encode().unwrap(),
+        ),
+    }
+}
+
+fn execute(element_uid: Option<u16>, speed: f64) -> ExecuteList {
+    let mut execute = ExecuteList {
+        element_uid,
+        ..ExecuteList::default()
+    };
+    execute.set_speed_m_per_s(speed).unwrap();
+    execute
+}
+
+/// The codes of the messages that a component was sent without asking.
+fn told(world: &World, who: usize) -> Vec<u16> {
+    let events = world.jaus[who].events.iter();
+    let codes = events.filter_map(|event| match event {
+        Event::Message(message) => message.payload.first_chunk().copied(),
+        _ => None,
+    });
+    codes.map(u16::from_le_bytes).collect()
+}
+
+#[test]
+fn an_ra_waypoint_driver_gets_the_list_of_a_jaus_client_in_order_and_its_speed() {
+    let mut world = World::new(Settings::default());
+    let parts = [(45, 1, "Waypoints")];
+    let ra = world.add_ra(subsystem(SUBSYSTEM, "Sim", &parts), Some(Rover::new()));
+    let operator = world.add_operator();
+    world.run(Duration::from_secs(10));
+    let directory = world.jaus[operator].stack.directory();
+    let driver = directory.component(JAUS_WAYPOINTS).unwrap();
+    assert!(
+        driver.offers(global_waypoint_list_driver::URN),
+        "{driver:?}"
+    );
+    assert!(driver.offers(list_manager::URN), "{driver:?}");
+
+    let set = SetElement {
+        element_list: (1..=3)
+            .map(|uid| element(uid, 3, 52.5 + f64::from(uid) / 1000.0))
+            .collect(),
+        ..SetElement::default()
+    };
+    world.tell(operator, JAUS_WAYPOINTS, &set);
+    assert_eq!(world.count(Counter::NotInControl), 1);
+    let (now, patience) = (world.now, Patience::default());
+    let stack = &mut world.jaus[operator].stack;
+    stack
+        .request_control(now, JAUS_WAYPOINTS, 127, patience)
+        .unwrap();
+    world.run(Duration::from_secs(2));
+    world.tell(operator, JAUS_WAYPOINTS, &set);
+    world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
+    world.run(Duration::from_secs(2));
+    assert_eq!(told(&world, operator), [0x041C], "the list is confirmed");
+    let rover = world.ra[ra].rover.as_ref().unwrap();
+    let numbers: Vec<u8> = rover.waypoints.iter().map(|data| data[1]).collect();
+    assert_eq!((numbers, rover.speeds.len()), (vec![0, 1, 2], 1));
+
+    let query = QueryElementCount {};
+    let count: ReportElementCount = world.ask(operator, JAUS_WAYPOINTS, &query).unwrap();
+    assert_eq!(count.element_count, 3);
+    let query = QueryActiveElement {};
+    let active: ReportActiveElement = world.ask(operator, JAUS_WAYPOINTS, &query).unwrap();
+    assert_eq!(active.element_uid, 1);
+    // OpenJAUS's does not tell its speed: it has the one that it was given.
+    world.tell(operator, JAUS_WAYPOINTS, &execute(None, 3.0));
+    let query = QueryTravelSpeed {};
+    let speed: ReportTravelSpeed = world.ask(operator, JAUS_WAYPOINTS, &query).unwrap();
+    assert!((speed.speed_m_per_s() - 3.0).abs() < 0.2, "{speed:?}");
+    let rover = world.ra[ra].rover.as_ref().unwrap();
+    assert_eq!((rover.waypoints.len(), rover.speeds.len()), (3, 2));
+
+    // Nobody is there any more who could stop it.
+    world.jaus[operator].up = false;
+    world.run(Duration::from_secs(20));
+    let rover = world.ra[ra].rover.as_ref().unwrap();
+    assert_eq!(rover.speeds.last(), Some(&bytes("0000")));
+    assert_eq!(rover.controller, None);
+}
+
+fn says(code: u16, hex: &str) -> Message {
+    Message::new(COMMANDER, RA_WAYPOINTS, code, bytes(hex))
+}
+
+/// Set Global Waypoint.
+fn waypoint(number: u8, latitude: f64) -> Message {
+    let scaled = |degrees: f64, limit: f64| (degrees / limit * f64::from(i32::MAX)) as i32;
+    let mut data = vec![0, number, 0];
+    data.extend(scaled(latitude, 90.0).to_le_bytes());
+    data.extend(scaled(13.4, 180.0).to_le_bytes());
+    Message::new(COMMANDER, RA_WAYPOINTS, 0x040C, Bytes::from(data))
+}
+
+#[test]
+fn an_ra_client_drives_a_jaus_vehicle_along_its_waypoints_and_changes_the_speed_on_the_way() {
+    let mut world = World::new(Settings::default());
+    let ra = world.add_ra(subsystem(30, "OCU", &[(32, 1, "Commander")]), None);
+    let rover = SkidSteer::new(SkidSteerConfig::default());
+    let vehicle = Vehicle::new(Pilot::new(rover, Frame::at(52.5, 13.4)));
+    let services: Vec<Box<dyn Service>> = vec![
+        Box::new(vehicle.global_waypoint_list_driver()),
+        Box::new(vehicle.list_manager()),
+    ];
+    let vehicle = stack(VEHICLE, Kind::Vehicle, "Rover", services);
+    world.add_jaus(vehicle.management(Management::new()));
+    let operator = world.add_operator();
+    world.run(Duration::from_secs(10));
+
+    world.ra_says(ra, &says(0x000D, "7f"));
+    world.run(Duration::from_secs(1));
+    world.ra_says(ra, &says(0x0004, ""));
+    // About 11 m from one to the next.
+    for number in 0..3 {
+        world.ra_says(ra, &waypoint(number, 52.5 + f64::from(number + 1) * 0.0001));
+    }
+    world.run(Duration::from_secs(1));
+    world.ra_says(ra, &says(0x240B, ""));
+    world.ra_says(ra, &says(0x240C, "0200"));
+    world.run(Duration::from_secs(1));
+    let heard = std::mem::take(&mut world.ra[ra].heard);
+    let count = heard.iter().find(|it| it.code == 0x440B).unwrap();
+    assert_eq!(count.data, bytes("0300"));
+    let third = heard.iter().find(|it| it.code == 0x440C).unwrap();
+    assert_eq!(third.data[1..3], [2, 0]);
+    assert_eq!(third.data[3..11], waypoint(2, 52.5003).data[3..11]);
+
+    let active = |world: &mut World| {
+        let query = QueryActiveElement {};
+        let report: ReportActiveElement = world.ask(operator, VEHICLE, &query).unwrap();
+        report.element_uid
+    };
+    // 2 m/s, until it is on its way to the second.
+    world.ra_says(ra, &says(0x040A, "0d00"));
+    assert_eq!(active(&mut world), 1);
+    for _ in 0..30 {
+        if active(&mut world) == 2 {
+            break;
+        }
+    }
+    world.ra_says(ra, &says(0x040A, "0700"));
+    assert_eq!(active(&mut world), 2, "it does not begin again");
+    for _ in 0..60 {
+        if active(&mut world) == 0 {
+            break;
+        }
+    }
+    world.ra_says(ra, &says(0x040A, "0d00"));
+    assert_eq!(
+        active(&mut world),
+        0,
+        "it was driven, and is not driven again"
+    );
+    assert_eq!(world.count(Counter::NotListed), 0);
+}
