@@ -9,6 +9,7 @@
 )]
 
 mod drivers;
+mod events;
 mod hostile;
 mod jaus_vehicle;
 mod knowledge;

@@ -14,6 +14,7 @@
 
 mod codes;
 mod entering;
+mod events;
 mod lease;
 mod listing;
 mod mirror;

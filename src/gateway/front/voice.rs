@@ -4,6 +4,7 @@
 //! | the RA component | becomes of it |
 //! |---|---|
 //! | sends a query | the JAUS component is asked, and its answer converted; nothing if it says nothing |
+//! | creates an event | an event of the JAUS component, if that has the like |
 //! | creates a service connection | an event of the JAUS component at that rate; confirmed when that one has confirmed |
 //! | requests control | Request Control with its authority; Confirm or Reject when it is decided |
 //! | sends a command | converted and passed on; the JAUS component obeys if this one is in control |
@@ -18,6 +19,7 @@ use super::super::counters::{Counter, Tally};
 use super::super::course::Entries;
 use super::super::pairs;
 use super::entering::{element_query, place_report, places};
+use super::events::RaEvent;
 use crate::address::JausId;
 use crate::ra::connection::{ConnectionId, Connections, Request, ResponseCode};
 use crate::ra::convert::Refusal;
@@ -39,8 +41,10 @@ pub(in crate::gateway) struct Voice {
     pub(super) entries: BTreeMap<RaId, (Target, Entries)>,
     /// Questions at which element a list is.
     pub(super) active: BTreeMap<Inquiry, RaId>,
+    /// Its events.
+    pub(super) events: BTreeMap<SubscriptionId, RaEvent>,
     /// Messages for the RA component, from those whom it asked.
-    said: Vec<Message>,
+    pub(super) said: Vec<Message>,
 }
 
 /// A JAUS component as an RA component sees it.
@@ -105,17 +109,19 @@ impl Voice {
             grips: BTreeMap::new(),
             entries: BTreeMap::new(),
             active: BTreeMap::new(),
+            events: BTreeMap::new(),
             said: Vec::new(),
         }
     }
 
-    fn words(&self, as_what: RaId, minor: u8) -> Words {
+    pub(super) fn words(&self, as_what: RaId, minor: u8) -> Words {
         Words::new(self.ids.clone(), as_what.component, minor)
     }
 
     /// Whether anything is under way.
     pub(in crate::gateway) fn is_busy(&self) -> bool {
-        !(self.asked.is_empty() && self.told.is_empty() && self.grips.is_empty())
+        let is_told = !(self.told.is_empty() && self.events.is_empty());
+        is_told || !(self.asked.is_empty() && self.grips.is_empty())
     }
 
     /// What is to be sent to the RA component since this was asked last.
@@ -151,7 +157,9 @@ impl Voice {
         stack: &mut Stack,
         tally: &mut Tally,
     ) {
-        if self.enter(now, request, peer, stack, tally) {
+        if self.enter(now, request, peer, stack, tally)
+            || self.handle_event_request(now, request, peer, stack, tally)
+        {
             return;
         }
         let words = self.words(request.destination, peer.minor);
@@ -282,6 +290,9 @@ impl Voice {
         connections: &mut Connections,
         tally: &mut Tally,
     ) {
+        if self.handle_event_news(now, id, &news, tally) {
+            return;
+        }
         let Some(told) = self.told.get_mut(&id) else {
             return;
         };
