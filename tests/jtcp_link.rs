@@ -180,6 +180,29 @@ async fn what_is_sent_before_the_first_connection_waits_for_it_and_later_it_does
     assert!(link.poll_timeout().unwrap() > later);
 }
 
+/// As JAUS++ does, which loses its place in a stream without.
+#[tokio::test]
+async fn who_writes_the_version_octet_before_each_message_gets_it_before_each() {
+    let said = message(20);
+    for (repeats, expected) in [(true, [&said[..], &said]), (false, [&said[..], &said[1..]])] {
+        let mut link = listening(1);
+        let mut peer = TcpStream::connect(link.local().unwrap()).unwrap();
+        peer.set_read_timeout(Some(LIMIT)).unwrap();
+        let now = Instant::now();
+        let again = if repeats { &said[..] } else { &said[1..] };
+        peer.write_all(&[&said, again].concat()).unwrap();
+        turns(&mut link, now, |link| link.counters().received == 2).await;
+
+        let remote = peer.local_addr().unwrap();
+        link.transmit(&to(remote, &said));
+        link.transmit(&to(remote, &said));
+        turn(&mut link, now).await;
+        let mut answers = vec![0; expected.concat().len()];
+        peer.read_exact(&mut answers).unwrap();
+        assert_eq!(answers, expected.concat(), "repeats: {repeats}");
+    }
+}
+
 #[tokio::test]
 async fn a_peer_that_still_writes_when_the_link_hangs_up_is_not_cut_off() {
     let mut link = listening(1);

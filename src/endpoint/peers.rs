@@ -257,6 +257,17 @@ impl Peers {
         assigned.or_else(recognised).unwrap_or_default()
     }
 
+    /// Whether a peer is better not answered on the TCP connections that it opened: for sure, or by
+    /// the habit that makes it so.
+    pub(super) fn is_deaf_on_its_connections(&self, id: JausId) -> bool {
+        let is_by_habit = || {
+            let known = self.learned.get(&id);
+            known.is_some_and(|known| known.recogniser.repeats_version())
+        };
+        let assigned = Assignment::find(&self.assigned, id);
+        self.profile(id).is_deaf_on_its_connections() || assigned.is_none() && is_by_habit()
+    }
+
     /// How a peer cuts large messages, if that is known. Who is configured to be no particular peer
     /// keeps to the standard.
     pub(super) fn large_style(&self, id: JausId) -> Option<LargeStyle> {

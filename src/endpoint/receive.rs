@@ -102,8 +102,8 @@ impl Endpoint {
         self.receive(now, from, frame);
     }
 
-    /// Takes note that a version octet stood before the latest frame of `source` in the middle of a
-    /// TCP stream, which tells something of who it is.
+    /// Takes note that a version octet stands before the next frame of `source` in the middle of a
+    /// TCP stream, which tells something of who it is and where it is to be answered.
     pub fn handle_repeated_version(&mut self, source: JausId) {
         self.peers
             .recognise(source, peer::Recogniser::handle_repeated_version);
@@ -375,7 +375,7 @@ impl Endpoint {
     /// where it was heard before by datagram, if it was.
     fn where_it_reads(&self, id: JausId, from: Path) -> Path {
         let is_datagram = |path: &Path| self.framing(path.link) == Framing::Judp;
-        if is_datagram(&from) || !self.peers.profile(id).is_deaf_on_its_connections() {
+        if is_datagram(&from) || !self.peers.is_deaf_on_its_connections(id) {
             return from;
         }
         let before = self.peers.last_heard(id).map(|(path, _)| path);

@@ -157,10 +157,11 @@ impl Link {
                 } => {
                     let path = from(Remote::Socket(remote));
                     taps.frame(path, &frame);
-                    endpoint.handle_frame(now, path, &frame);
+                    // First, for it decides where this one is answered.
                     if version_again {
                         endpoint.handle_repeated_version(frame.source);
                     }
+                    endpoint.handle_frame(now, path, &frame);
                 }
                 Arrival::Closed(peer, _) => endpoint.forget_path(from(Remote::Socket(peer))),
             }),

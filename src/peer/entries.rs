@@ -231,8 +231,9 @@ departures! {
                own",
         source: Source::Recorded,
         told: Told::By(&[Sign::RepeatedVersion]),
-        ours: "both ways of writing are read. It hangs when a message of ours comes in two \
-               segments: use UDP with it",
+        ours: "both ways of writing are read, and who writes so is answered so, for it hangs when one \
+               is missing. It hangs as well when a message of ours comes in two segments: use UDP \
+               with it",
         place: "src/wire/jtcp/decoder.rs",
         test: "a_version_octet_before_each_message_is_read",
     };
@@ -240,16 +241,17 @@ departures! {
     OneWayConnections = Entry {
         name: "one-way connections",
         peers: &[JausPlusPlus],
-        does: "opens a TCP connection to whoever it hears by UDP, writes on it, and reads only those \
-               that others opened",
+        does: "opens a TCP connection to whoever it hears by UDP and writes on it; what it is \
+               answered there it reads behind version octets alone, or hangs",
         source: Source::Recorded,
         told: Told::By(&[
             Sign::RegistersAcrossSubsystems,
             Sign::StaleOctets,
             Sign::RepeatedVersion,
         ]),
-        ours: "whoever is known by UDP is answered by UDP; where there is TCP alone, give its id \
-               with `tcp.connect`, so that we open a connection of our own",
+        ours: "from the first version octet in the middle of its stream on it is answered by UDP, by \
+               which it has heard us before it connects. Leave it out of `tcp.connect`: it does not \
+               find us then",
         place: "src/endpoint/receive.rs",
         test: "jauspp_that_connects_is_answered_where_it_reads",
     };

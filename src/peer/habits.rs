@@ -85,7 +85,8 @@ impl Peer {
         matches!(self, Self::Iop | Self::Jts)
     }
 
-    /// Whether it reads nothing on the TCP connections that it opened, and is to be answered by UDP.
+    /// Whether answers on the TCP connections that it opened are lost, so that it is to be answered by
+    /// UDP.
     #[must_use]
     pub const fn is_deaf_on_its_connections(self) -> bool {
         matches!(self, Self::JausPlusPlus)

@@ -174,6 +174,11 @@ impl Recogniser {
         self.note(Sign::AnswersForZero);
     }
 
+    /// Whether version octets stood before its messages in the middle of a TCP stream.
+    pub(crate) const fn repeats_version(&self) -> bool {
+        self.signs.has(Sign::RepeatedVersion)
+    }
+
     /// Who it is, as far as can be told.
     #[must_use]
     pub fn verdict(&self) -> Verdict {

@@ -165,9 +165,7 @@ impl Signs {
     }
 
     pub(super) fn iter(self) -> impl Iterator<Item = Sign> {
-        Sign::ALL
-            .into_iter()
-            .filter(move |sign| self.0 & sign.bit() != 0)
+        Sign::ALL.into_iter().filter(move |sign| self.has(*sign))
     }
 
     /// How much they say for a peer. What speaks for Junior speaks for a fork of it as well, if

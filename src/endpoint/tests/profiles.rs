@@ -206,6 +206,32 @@ fn jauspp_that_connects_is_answered_where_it_reads() {
 }
 
 #[test]
+fn who_repeats_the_version_octet_on_a_stream_is_answered_by_datagram_before_it_is_known() {
+    const CONNECTIONS: LinkId = LinkId(1);
+    for (repeats, expected) in [(true, WIRE), (false, CONNECTIONS)] {
+        let mut rig = Rig::new();
+        let stream = LinkProfile {
+            framing: crate::wire::Framing::Jtcp,
+            ..LinkProfile::default()
+        };
+        rig.endpoint.add_link(CONNECTIONS, stream);
+        rig.meet_peer();
+        if repeats {
+            rig.endpoint.handle_repeated_version(PEER);
+        }
+        let connection = Path {
+            link: CONNECTIONS,
+            peer: SocketAddr::from(([10, 0, 0, PEER_HOST], 33_918)).into(),
+        };
+        let frame = from_peer(QUERY_IDENTIFICATION);
+        rig.endpoint.handle_frame(rig.now, connection, &frame);
+        rig.send(to_peer()).unwrap();
+        let links: Vec<_> = rig.transmits().iter().map(|it| it.link).collect();
+        assert_eq!(links, [expected], "repeats: {repeats}");
+    }
+}
+
+#[test]
 fn a_call_of_junior_is_acknowledged_by_the_one_alone_from_its_own_address() {
     let mut rig = Rig::new();
     rig.endpoint.attach(SIBLING).unwrap();

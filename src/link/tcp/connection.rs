@@ -104,6 +104,9 @@ impl Connection {
     /// connection carries one version.
     pub(super) fn send(&mut self, priority: Priority, encoded: &Bytes) -> bool {
         let (version, message) = split_version(encoded.clone());
+        // Who writes the version octet before each message may need it there to read one (JAUS++).
+        let repeats = self.spoken.is_some() && self.decoder.repeats_version();
+        let message = if repeats { encoded.clone() } else { message };
         let spoken = *self.spoken.get_or_insert_with(|| {
             self.leaving.put_u8(match version {
                 Version::As5669a => VERSION_AS5669A,
