@@ -33,6 +33,8 @@ counters! {
     NotConverted = "refused: cannot be said on the other side",
     /// Refused: a command of a client that is not in control.
     NotInControl = "refused: sender not in control",
+    /// Refused: a command for an RA component in an emergency.
+    InEmergency = "refused: in an emergency",
     /// Refused: a query that is waiting for its answer already.
     Repeated = "refused: question repeated while it waits",
     /// Refused: more than may wait for an answer.

@@ -16,7 +16,7 @@ use jaus::service::{
     Topic, When,
 };
 
-use crate::rover::{Rover, SUBSYSTEM};
+use crate::rover::{Rover, SUBSYSTEM, bytes};
 use crate::world::{COMMANDER, OPERATOR, World, stack, subsystem};
 
 const JAUS_DRIVER: JausId = JausId::new(20, 1, 33);
@@ -291,6 +291,33 @@ fn its_states_are_told_and_set_and_anybody_may_stop_it_in_an_emergency() {
     };
     world.tell(stranger, JAUS_DRIVER, &emergency);
     assert_eq!(world.ra[ra].rover.as_ref().unwrap().state, 5);
+}
+
+#[test]
+fn in_an_emergency_it_is_stopped_by_what_it_obeys_and_not_driven_until_that_is_over() {
+    let (mut world, ra, operator) = world();
+    take_control(&mut world, operator, 127);
+    let mut ahead = SetWrenchEffort::default();
+    ahead.set_propulsive_linear_effort_x_percent(60.0).unwrap();
+    let drive = |world: &mut World| {
+        world.tell(operator, JAUS_DRIVER, &ahead);
+        world.run(seconds(0.3));
+        world.ra[ra].rover.as_ref().unwrap().efforts.len()
+    };
+    assert_eq!(drive(&mut world), 1);
+    let emergency_code = set_emergency::EmergencyCode(1);
+    world.tell(operator, JAUS_DRIVER, &SetEmergency { emergency_code });
+    world.run(seconds(0.1));
+    // Like OpenJAUS's, it obeys efforts in every state.
+    let rover = world.ra[ra].rover.as_mut().unwrap();
+    let stop = rover.efforts.last().unwrap();
+    assert_eq!(stop[..], bytes("7f00000000000000000000000000ff"));
+    assert_eq!(drive(&mut world), 2, "nobody drives it");
+    assert_eq!(world.count(Counter::InEmergency), 1);
+    // Somebody else has taken the emergency back, which the next command finds out.
+    world.ra[ra].rover.as_mut().unwrap().state = 1;
+    assert_eq!(drive(&mut world), 2);
+    assert_eq!(drive(&mut world), 3);
 }
 
 #[test]

@@ -13,6 +13,7 @@
 //! The same stack is the RA component's voice among JAUS components: see [`Voice`].
 
 mod codes;
+mod emergency;
 mod entering;
 mod events;
 mod lease;
@@ -68,6 +69,8 @@ pub(super) struct Front {
     patience: Duration,
     words: Words,
     mirror: Mirror,
+    /// Whether it has said last that it is in an emergency.
+    in_emergency: bool,
     lease: Lease,
     /// The list of places, of a driver that goes to such.
     listing: Option<Listing>,
@@ -137,6 +140,7 @@ impl Front {
             patience: plan.patience,
             words,
             mirror,
+            in_emergency: false,
             lease: Lease::new(plan.patience, plan.authority),
             listing,
             streams: Streams::new(plan.ra, plan.own),
@@ -237,8 +241,13 @@ impl Front {
         if needs_control(code) && !self.lease.obeys(client) {
             return tally.refuse(now, Counter::NotInControl, code, client);
         }
+        if self.holds_back(now, code) {
+            return tally.refuse(now, Counter::InEmergency, code, client);
+        }
         tally.add(Counter::CommandsToRa);
         self.note_command(code, &words.1);
+        let stop = (code == emergency::SET).then(|| self.stop()).flatten();
+        self.to_ra.extend(stop);
         self.to_ra.push(words);
         if is_management(code) {
             self.mirror.outdate(STATUS);
@@ -380,6 +389,9 @@ impl Front {
     }
 
     fn tell_state(&mut self, now: Instant, report: u16, data: Bytes, converted: &[u8]) {
+        if report == STATUS {
+            self.heed_status(&data);
+        }
         let changed = self.mirror.keep(now, report, data);
         let (ready, held) = std::mem::take(&mut self.held)
             .into_iter()
