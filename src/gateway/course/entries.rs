@@ -244,6 +244,8 @@ impl Entries {
             Some(number) => drop(self.set.split_off(&number)),
             None => self.set.clear(),
         }
+        let set = &self.set;
+        self.replaced.retain(|number| set.contains_key(number));
     }
 
     /// Asks for the next thing to be put into the list; when all is there, the speed follows.
