@@ -198,9 +198,9 @@ impl Endpoint {
             self.counters.add(Counter::NotTheWayBack);
         } else {
             self.learn(now, from, frame)?;
-            if self.is_unmarked_call(frame) {
+            if self.to_all {
                 self.peers
-                    .recognise(frame.source, peer::Recogniser::handle_call);
+                    .recognise(frame.source, |it| it.handle_frame_to_all(frame));
             }
             if passes {
                 self.pass_on(now, from, frame);
@@ -427,20 +427,12 @@ impl Endpoint {
             return self.config.duplicate_window;
         }
         let is_call = frame.flags.broadcast() != Some(Broadcast::None);
-        if is_call || self.is_unmarked_call(frame) || self.repeats_soon(frame.source) {
+        let is_unmarked_call = self.to_all && peer::Recogniser::is_unmarked_call(frame);
+        if is_call || is_unmarked_call || self.repeats_soon(frame.source) {
             self.config.first_contact_window
         } else {
             self.config.retransmission_window
         }
-    }
-
-    /// Whether a message for one of us went to everybody and wants an acknowledgement, and does not
-    /// say that it went to everybody.
-    fn is_unmarked_call(&self, frame: &Frame) -> bool {
-        self.to_all
-            && frame.destination.is_unicast()
-            && frame.flags.acknowledgement() == Acknowledgement::Request
-            && frame.flags.broadcast() == Some(Broadcast::None)
     }
 
     fn repeats_soon(&self, source: JausId) -> bool {

@@ -127,10 +127,20 @@ impl Recogniser {
         self.note(Sign::StaleOctets);
     }
 
-    /// Takes note that a message for one component, which wants an acknowledgement, went to everybody
-    /// without saying so.
-    pub fn handle_call(&mut self) {
-        self.note(Sign::CallsUnknownIds);
+    /// Takes a frame of it that went to everybody, besides [`handle_frame`](Self::handle_frame).
+    pub fn handle_frame_to_all(&mut self, frame: &Frame) {
+        if Self::is_unmarked_call(frame) {
+            self.note(Sign::CallsUnknownIds);
+        }
+    }
+
+    /// Whether a frame that went to everybody is for one component, wants an acknowledgement, and
+    /// does not say that it went to everybody: a call as fkie's node manager in Python has it.
+    #[must_use]
+    pub fn is_unmarked_call(frame: &Frame) -> bool {
+        frame.destination.is_unicast()
+            && frame.flags.acknowledgement() == Acknowledgement::Request
+            && frame.flags.broadcast() == Some(Broadcast::None)
     }
 
     /// Takes the style of a large message that was put together.
