@@ -8,13 +8,14 @@ use bytes::Bytes;
 
 use super::Front;
 use crate::address::JausId;
-use crate::codec::ServiceId;
+use crate::codec::{Message as _, ServiceId};
 use crate::endpoint::Received;
 use crate::gateway::convert;
 use crate::gateway::counters::{Counter, Tally};
 use crate::gateway::course::{Course, Refused};
 use crate::gateway::roles::Role;
 use crate::messages::core::list_manager;
+use crate::messages::mobility::ExecuteList;
 use crate::ra::convert::Places;
 use crate::service::{Context, Handled, Service};
 
@@ -93,6 +94,9 @@ impl Front {
         }
         if !self.lease.obeys(client) {
             return tally.refuse(now, Counter::NotInControl, code, client);
+        }
+        if code == ExecuteList::CODE && self.holds_back(now, SET_SPEED) {
+            return tally.refuse(now, Counter::InEmergency, code, client);
         }
         if let Some(listing) = &self.listing {
             listing.lock().handle_command(now, &message.payload);
