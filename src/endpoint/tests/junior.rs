@@ -125,19 +125,29 @@ fn lengths_of(rig: &mut Rig, frames: &[Frame]) -> Vec<usize> {
 
 #[test]
 fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_come_again() {
-    let mut rig = Rig::new();
-    // As recorded: three times 10 KiB, and 3.07 s later another process with 100 KiB of which the
-    // second fragment is the same.
-    let small = [1, 4, 7]
-        .map(|first| of_junior(first, &message(10_240)))
-        .concat();
-    assert_eq!(lengths_of(&mut rig, &small), [10_240; 3]);
-    rig.pass(Duration::from_millis(3070) - Duration::from_millis(18));
-    let large = of_junior(1, &message(102_400));
-    assert_eq!(lengths_of(&mut rig, &large), [102_400]);
-    // And once more the same, all of it.
-    rig.pass(Duration::from_millis(2500));
-    assert_eq!(lengths_of(&mut rig, &large), [102_400]);
+    // Whether it is known by its fragments or taken for anybody.
+    let anybody = Assignment {
+        id: PEER,
+        profile: Known::Standard,
+    };
+    for profiles in [Vec::new(), vec![anybody]] {
+        let mut rig = Rig::with(Config {
+            profiles,
+            ..Config::default()
+        });
+        // As recorded: three times 10 KiB, and 3.07 s later another process with 100 KiB of which
+        // the second fragment is the same.
+        let small = [1, 4, 7]
+            .map(|first| of_junior(first, &message(10_240)))
+            .concat();
+        assert_eq!(lengths_of(&mut rig, &small), [10_240; 3]);
+        rig.pass(Duration::from_millis(3070) - Duration::from_millis(18));
+        let large = of_junior(1, &message(102_400));
+        assert_eq!(lengths_of(&mut rig, &large), [102_400]);
+        // And once more the same, all of it.
+        rig.pass(Duration::from_millis(2500));
+        assert_eq!(lengths_of(&mut rig, &large), [102_400]);
+    }
 }
 
 #[test]
