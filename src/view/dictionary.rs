@@ -197,10 +197,14 @@ impl Dictionary {
             return Ok(());
         }
         let wanted = service.urn.to_lowercase();
-        let wanted = wanted.rsplit(':').next().unwrap_or_default();
+        let (family, wanted) = wanted.rsplit_once(':').unwrap_or(("", &wanted));
         let similar = all().filter(|known| known.urn.to_lowercase().contains(wanted));
-        // The one that has little else in its name.
-        let similar = similar.min_by_key(|known| known.urn.len());
+        // One of the same family, else the standard's, and the one that has little else in its name.
+        let similar = similar.min_by_key(|known| {
+            let urn = known.urn.to_lowercase();
+            let is_kin = urn.starts_with(family);
+            (!is_kin, !urn.starts_with("urn:jaus:"), urn.len())
+        });
         Err(Unreadable::new(
             match similar {
                 Some(similar) => format!(
