@@ -138,10 +138,15 @@ impl Lines {
     const LONGEST: usize = 4096;
 
     fn take(&mut self, octets: &[u8], voice: &Voice) {
-        for piece in octets.split_inclusive(|&octet| octet == b'\n') {
-            self.begun.extend_from_slice(piece);
-            if piece.ends_with(b"\n") || self.begun.len() >= Self::LONGEST {
-                self.end(voice);
+        for mut piece in octets.split_inclusive(|&octet| octet == b'\n') {
+            while !piece.is_empty() {
+                let room = Self::LONGEST.saturating_sub(self.begun.len());
+                let (fits, rest) = piece.split_at(room.clamp(1, piece.len()));
+                self.begun.extend_from_slice(fits);
+                if fits.ends_with(b"\n") || self.begun.len() >= Self::LONGEST {
+                    self.end(voice);
+                }
+                piece = rest;
             }
         }
     }
