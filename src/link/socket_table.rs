@@ -30,11 +30,16 @@ impl Entry {
 /// All sockets that this host shows.
 pub(super) fn all() -> Vec<Entry> {
     let tables = ["/proc/net/udp", "/proc/net/udp6"].map(fs::read_to_string);
-    tables
-        .iter()
-        .flatten()
-        .flat_map(|table| read(table))
-        .collect()
+    once(tables.iter().flatten().flat_map(|table| read(table)))
+}
+
+/// Each socket once: while others open and close theirs, the table may tell of one twice.
+fn once(entries: impl Iterator<Item = Entry>) -> Vec<Entry> {
+    let mut entries: Vec<_> = entries.collect();
+    entries.sort_by_key(|entry| entry.inode);
+    // Sockets that no process holds have no number.
+    entries.dedup_by(|next, before| next.inode != 0 && next.inode == before.inode);
+    entries
 }
 
 /// What a file descriptor of the socket with this number links to.
@@ -104,6 +109,15 @@ garbage
         assert!(in_the_way("127.0.0.2:3794").is_empty());
         assert!(in_the_way("127.0.0.1:3796").is_empty());
         assert!(in_the_way("[::1]:53").is_empty());
+    }
+
+    #[test]
+    fn a_socket_that_is_told_of_twice_counts_once() {
+        let inodes: Vec<u64> = once(read(TABLE).chain(read(TABLE)))
+            .iter()
+            .map(|e| e.inode)
+            .collect();
+        assert_eq!(inodes, [66, 67, 77, 4242]);
     }
 
     #[test]
