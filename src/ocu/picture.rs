@@ -77,7 +77,12 @@ impl Part {
     }
 
     pub(super) fn controller(&self) -> Option<JausId> {
-        self.controller?.what.map(|(id, _)| id)
+        self.told_controller()?
+    }
+
+    /// Who controls it, or that nobody does, once it has said so.
+    pub(super) fn told_controller(&self) -> Option<Option<JausId>> {
+        Some(self.controller?.what.map(|(id, _)| id))
     }
 }
 

@@ -20,6 +20,8 @@ mod networks;
 mod steps;
 mod system;
 
+use std::time::Duration;
+
 use browser::{Browser, SCREENS};
 use networks::{on_hosts, say_skipped};
 use steps::{emergency, look_from_all_screens, take_control};
@@ -106,8 +108,14 @@ fn plan(page: &mut Browser, north: f64, east: f64) {
     page.wait("document.querySelector('#destination-x').value !== ''");
     page.write("#destination-x", &north.to_string());
     page.write("#destination-y", &east.to_string());
+    // Right after control was taken the planner may not be ready yet; then the page says so, and
+    // whoever wants a route presses again.
+    let planned = "!document.querySelector('#approve').disabled";
     page.press("#plan");
-    page.wait("!document.querySelector('#approve').disabled");
+    if !page.holds_within(Duration::from_secs(5), planned) {
+        page.press("#plan");
+    }
+    page.wait(planned);
 }
 
 fn approve(page: &mut Browser) {

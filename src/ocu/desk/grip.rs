@@ -12,6 +12,7 @@ use crate::component::{Control, ControlError};
 use crate::ocu::picture::{Part, Picture};
 use crate::ocu::role::Role;
 use crate::ocu::state;
+use crate::service::State;
 
 /// What is wanted and what is held.
 #[derive(Default)]
@@ -77,9 +78,39 @@ impl Grip {
         self.ready == Some(true)
     }
 
-    /// What this operator left ready when the station ended is to stay so.
-    pub(super) fn go_on_ready(&mut self) {
-        self.ready.get_or_insert(true);
+    /// What this operator left ready when the station before this one ended is to stay so: decided
+    /// when control is taken, or as soon as the driver tells whom it obeys.
+    fn go_on_ready(&mut self, now: Instant, picture: &Picture, hands: &mut Hands) {
+        if self.ready.is_some() || self.wanted == Wanted::Nothing {
+            return;
+        }
+        let known = picture.find(Role::PrimitiveDriver);
+        let known = known.and_then(|id| Some((id, picture.parts().get(&id)?)));
+        let Some((id, driver)) = known else {
+            return;
+        };
+        // Right after the grant it may still say what it was for somebody else.
+        let settled = match self.holds.get(&id) {
+            Some(Hold::Held { since, .. }) => now >= *since + Self::SETTLED,
+            _ => true,
+        };
+        let own = Some(hands.component().id());
+        match driver.told_controller() {
+            Some(told) if told != own => self.ready = Some(false),
+            Some(_) if driver.is(State::Ready) && settled => {
+                self.set_ready(now, true);
+                self.resume_all(hands);
+            }
+            _ => {}
+        }
+    }
+
+    fn resume_all(&self, hands: &mut Hands) {
+        for hold in self.holds.values() {
+            if let Hold::Held { control, .. } = hold {
+                resume(control, hands);
+            }
+        }
     }
 
     /// The control over a part, if it is held.
@@ -116,6 +147,7 @@ impl Grip {
         hands: &mut Hands,
     ) {
         self.wanted = wanted;
+        self.go_on_ready(now, picture, hands);
         // Whoever has it: it is asked for anew.
         self.holds
             .retain(|_, hold| !matches!(hold, Hold::Not { .. }));
@@ -188,6 +220,7 @@ impl Grip {
     /// lost.
     pub(super) fn handle_time(&mut self, now: Instant, picture: &Picture, hands: &mut Hands) {
         drop(self.let_go(picture));
+        self.go_on_ready(now, picture, hands);
         let own = hands.component().id();
         let is_ready = self.is_ready();
         let wanted = self.wanted_parts(picture);

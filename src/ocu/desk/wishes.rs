@@ -83,12 +83,6 @@ impl Desk {
         } else {
             Wanted::Everything
         };
-        // Control that the parts still say is ours outlived the station that had it.
-        let driver = self.picture.find(Role::PrimitiveDriver);
-        let driver = driver.and_then(|id| self.picture.parts().get(&id));
-        if driver.is_some_and(|it| it.controller() == Some(own) && it.is(State::Ready)) {
-            self.grip.go_on_ready();
-        }
         self.grip
             .take(now, wanted, reply, &self.picture, &mut self.hands);
     }
