@@ -7,7 +7,9 @@ use jaus::address::JausId;
 use jaus::codec::{FormattedBlob, Message as _};
 use jaus::gateway::{Counter, Settings};
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec};
-use jaus::messages::core::{QueryElementCount, ReportElementCount, SetElement, list_manager};
+use jaus::messages::core::{
+    QueryElementCount, ReportElementCount, SetElement, SetEmergency, list_manager, set_emergency,
+};
 use jaus::messages::mobility::{
     ExecuteList, QueryActiveElement, QueryTravelSpeed, ReportActiveElement, ReportTravelSpeed,
     SetGlobalWaypoint, global_waypoint_list_driver,
@@ -61,13 +63,38 @@ fn told(world: &World, who: usize) -> Vec<u16> {
     codes.map(u16::from_le_bytes).collect()
 }
 
-#[test]
-fn an_ra_waypoint_driver_gets_the_list_of_a_jaus_client_in_order_and_its_speed() {
+/// An operator and an RA waypoint driver that have found each other.
+fn driver_of_ra() -> (World, usize, usize) {
     let mut world = World::new(Settings::default());
     let parts = [(45, 1, "Waypoints")];
     let ra = world.add_ra(subsystem(SUBSYSTEM, "Sim", &parts), Some(Rover::new()));
     let operator = world.add_operator();
     world.run(Duration::from_secs(10));
+    (world, ra, operator)
+}
+
+fn take_control(world: &mut World, operator: usize) {
+    let (now, patience) = (world.now, Patience::default());
+    let stack = &mut world.jaus[operator].stack;
+    stack
+        .request_control(now, JAUS_WAYPOINTS, 127, patience)
+        .unwrap();
+    world.run(Duration::from_secs(2));
+}
+
+/// Three waypoints, one north of the other.
+fn three_waypoints() -> SetElement {
+    SetElement {
+        element_list: (1..=3)
+            .map(|uid| element(uid, 3, 52.5 + f64::from(uid) / 1000.0))
+            .collect(),
+        ..SetElement::default()
+    }
+}
+
+#[test]
+fn an_ra_waypoint_driver_gets_the_list_of_a_jaus_client_in_order_and_its_speed() {
+    let (mut world, ra, operator) = driver_of_ra();
     let directory = world.jaus[operator].stack.directory();
     let driver = directory.component(JAUS_WAYPOINTS).unwrap();
     assert!(
@@ -76,21 +103,10 @@ fn an_ra_waypoint_driver_gets_the_list_of_a_jaus_client_in_order_and_its_speed()
     );
     assert!(driver.offers(list_manager::URN), "{driver:?}");
 
-    let set = SetElement {
-        element_list: (1..=3)
-            .map(|uid| element(uid, 3, 52.5 + f64::from(uid) / 1000.0))
-            .collect(),
-        ..SetElement::default()
-    };
-    world.tell(operator, JAUS_WAYPOINTS, &set);
+    world.tell(operator, JAUS_WAYPOINTS, &three_waypoints());
     assert_eq!(world.count(Counter::NotInControl), 1);
-    let (now, patience) = (world.now, Patience::default());
-    let stack = &mut world.jaus[operator].stack;
-    stack
-        .request_control(now, JAUS_WAYPOINTS, 127, patience)
-        .unwrap();
-    world.run(Duration::from_secs(2));
-    world.tell(operator, JAUS_WAYPOINTS, &set);
+    take_control(&mut world, operator);
+    world.tell(operator, JAUS_WAYPOINTS, &three_waypoints());
     world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
     world.run(Duration::from_secs(2));
     assert_eq!(told(&world, operator), [0x041C], "the list is confirmed");
@@ -118,6 +134,34 @@ fn an_ra_waypoint_driver_gets_the_list_of_a_jaus_client_in_order_and_its_speed()
     let rover = world.ra[ra].rover.as_ref().unwrap();
     assert_eq!(rover.speeds.last(), Some(&bytes("0000")));
     assert_eq!(rover.controller, None);
+}
+
+#[test]
+fn in_an_emergency_a_list_is_stopped_and_none_is_executed_until_that_is_over() {
+    let (mut world, ra, operator) = driver_of_ra();
+    take_control(&mut world, operator);
+    world.tell(operator, JAUS_WAYPOINTS, &three_waypoints());
+    let speeds = |world: &mut World| {
+        world.run(Duration::from_secs(2));
+        world.ra[ra].rover.as_ref().unwrap().speeds.clone()
+    };
+    world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
+    assert_eq!(speeds(&mut world).len(), 1);
+    let emergency_code = set_emergency::EmergencyCode(1);
+    world.tell(operator, JAUS_WAYPOINTS, &SetEmergency { emergency_code });
+    let stopped = speeds(&mut world);
+    assert_eq!(stopped.last(), Some(&bytes("0000")));
+    for uid in [Some(0), None] {
+        world.tell(operator, JAUS_WAYPOINTS, &execute(uid, 2.0));
+        assert_eq!(speeds(&mut world), stopped, "{uid:?}");
+    }
+    assert_eq!(world.count(Counter::InEmergency), 2);
+    world.ra[ra].rover.as_mut().unwrap().state = 1;
+    // The first finds out that the emergency is over.
+    world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
+    speeds(&mut world);
+    world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
+    assert_ne!(speeds(&mut world).last(), Some(&bytes("0000")));
 }
 
 fn says(code: u16, hex: &str) -> Message {
