@@ -4,7 +4,7 @@ use bytes::{BufMut, Bytes, BytesMut};
 
 use super::carry::Counterpart;
 use super::{Context, Refusal};
-use crate::codec::{DecodeError, Message};
+use crate::codec::Message;
 use crate::messages::ra::forgiving;
 use crate::ra::ids::RaComponent;
 
@@ -61,6 +61,7 @@ impl Pair {
     }
 
     /// The pair of two types that are laid out alike, code included, and mean the same.
+    #[cfg(feature = "ground")]
     pub(super) const fn same_octets<Ra: Message, Jaus: Message>() -> Self {
         Self {
             ra: Ra::CODE,
@@ -119,9 +120,10 @@ where
 }
 
 /// The octets, if the other definition reads them too.
+#[cfg(feature = "ground")]
 fn read_by_both<M>(
     payload: Bytes,
-    decode: fn(&Bytes) -> Result<M, DecodeError>,
+    decode: fn(&Bytes) -> Result<M, crate::codec::DecodeError>,
 ) -> Result<Bytes, Refusal> {
     decode(&payload)?;
     Ok(payload)
