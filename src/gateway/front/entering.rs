@@ -6,15 +6,13 @@ use bytes::Bytes;
 
 use super::Front;
 use super::listing::refuse;
-use super::voice::{Target, Voice};
+use super::target::{Target, places};
+use super::voice::Voice;
 use crate::codec::Message as _;
 use crate::endpoint::Received;
 use crate::gateway::counters::{Counter, Tally};
 use crate::gateway::course::{Entries, Want};
-use crate::messages::core::{QueryElement, ReportElement};
 use crate::messages::mobility::ReportActiveElement;
-use crate::ra::convert::{Element, Places, Refusal};
-use crate::ra::ids::RaComponent;
 use crate::ra::{Message, RaId};
 use crate::service::{Inquiry, NoAnswer, Stack};
 
@@ -22,29 +20,6 @@ use crate::service::{Inquiry, NoAnswer, Stack};
 const SET_SPEED: u16 = 0x040A;
 /// Reset.
 const RESET: u16 = 0x0005;
-
-/// The places that a JAUS driver goes to, if it has a list of them.
-pub(super) fn places(request: &Message, peer: Target) -> Option<Places> {
-    let part = RaComponent(request.destination.component);
-    Places::of(part).filter(|_| peer.lists)
-}
-
-/// What stands for a query for a place: that for its element.
-pub(super) fn element_query(places: Places, request: &Message) -> Option<Bytes> {
-    let number = places.queried(&request.data)?;
-    let element_uid = number.checked_add(1)?;
-    QueryElement { element_uid }.encode().ok()
-}
-
-/// The code and data of the report of a place, for that of its element.
-pub(super) fn place_report(places: Places, report: &Bytes) -> Result<(u16, Bytes), Refusal> {
-    let report = ReportElement::decode(report)?;
-    let number = report.element_uid.saturating_sub(1);
-    let format =
-        crate::messages::core::set_element::ElementDataFormat(report.element_data.format.0);
-    let element = Element::new(format, report.element_data.data);
-    Ok((places.report(), places.to_ra(&element, number)?))
-}
 
 impl Voice {
     /// The most lists that are entered.

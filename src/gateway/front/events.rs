@@ -8,7 +8,9 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
-use super::voice::{Target, Voice};
+use super::ra_event::RaEvent;
+use super::target::Target;
+use super::voice::Voice;
 use crate::codec::Message as _;
 use crate::gateway::convert::{self, Words};
 use crate::gateway::counters::{Counter, Tally};
@@ -16,29 +18,11 @@ use crate::gateway::pairs;
 use crate::messages::ra33::confirm_event_request::ResponseCode;
 use crate::messages::ra33::create_event::{CreateEventRec, EventType};
 use crate::messages::ra33::{
-    CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryEvents, RejectEventRequest,
-    ReportEvents, UpdateEvent, report_events, update_event,
+    CancelEvent, ConfirmEventRequest, CreateEvent, QueryEvents, RejectEventRequest, ReportEvents,
+    UpdateEvent, report_events, update_event,
 };
-use crate::ra::{Message, RaId};
+use crate::ra::Message;
 use crate::service::{Stack, SubscriptionId, SubscriptionNews, Topic, When, code_of};
-
-/// An event of the RA component.
-#[derive(Debug)]
-pub(super) struct RaEvent {
-    /// Its number. All events of the RA component have different ones.
-    id: u8,
-    /// The JAUS component as the RA component sees it.
-    at: RaId,
-    /// The message that created or changed it, to answer.
-    request: Message,
-    wanted: CreateEventRec,
-    topic: Topic,
-    words: Words,
-    /// Counts what was told.
-    sequence: u8,
-    /// Whether the RA component knows that it has it.
-    confirmed: bool,
-}
 
 impl Voice {
     /// The RA component asks for an event, or about events, if the message is one of those.
@@ -297,20 +281,6 @@ impl Voice {
         let (from, to) = (request.destination, request.source);
         self.said
             .extend(Message::with_body(from, to, &confirm).ok());
-    }
-}
-
-impl RaEvent {
-    /// The message that tells a report.
-    fn tell(&mut self, report_message: Bytes) -> Option<Message> {
-        let event = Event {
-            event_id: self.id,
-            report_code: self.wanted.report_code,
-            sequence_number: self.sequence,
-            report_message,
-        };
-        self.sequence = self.sequence.wrapping_add(1);
-        Message::with_body(self.at, self.request.source, &event).ok()
     }
 }
 

@@ -18,8 +18,8 @@ use super::super::convert::{self, Ids, Words};
 use super::super::counters::{Counter, Tally};
 use super::super::course::Entries;
 use super::super::pairs;
-use super::entering::{element_query, place_report, places};
-use super::events::RaEvent;
+use super::ra_event::RaEvent;
+use super::target::{Target, element_query, place_report, places};
 use crate::address::JausId;
 use crate::ra::connection::{ConnectionId, Connections, Request, ResponseCode};
 use crate::ra::convert::Refusal;
@@ -45,17 +45,6 @@ pub(in crate::gateway) struct Voice {
     pub(super) events: BTreeMap<SubscriptionId, RaEvent>,
     /// Messages for the RA component, from those whom it asked.
     pub(super) said: Vec<Message>,
-}
-
-/// A JAUS component as an RA component sees it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::gateway) struct Target {
-    /// Its id.
-    pub(in crate::gateway) id: JausId,
-    /// The minor version of the service that is meant.
-    pub(in crate::gateway) minor: u8,
-    /// Whether it works a list of places off.
-    pub(in crate::gateway) lists: bool,
 }
 
 /// A service connection of the RA component.
