@@ -156,14 +156,8 @@ impl Header {
     }
 
     /// Whether the message is one of the Reference Architecture, by its header and its source.
-    ///
-    /// The two older headers carry both kinds: OpenJAUS's messages of the Reference Architecture,
-    /// and messages of the services, which Junior and its like send through them. Nothing in the
-    /// header says which. But the first of the four numbers of an id in the Reference Architecture
-    /// is never 0, and among ids with three numbers only those of subsystems from 256 on have
-    /// another octet there.
     pub(super) fn is_ra(&self) -> bool {
-        self.transport != Version::As5669a && RaId::from(self.source).subsystem != 0
+        RaId::in_header(self.transport, self.source).is_some()
     }
 
     /// `42.1.1`; the Reference Architecture's ids have four parts.

@@ -244,6 +244,21 @@ pub struct RaId {
     pub instance: u8,
 }
 
+impl RaId {
+    /// The id of the Reference Architecture that stands in a header of this version, if it is one.
+    ///
+    /// The two older headers carry both kinds: OpenJAUS's messages of the Reference Architecture,
+    /// and messages of the services, which Junior and its like send through them. Nothing in the
+    /// header says which. But the first of the four numbers of an id in the Reference Architecture
+    /// is never 0, and among ids with three numbers only those of subsystems from 256 on have
+    /// another octet there.
+    #[must_use]
+    pub fn in_header(version: Version, id: JausId) -> Option<Self> {
+        let id = Self::from(id);
+        (version != Version::As5669a && id.subsystem != 0).then_some(id)
+    }
+}
+
 impl From<JausId> for RaId {
     fn from(id: JausId) -> Self {
         let [instance, component, node, subsystem] = id.to_wire();

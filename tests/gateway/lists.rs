@@ -8,7 +8,8 @@ use jaus::codec::{FormattedBlob, Message as _};
 use jaus::gateway::{Counter, Settings};
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec};
 use jaus::messages::core::{
-    QueryElementCount, ReportElementCount, SetElement, SetEmergency, list_manager, set_emergency,
+    QueryElementCount, QueryStatus, ReportElementCount, ReportStatus, SetElement, SetEmergency,
+    list_manager, set_emergency,
 };
 use jaus::messages::mobility::{
     ExecuteList, QueryActiveElement, QueryTravelSpeed, ReportActiveElement, ReportTravelSpeed,
@@ -162,6 +163,25 @@ fn in_an_emergency_a_list_is_stopped_and_none_is_executed_until_that_is_over() {
     speeds(&mut world);
     world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
     assert_ne!(speeds(&mut world).last(), Some(&bytes("0000")));
+}
+
+#[test]
+fn an_emergency_that_somebody_else_has_set_ends_a_list_before_its_speed_is_told() {
+    let (mut world, ra, operator) = driver_of_ra();
+    take_control(&mut world, operator);
+    // It answers no questions for places, so that they are handed over slowly.
+    world.ra[ra].rover.as_mut().unwrap().mute = true;
+    world.tell(operator, JAUS_WAYPOINTS, &three_waypoints());
+    world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
+    let speeds = |world: &World| world.ra[ra].rover.as_ref().unwrap().speeds.len();
+    assert_eq!(speeds(&world), 0, "still being handed over");
+    world.ra[ra].rover.as_mut().unwrap().state = 5;
+    let status: ReportStatus = world
+        .ask(operator, JAUS_WAYPOINTS, &QueryStatus {})
+        .unwrap();
+    assert_eq!(status.status.0, 5);
+    world.run(Duration::from_secs(10));
+    assert_eq!(speeds(&world), 0);
 }
 
 fn says(code: u16, hex: &str) -> Message {

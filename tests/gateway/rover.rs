@@ -30,7 +30,7 @@ pub(crate) struct Rover {
     /// Rates that were asked for, by report.
     pub(crate) connections: BTreeMap<u16, f64>,
     streams: BTreeMap<u16, Stream>,
-    /// Whether it answers queries for poses and velocities at all.
+    /// Whether it answers no queries for poses, velocities and waypoints.
     pub(crate) mute: bool,
     /// What its controller says of itself.
     pub(crate) controller_ready: bool,
@@ -81,7 +81,7 @@ impl Rover {
             0x040A if self.controller.is_some_and(|(id, _)| id == from) => {
                 self.speeds.push(message.data.clone());
             }
-            0x240C => {
+            0x240C if !self.mute => {
                 let mut waypoints = self.waypoints.iter();
                 if let Some(held) = waypoints.find(|held| held[1..3] == message.data[..2]) {
                     self.said.push(message.answer(0x440C, held.clone()));

@@ -194,6 +194,17 @@ fn a_program_of_junior_that_is_started_again_beside_its_engine_is_heard() {
     }
 }
 
+/// A frame comes, to us alone or to everybody, whatever its flags say.
+fn hear_as_sent(rig: &mut Rig, frame: &Frame, to_all: bool) {
+    let datagram = judp::encode(frame).unwrap();
+    let from = path(PEER_HOST);
+    if to_all {
+        rig.endpoint.handle_datagram_to_all(rig.now, from, datagram);
+    } else {
+        rig.endpoint.handle_datagram(rig.now, from, datagram);
+    }
+}
+
 #[test]
 fn a_call_without_its_flag_is_known_by_the_way_that_it_came() {
     // As recorded of fkie's node manager in Python.
@@ -201,18 +212,10 @@ fn a_call_without_its_flag_is_known_by_the_way_that_it_came() {
         flags: WANTED,
         ..from_peer(QUERY_HEARTBEAT)
     };
-    let datagram = judp::encode(&call).unwrap();
     for (to_all, heard) in [(true, 2), (false, 1)] {
         let mut rig = Rig::new();
         for _process in 0..2 {
-            let octets = datagram.clone();
-            if to_all {
-                rig.endpoint
-                    .handle_datagram_to_all(rig.now, path(PEER_HOST), octets);
-            } else {
-                rig.endpoint
-                    .handle_datagram(rig.now, path(PEER_HOST), octets);
-            }
+            hear_as_sent(&mut rig, &call, to_all);
             rig.pass(Duration::from_millis(1500));
         }
         assert_eq!(rig.received().len(), heard, "to everybody: {to_all}");
@@ -229,14 +232,7 @@ fn who_calls_without_the_flag_and_begins_with_1_gets_fragments_as_junior_does() 
             sequence: first,
             ..from_peer(QUERY_HEARTBEAT)
         };
-        let datagram = judp::encode(&call).unwrap();
-        if to_all {
-            rig.endpoint
-                .handle_datagram_to_all(rig.now, path(PEER_HOST), datagram);
-        } else {
-            rig.endpoint
-                .handle_datagram(rig.now, path(PEER_HOST), datagram);
-        }
+        hear_as_sent(&mut rig, &call, to_all);
         rig.sent();
         rig.send(Outgoing {
             payload: message(102_400),

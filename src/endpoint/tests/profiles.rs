@@ -178,55 +178,54 @@ fn who_is_configured_is_what_it_is_said_to_be() {
     );
 }
 
+/// A link whose peers have connected to us.
+const CONNECTIONS: LinkId = LinkId(1);
+
+fn add_connections(rig: &mut Rig) {
+    let stream = LinkProfile {
+        framing: crate::wire::Framing::Jtcp,
+        ..LinkProfile::default()
+    };
+    rig.endpoint.add_link(CONNECTIONS, stream);
+}
+
+/// By which links a peer is answered that has asked on its connection.
+fn links_of_answer(rig: &mut Rig) -> Vec<LinkId> {
+    let connection = Path {
+        link: CONNECTIONS,
+        peer: SocketAddr::from(([10, 0, 0, PEER_HOST], 33_918)).into(),
+    };
+    let frame = from_peer(QUERY_IDENTIFICATION);
+    rig.endpoint.handle_frame(rig.now, connection, &frame);
+    rig.send(to_peer()).unwrap();
+    rig.transmits().iter().map(|it| it.link).collect()
+}
+
 #[test]
 fn jauspp_that_connects_is_answered_where_it_reads() {
-    const CONNECTIONS: LinkId = LinkId(1);
     for (profile, expected) in [
         (Known::JausPlusPlus, WIRE),
         (Known::Junior, CONNECTIONS),
         (Known::Standard, CONNECTIONS),
     ] {
         let mut rig = Rig::with(assigned(profile));
-        let stream = LinkProfile {
-            framing: crate::wire::Framing::Jtcp,
-            ..LinkProfile::default()
-        };
-        rig.endpoint.add_link(CONNECTIONS, stream);
+        add_connections(&mut rig);
         rig.meet_peer();
-        let connection = Path {
-            link: CONNECTIONS,
-            peer: SocketAddr::from(([10, 0, 0, PEER_HOST], 33_918)).into(),
-        };
-        let frame = from_peer(QUERY_IDENTIFICATION);
-        rig.endpoint.handle_frame(rig.now, connection, &frame);
-        rig.send(to_peer()).unwrap();
-        let links: Vec<_> = rig.transmits().iter().map(|it| it.link).collect();
+        let links = links_of_answer(&mut rig);
         assert_eq!(links, [expected], "{profile}");
     }
 }
 
 #[test]
 fn who_repeats_the_version_octet_on_a_stream_is_answered_by_datagram_before_it_is_known() {
-    const CONNECTIONS: LinkId = LinkId(1);
     for (repeats, expected) in [(true, WIRE), (false, CONNECTIONS)] {
         let mut rig = Rig::new();
-        let stream = LinkProfile {
-            framing: crate::wire::Framing::Jtcp,
-            ..LinkProfile::default()
-        };
-        rig.endpoint.add_link(CONNECTIONS, stream);
+        add_connections(&mut rig);
         rig.meet_peer();
         if repeats {
             rig.endpoint.handle_repeated_version(PEER);
         }
-        let connection = Path {
-            link: CONNECTIONS,
-            peer: SocketAddr::from(([10, 0, 0, PEER_HOST], 33_918)).into(),
-        };
-        let frame = from_peer(QUERY_IDENTIFICATION);
-        rig.endpoint.handle_frame(rig.now, connection, &frame);
-        rig.send(to_peer()).unwrap();
-        let links: Vec<_> = rig.transmits().iter().map(|it| it.link).collect();
+        let links = links_of_answer(&mut rig);
         assert_eq!(links, [expected], "repeats: {repeats}");
     }
 }

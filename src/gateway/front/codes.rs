@@ -1,4 +1,18 @@
-//! Which JAUS messages are an RA component's business, by their codes.
+//! Which JAUS messages are an RA component's business, by their codes; and the codes of those RA
+//! messages that are looked at here.
+
+use crate::codec::Message as _;
+use crate::messages::ra33;
+
+pub(super) const RESET: u16 = ra33::Reset::CODE;
+pub(super) const SET_EMERGENCY: u16 = ra33::SetEmergency::CODE;
+pub(super) const REQUEST_CONTROL: u16 = ra33::RequestComponentControl::CODE;
+pub(super) const RELEASE_CONTROL: u16 = ra33::ReleaseComponentControl::CODE;
+pub(super) const CONFIRM_CONTROL: u16 = ra33::ConfirmComponentControl::CODE;
+pub(super) const REJECT_CONTROL: u16 = ra33::RejectComponentControl::CODE;
+pub(super) const SET_SPEED: u16 = ra33::SetTravelSpeed::CODE;
+pub(super) const SPEED: u16 = ra33::ReportTravelSpeed::CODE;
+pub(super) const STATUS: u16 = ra33::ReportComponentStatus::CODE;
 
 /// Whether a message with this code is the RA component's business; all others are ours: transport,
 /// discovery, liveness, events, who is in control, and what JAUS drivers say of elements that the RA

@@ -7,14 +7,12 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
-use super::codes::is_management;
-use super::{Front, STATUS, needs_control};
+use super::Front;
+use super::codes::{STATUS, is_management, needs_control};
 use crate::codec::{Message, OutOfRange};
 use crate::messages::ra33::{SetTravelSpeed, SetWrenchEffort};
 use crate::ra::ids::RaComponent;
 
-/// Set Emergency.
-pub(super) const SET: u16 = 0x0006;
 /// The primary status code for an emergency.
 const EMERGENCY: u8 = 5;
 

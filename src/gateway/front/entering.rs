@@ -5,6 +5,7 @@ use std::time::Instant;
 use bytes::Bytes;
 
 use super::Front;
+use super::codes::{RESET, SET_SPEED};
 use super::listing::refuse;
 use super::target::{Target, places};
 use super::voice::Voice;
@@ -15,11 +16,6 @@ use crate::gateway::course::{Entries, Want};
 use crate::messages::mobility::ReportActiveElement;
 use crate::ra::{Message, RaId};
 use crate::service::{Inquiry, NoAnswer, Stack};
-
-/// Set Travel Speed.
-const SET_SPEED: u16 = 0x040A;
-/// Reset.
-const RESET: u16 = 0x0005;
 
 impl Voice {
     /// The most lists that are entered.

@@ -8,17 +8,13 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use super::codes::{RELEASE_CONTROL, REQUEST_CONTROL};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::messages::core::confirm_control::ResponseCode as Confirmation;
 use crate::messages::core::reject_control::ResponseCode as Rejection;
 use crate::messages::core::{ConfirmControl, RejectControl};
 use crate::service::Controller;
-
-/// Request Component Control.
-pub(super) const REQUEST: u16 = 0x000D;
-/// Release Component Control.
-pub(super) const RELEASE: u16 = 0x000E;
 
 /// Who controls an RA component through us.
 #[derive(Debug)]
@@ -217,7 +213,7 @@ impl Lease {
 
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         if let Some(farewell) = self.farewell.filter(|it| it.next <= now) {
-            self.said.to_ra.push((RELEASE, Bytes::new()));
+            self.said.to_ra.push((RELEASE_CONTROL, Bytes::new()));
             self.say_again(now, farewell.left - 1);
         }
         let State::Asking {
@@ -265,13 +261,13 @@ impl Lease {
 
     fn pass_on(&mut self, client: Controller) {
         let body = Bytes::copy_from_slice(&[client.authority]);
-        self.said.to_ra.push((REQUEST, body));
+        self.said.to_ra.push((REQUEST_CONTROL, body));
     }
 
     fn let_go(&mut self, now: Instant) {
         self.state = State::Free;
         self.outranked_ourselves = false;
-        self.said.to_ra.push((RELEASE, Bytes::new()));
+        self.said.to_ra.push((RELEASE_CONTROL, Bytes::new()));
         self.say_again(now, Self::FAREWELLS);
     }
 
@@ -323,7 +319,7 @@ mod tests {
         let (mut lease, now) = lease();
         lease.request(now, CLIENT, 127);
         let said = lease.take_said();
-        assert_eq!(said.to_ra, [(REQUEST, Bytes::from_static(&[127]))]);
+        assert_eq!(said.to_ra, [(REQUEST_CONTROL, Bytes::from_static(&[127]))]);
         assert!(told(&said).is_empty() && !lease.obeys(CLIENT));
         lease.handle_confirm(now, 0);
         assert_eq!(told(&lease.take_said()), [(CLIENT, 0x000F, 0)]);
@@ -338,7 +334,11 @@ mod tests {
         while let Some(wake) = lease.poll_timeout() {
             lease.handle_timeout(wake);
             let said = lease.take_said();
-            requests += said.to_ra.iter().filter(|it| it.0 == REQUEST).count();
+            requests += said
+                .to_ra
+                .iter()
+                .filter(|it| it.0 == REQUEST_CONTROL)
+                .count();
             if !said.to_clients.is_empty() {
                 assert_eq!(told(&said), [(CLIENT, 0x000F, 1)]);
                 assert_eq!(wake, start + Duration::from_secs(1));
@@ -358,7 +358,7 @@ mod tests {
         lease.request(now, RIVAL, 255);
         let said = lease.take_said();
         assert_eq!(told(&said), [(CLIENT, 0x0010, 0)]);
-        assert_eq!(said.to_ra, [(REQUEST, Bytes::from_static(&[200]))]);
+        assert_eq!(said.to_ra, [(REQUEST_CONTROL, Bytes::from_static(&[200]))]);
         // OpenJAUS rejects the hold that we had, and then confirms.
         lease.handle_reject();
         assert!(told(&lease.take_said()).is_empty());
@@ -392,7 +392,7 @@ mod tests {
                 lease.release(now, CLIENT);
             }
             let said = lease.take_said();
-            assert_eq!(said.to_ra, [(RELEASE, Bytes::new())]);
+            assert_eq!(said.to_ra, [(RELEASE_CONTROL, Bytes::new())]);
             assert_eq!(told(&said).len(), usize::from(!gone));
             assert!(lease.controller().is_none());
         }
@@ -414,12 +414,12 @@ mod tests {
                 .take_said()
                 .to_ra
                 .iter()
-                .filter(|it| it.0 == RELEASE)
+                .filter(|it| it.0 == RELEASE_CONTROL)
                 .count();
             while let Some(wake) = lease.poll_timeout() {
                 lease.handle_timeout(wake);
                 let said = lease.take_said().to_ra;
-                releases += said.iter().filter(|it| it.0 == RELEASE).count();
+                releases += said.iter().filter(|it| it.0 == RELEASE_CONTROL).count();
             }
             assert_eq!(releases, if asked_again { 1 } else { 3 });
             assert_eq!(lease.obeys(RIVAL), asked_again);

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use super::Front;
+use super::codes::{RESET, SET_EMERGENCY, SET_SPEED, SPEED};
 use crate::address::JausId;
 use crate::codec::{Message as _, ServiceId};
 use crate::endpoint::Received;
@@ -16,13 +17,9 @@ use crate::gateway::course::{Course, Refused};
 use crate::gateway::roles::Role;
 use crate::messages::core::list_manager;
 use crate::messages::mobility::ExecuteList;
+use crate::messages::ra33::{Shutdown, Standby};
 use crate::ra::convert::Places;
 use crate::service::{Context, Handled, Service};
-
-/// Set Travel Speed.
-const SET_SPEED: u16 = 0x040A;
-/// Report Travel Speed.
-const SPEED: u16 = 0x440A;
 
 /// The list of an RA driver. Cheap to clone; the clones are one.
 #[derive(Debug, Clone)]
@@ -108,10 +105,8 @@ impl Front {
     pub(super) fn note_command(&self, code: u16, body: &Bytes) {
         let Some(listing) = &self.listing else { return };
         match code {
-            // Shutdown, Standby, Set Emergency.
-            0x0002 | 0x0003 | 0x0006 => listing.lock().stop(),
-            // Reset.
-            0x0005 => listing.lock().reset(),
+            Shutdown::CODE | Standby::CODE | SET_EMERGENCY => listing.lock().stop(),
+            RESET => listing.lock().reset(),
             SET_SPEED => listing.lock().note_speed(body.clone()),
             _ => {}
         }
@@ -166,14 +161,18 @@ impl Front {
         }
     }
 
-    /// If nobody is in control any more, the driver is stopped before it is released.
-    pub(super) fn stop_list_without_controller(&mut self, now: Instant, tally: &mut Tally) {
-        if let Some(listing) = &self.listing
-            && self.lease.controller().is_none()
-        {
+    /// If nobody is in control any more, the driver is stopped before it is released. In an emergency,
+    /// whoever has set it, nothing more is handed over, and no speed follows.
+    pub(super) fn stop_list_where_due(&mut self, now: Instant, tally: &mut Tally) {
+        let Some(listing) = &self.listing else { return };
+        if self.lease.controller().is_none() {
             listing.lock().leave();
-            self.follow_list(now, None, tally);
+        } else if self.in_emergency {
+            listing.lock().stop();
+        } else {
+            return;
         }
+        self.follow_list(now, None, tally);
     }
 
     /// Carries out what the list wants. `client` is whose message it was.

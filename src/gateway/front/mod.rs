@@ -30,7 +30,10 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use self::codes::{answer_to_command, crosses, is_management, needs_control};
+use self::codes::{
+    CONFIRM_CONTROL, REJECT_CONTROL, SET_EMERGENCY, STATUS, answer_to_command, crosses,
+    is_management, needs_control,
+};
 use self::lease::Lease;
 use self::listing::{Listed, Listing};
 use self::mirror::{Mirror, Mirrored};
@@ -54,13 +57,6 @@ use crate::ra::{Message, RaId};
 use crate::service::{
     Discovery, Event, Liveness, Profile, Scope, Service, Stack, Timing, Transport, code_of,
 };
-
-/// Report Component Status.
-const STATUS: u16 = 0x4002;
-/// Confirm Component Control.
-const CONFIRM_CONTROL: u16 = 0x000F;
-/// Reject Component Control.
-const REJECT_CONTROL: u16 = 0x0010;
 
 /// An RA component among JAUS components.
 pub(super) struct Front {
@@ -249,7 +245,7 @@ impl Front {
         }
         tally.add(Counter::CommandsToRa);
         self.note_command(code, &words.1);
-        let stop = (code == emergency::SET).then(|| self.stop()).flatten();
+        let stop = (code == SET_EMERGENCY).then(|| self.stop()).flatten();
         self.to_ra.extend(stop);
         self.to_ra.push(words);
         if is_management(code) {
@@ -448,7 +444,7 @@ impl Front {
         if said.granted {
             tally.add(Counter::ControlOfRa);
         }
-        self.stop_list_without_controller(now, tally);
+        self.stop_list_where_due(now, tally);
         self.to_ra.extend(said.to_ra);
         let before = self.mirror.controller_is(self.lease.controller());
         for (client, payload) in said.to_clients {

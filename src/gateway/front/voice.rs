@@ -18,9 +18,12 @@ use super::super::convert::{self, Ids, Words};
 use super::super::counters::{Counter, Tally};
 use super::super::course::Entries;
 use super::super::pairs;
+use super::codes::{CONFIRM_CONTROL, REJECT_CONTROL, RELEASE_CONTROL, REQUEST_CONTROL};
 use super::ra_event::RaEvent;
 use super::target::{Target, element_query, place_report, places};
 use crate::address::JausId;
+use crate::codec::Message as _;
+use crate::messages::ra33::CreateServiceConnection;
 use crate::ra::connection::{ConnectionId, Connections, Request, ResponseCode};
 use crate::ra::convert::Refusal;
 use crate::ra::{Message, RaId};
@@ -69,13 +72,6 @@ struct Grip {
     peer: JausId,
     held: bool,
 }
-
-/// Create Service Connection.
-const CREATE_CONNECTION: u16 = 0x0008;
-/// Confirm Component Control.
-const CONFIRM_CONTROL: u16 = 0x000F;
-/// Reject Component Control.
-const REJECT_CONTROL: u16 = 0x0010;
 
 impl Voice {
     /// The most questions that wait for an answer.
@@ -128,10 +124,10 @@ impl Voice {
         tally: &mut Tally,
     ) {
         match request.code {
-            0x000D => self.request_control(now, request, peer, stack, tally),
-            0x000E => self.release_control(now, peer.id, stack),
+            REQUEST_CONTROL => self.request_control(now, request, peer, stack, tally),
+            RELEASE_CONTROL => self.release_control(now, peer.id, stack),
             // Answers to what JAUS components never ask of RA components.
-            0x000F | 0x0010 => {
+            CONFIRM_CONTROL | REJECT_CONTROL => {
                 tally.refuse(now, Counter::Unasked, request.code, request.source);
             }
             _ => self.pass_on(now, request, peer, stack, tally),
@@ -306,7 +302,7 @@ impl Voice {
             SubscriptionNews::Ended(why) => {
                 let confirmed = told.confirmed;
                 self.told.remove(&id);
-                tally.refuse(now, Counter::Unanswered, CREATE_CONNECTION, why);
+                tally.refuse(now, Counter::Unanswered, CreateServiceConnection::CODE, why);
                 match confirmed {
                     true => connections.end(connection),
                     false => connections.refuse(connection, ResponseCode::COMPONENT_NOT_CAPABLE),

@@ -9,8 +9,8 @@ use std::task::Poll;
 use jaus::link::udp::{Settings, UdpLink};
 use jaus::link::{Group, Slab};
 use jaus::node::Config;
+use jaus::wire::judp;
 use jaus::wire::ra::RaId;
-use jaus::wire::{Version, judp};
 
 use super::finding::Finding;
 use super::peer::RA_GROUP;
@@ -62,9 +62,9 @@ impl RaSystems {
                 continue;
             };
             for frame in frames.map_while(Result::ok) {
-                let subsystem = RaId::from(frame.source).subsystem;
-                if frame.version != Version::As5669a && subsystem != 0 && self.heard.len() < MOST {
-                    self.heard.insert(subsystem, from);
+                let of_ra = RaId::in_header(frame.version, frame.source);
+                if let Some(id) = of_ra.filter(|_| self.heard.len() < MOST) {
+                    self.heard.insert(id.subsystem, from);
                 }
             }
         }

@@ -11,12 +11,13 @@ use clap::Args;
 use jaus::cli::failure::Failure;
 use jaus::cli::output::Output;
 use jaus::view;
+use jaus::wire::ra::RaId;
 use jaus::wire::{Frame, Version, judp};
 use jsidl::Library;
 use jsidl::explain::{Explanation, ServiceName, Unexplained, explain, table};
 
 use super::datagram::Datagram;
-use super::ra::{ReferenceArchitecture, may_be_of_ra};
+use super::ra::ReferenceArchitecture;
 use super::sources::{self, Sources};
 
 /// More octets are not read: a datagram has at most 65,507, a large message seldom more than this.
@@ -165,7 +166,7 @@ impl Explainer {
     /// if these do not know it, and no others are asked for.
     fn framed(&self, frame: &Frame) -> Result<Option<Explanation>, Unexplained> {
         let older = frame.version != Version::As5669a;
-        let as_ra = (older && self.by_ra || may_be_of_ra(frame))
+        let as_ra = (older && self.by_ra || RaId::in_header(frame.version, frame.source).is_some())
             .then(|| self.explain_as_ra(&frame.payload))
             .and_then(Result::ok);
         let is_sure = frame.version == Version::Ra || self.by_ra;

@@ -3,8 +3,6 @@
 
 use bytes::Bytes;
 use jaus::messages::{ra, ra_registry};
-use jaus::wire::ra::RaId;
-use jaus::wire::{Frame, Version};
 use jsidl::dynamic::Raw;
 use jsidl::explain::{Explanation, Kind, Row, ServiceName, Unexplained, explain};
 use jsidl::{Library, Loader};
@@ -36,12 +34,6 @@ impl ReferenceArchitecture {
         }
         Ok(explanation)
     }
-}
-
-/// Whether a frame's message may be one of the Reference Architecture. The older headers carry those
-/// of the services as well: an id of the Reference Architecture has no 0 in front.
-pub(super) fn may_be_of_ra(frame: &Frame) -> bool {
-    frame.version != Version::As5669a && RaId::from(frame.source).subsystem != 0
 }
 
 /// The octets as they would be without what is forgiven; unchanged if there is more wrong with them.

@@ -87,21 +87,19 @@ fn others(case: &Case) -> Vec<String> {
         .all()
         .iter()
         .filter(|heard| Some(heard.frame.source) != case.id);
-    let set: BTreeSet<(JausId, bool, SocketAddr)> = all
-        .map(|heard| (heard.frame.source, is_of_ra(heard), heard.from))
+    let set: BTreeSet<(JausId, Option<RaId>, SocketAddr)> = all
+        .map(|heard| {
+            let of_ra = RaId::in_header(heard.frame.version, heard.frame.source);
+            (heard.frame.source, of_ra, heard.from)
+        })
         .collect();
     let named = set.iter().take(SOME);
     named
         .map(|(id, of_ra, from)| match of_ra {
-            true => format!("{} at {from} (Reference Architecture)", RaId::from(*id)),
-            false => format!("{id} at {from}"),
+            Some(id) => format!("{id} at {from} (Reference Architecture)"),
+            None => format!("{id} at {from}"),
         })
         .collect()
-}
-
-/// Whether an id has the four numbers of the Reference Architecture.
-fn is_of_ra(heard: &Heard) -> bool {
-    heard.frame.version != Version::As5669a && RaId::from(heard.frame.source).subsystem != 0
 }
 
 /// Asks whether the port refuses, from a passing socket, so that no answer is expected there.
