@@ -153,6 +153,7 @@ impl<A: Actuator> Wheels<A> {
             };
         }
         self.motion.pose = self.reckoning.pose();
+        self.motion.sampled_at = Some(now);
     }
 }
 
@@ -189,6 +190,10 @@ impl<A: Actuator> Platform for Wheels<A> {
 
     fn set_limits(&mut self, limits: Limits) {
         self.limits = limits.and(&self.config.limits);
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.left.fault().or_else(|| self.right.fault())
     }
 }
 

@@ -1,6 +1,7 @@
 //! Where a vehicle is and how it moves, in the units and axes of AS6009.
 
 use std::f64::consts::{PI, TAU};
+use std::time::Instant;
 
 /// Where a vehicle is in the local frame, and how it is turned.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -53,7 +54,7 @@ pub struct Acceleration {
     pub yaw: f64,
 }
 
-/// All that a platform tells about its motion.
+/// Pose, velocity and acceleration of a platform at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Motion {
     /// Where it is.
@@ -62,6 +63,8 @@ pub struct Motion {
     pub velocity: Velocity,
     /// How that changes.
     pub acceleration: Acceleration,
+    /// When it was measured; `None` if that is not known.
+    pub sampled_at: Option<Instant>,
 }
 
 impl Pose {

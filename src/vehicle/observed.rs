@@ -28,7 +28,7 @@ impl Observed {
         observed
     }
 
-    /// From now on it moves like this.
+    /// Replaces the motion; its age is judged by [`Motion::sampled_at`].
     pub fn set(&self, motion: Motion) {
         self.lock().motion = motion;
     }

@@ -37,6 +37,14 @@ pub trait Platform: Send {
 
     /// From now on it keeps these limits, none of which is wider than its own.
     fn set_limits(&mut self, limits: Limits);
+
+    /// Why it cannot drive, as text for the operator; `None` while it can.
+    ///
+    /// A platform with a fault stops all of its drives by itself, and reports the fault until it is
+    /// gone.
+    fn fault(&self) -> Option<String> {
+        None
+    }
 }
 
 /// What a platform is to do.

@@ -170,6 +170,7 @@ impl Platform for SkidSteer {
     fn handle_time(&mut self, now: Instant) {
         let since = now.saturating_duration_since(self.time.unwrap_or(now));
         self.time = Some(self.time.map_or(now, |time| time.max(now)));
+        self.motion.sampled_at = self.time;
         let mut left = since.min(Self::LONGEST_GAP);
         while !left.is_zero() {
             let step = left.min(Self::STEP);
