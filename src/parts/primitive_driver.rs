@@ -11,6 +11,7 @@ use super::{Part, PartError, Seat};
 use crate::actuator::{Actuator, MotorConfig, Odometer, SimulatedMotor, Wheels, WheelsConfig};
 use crate::component::Component;
 use crate::messages::ground::QueryStage;
+use crate::service::MotionPolicy;
 use crate::service::ground::{StageBoard, StageReport, StageState, WheelOdometry};
 use crate::service::mobility::Vehicle;
 use crate::vehicle::{Frame, Pilot};
@@ -102,8 +103,9 @@ impl Part for PrimitiveDriver {
         let odometer = Odometer::new(random());
         let [left, right] = self.motors.start()?;
         let wheels = Wheels::new(left, right, self.wheels, odometer.clone());
-        let pilot = Pilot::new(wheels, Frame::default()).give_up_after(self.silence);
-        let vehicle = Vehicle::new(pilot);
+        let pilot = Pilot::new(wheels, Frame::default());
+        let policy = MotionPolicy::Expire(self.silence);
+        let vehicle = Vehicle::new(pilot).motion_policy(policy);
         let board = StageBoard::default();
         let component = seat
             .component("Primitive Driver")
@@ -117,7 +119,6 @@ impl Part for PrimitiveDriver {
             vehicle,
             odometer,
             board,
-            silence: self.silence,
         };
         driver.watch().await
     }
@@ -134,7 +135,6 @@ struct Running {
     vehicle: Vehicle,
     odometer: Odometer,
     board: StageBoard,
-    silence: Duration,
 }
 
 impl Running {
@@ -170,9 +170,8 @@ impl Running {
         if let Some(reason) = watchman.emergency() {
             return told(StageState::Blocked, reason.to_owned());
         }
-        if self.vehicle.was_left_alone() {
-            let seconds = self.silence.as_secs_f64();
-            let reason = format!("stopped: no effort was set for {seconds:.1} s");
+        if let Some(cause) = self.vehicle.last_stop() {
+            let reason = format!("stopped: {cause}");
             return told(StageState::Idle, reason);
         }
         match self.vehicle.is_under_way() {

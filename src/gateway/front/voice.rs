@@ -387,6 +387,7 @@ impl Voice {
                 stack.release_control(now, id);
                 self.reject_control(&request);
             }
+            ControlNews::Status(_) => {}
             ControlNews::Released => drop(self.grips.remove(&id)),
         }
     }
