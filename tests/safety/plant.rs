@@ -79,11 +79,16 @@ impl Plant {
         self.rover.motion().velocity.x.abs()
     }
 
-    /// Moves on to `now`.
+    /// Moves on to `now`. Only what lasts is motion: an order that is taken back in the same instant
+    /// is none.
     pub(crate) fn advance(&mut self, now: Instant) {
+        if now <= self.now {
+            return;
+        }
+        self.order.moves_until(now);
         if !self.actuator.moves && !self.wheels.moves {
             self.rover.handle_time(now);
-            self.now = self.now.max(now);
+            self.now = now;
         }
         while self.now < now {
             let mut next = now.min(self.now + Self::STEP);
@@ -97,7 +102,6 @@ impl Plant {
                 self.rover.drive(Drive::Stop);
             }
         }
-        self.order.note(self.now);
     }
 
     fn turn_wheels(&mut self, next: Instant) {
@@ -107,8 +111,8 @@ impl Plant {
         let velocity = self.rover.motion().velocity;
         self.odometer += velocity.x.abs() * seconds;
         self.wheels.moves = velocity.x.abs() > Self::REST || velocity.yaw.abs() > Self::REST;
-        self.wheels.note(next);
-        self.actuator.note(next);
+        self.wheels.moves_until(next);
+        self.actuator.moves_until(next);
     }
 
     /// The program orders something.
@@ -119,7 +123,6 @@ impl Plant {
         }
         self.ordered = command;
         self.order.moves = is_motion(&command);
-        self.order.note(self.now);
         self.obey();
     }
 
@@ -128,7 +131,6 @@ impl Plant {
         self.last_order = self.now;
         self.rover.drive(self.ordered);
         self.actuator.moves = self.order.moves;
-        self.actuator.note(self.now);
     }
 
     fn read_sensor(&mut self) {
@@ -145,7 +147,7 @@ impl Plant {
 }
 
 impl Movement {
-    fn note(&mut self, now: Instant) {
+    fn moves_until(&mut self, now: Instant) {
         if self.moves {
             self.last = Some(now);
         }
@@ -223,5 +225,68 @@ impl Wheels {
 
     pub(crate) fn set_limits(&self, limits: Limits) {
         self.0.lock().rover.set_limits(limits);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jaus::vehicle::Effort;
+
+    const FULL: Drive = Drive::Effort(Effort {
+        forward: 1.0,
+        turn: 0.0,
+        brake: 0.0,
+        turn_brake: 0.0,
+    });
+
+    /// A plant that was ordered to move and is left alone for a second.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "an arbitrary beginning of virtual time"
+    )]
+    fn left_alone() -> (Plant, Instant, Instant) {
+        let start = Instant::now();
+        let mut plant = Plant::new(start);
+        plant.drive(FULL);
+        let end = start + Duration::from_secs(1);
+        plant.advance(end);
+        (plant, start, end)
+    }
+
+    #[test]
+    fn the_actuator_stops_at_its_deadline_though_the_order_stands() {
+        let (plant, start, end) = left_alone();
+        assert_eq!(plant.actuator.last(), Some(start + Plant::DEADLINE));
+        assert_eq!(plant.order.last(), Some(end));
+        assert!(plant.odometer > 0.01 && plant.speed() < Plant::REST);
+    }
+
+    #[test]
+    fn an_order_that_is_repeated_keeps_it_moving_until_it_is_taken_back() {
+        let (mut plant, _, mut now) = left_alone();
+        for _ in 0..20 {
+            plant.obey();
+            now += Duration::from_millis(100);
+            plant.advance(now);
+        }
+        assert_eq!(plant.actuator.last(), Some(now));
+        plant.drive(Drive::Stop);
+        plant.advance(now + Duration::from_secs(3));
+        assert_eq!(
+            (plant.actuator.last(), plant.order.last()),
+            (Some(now), Some(now))
+        );
+        assert!(plant.speed() < Plant::REST);
+    }
+
+    #[test]
+    fn what_is_no_number_is_noted_and_not_obeyed() {
+        let (mut plant, ..) = left_alone();
+        plant.drive(Drive::Effort(Effort {
+            forward: f64::NAN,
+            ..Effort::default()
+        }));
+        assert!(plant.got_rubbish && !plant.actuator.moves);
     }
 }
