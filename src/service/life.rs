@@ -147,7 +147,7 @@ impl Life {
             match (self.peers.get_mut(&id), rank(id)) {
                 (Some(peer), Some(rank)) => {
                     let silence = now.saturating_duration_since(peer.alive);
-                    if silence >= Self::DEATH && (peer.answers || peer.acknowledges) {
+                    if silence >= Self::DEATH && peer.is_probed() {
                         self.peers.remove(&id);
                         self.dead.push_back(id);
                         continue;
@@ -188,6 +188,12 @@ impl Rank {
 }
 
 impl Peer {
+    /// Whether its silence says something: it can answer, and has been asked to. A component that was
+    /// itself held up has not asked.
+    const fn is_probed(&self) -> bool {
+        (self.answers || self.acknowledges) && self.probes >= 2
+    }
+
     /// The next probe, or the moment of death if that comes first.
     fn next_look(&self, now: Instant, rank: Rank) -> Instant {
         let probe = if self.probes == 0 {

@@ -7,8 +7,8 @@ use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
 use jaus::service::{
-    Condition, Discovery, Handlers, Kind, Liveness, Management, Profile, Scope, Service, Stack,
-    Standing, State, Time, Timing, mobility,
+    Condition, Discovery, Handlers, Kind, Liveness, Management, MotionPolicy, Profile, Scope,
+    Service, Stack, Standing, State, StopCause, Time, Timing, mobility,
 };
 use jaus::vehicle::{Drive, Effort, Frame, Limits, Motion, Pilot, Platform, Pose};
 
@@ -97,10 +97,11 @@ impl Program {
         self.stack.standing()
     }
 
-    /// Ends in an orderly way; says what is still to be sent.
-    pub(crate) fn stop(self, _now: Instant) -> Vec<Outgoing> {
-        drop(self);
-        Vec::new()
+    /// Ends in an orderly way; returns what is still to be sent.
+    pub(crate) fn stop(mut self, now: Instant) -> Vec<Outgoing> {
+        self.stack.stop(&StopCause::Ended);
+        self.stack.take_leave(now);
+        std::iter::from_fn(|| self.poll_transmit()).collect()
     }
 }
 
@@ -109,10 +110,16 @@ fn drivers(
     now: Instant,
     plant: &SharedPlant,
     clock: &WallClock,
-    _holds: bool,
+    holds: bool,
 ) -> Vec<Box<dyn Service>> {
     let pilot = Pilot::new(Wheels(plant.clone()), Frame::at(52.5, 13.4));
-    let vehicle = mobility::Vehicle::new(pilot).with_time(now, clock.since_1970());
+    let policy = match holds {
+        true => MotionPolicy::Hold,
+        false => MotionPolicy::default(),
+    };
+    let vehicle = mobility::Vehicle::new(pilot)
+        .motion_policy(policy)
+        .with_time(now, clock.since_1970());
     vec![
         Box::new(vehicle.velocity_state_sensor()),
         Box::new(vehicle.local_pose_sensor()),
@@ -163,5 +170,9 @@ impl Platform for Wheels {
 
     fn set_limits(&mut self, limits: Limits) {
         Self::set_limits(self, limits);
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.0.fault()
     }
 }

@@ -140,6 +140,11 @@ impl Cockpit {
         }
     }
 
+    /// Whether something keeps it from driving.
+    pub(super) const fn is_in_trouble(&self) -> bool {
+        self.trouble.is_some()
+    }
+
     /// When to look again whether the trouble is gone.
     pub(super) fn next_look(&self) -> Option<Instant> {
         self.looked

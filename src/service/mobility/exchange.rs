@@ -45,7 +45,8 @@ impl Exchange<'_, '_> {
             _ => false,
         };
         let message = self.read_if(may)?;
-        let acts = self.context.standing().acts_for(self.message.source);
+        let is_ready = self.context.standing().acts_for(self.message.source);
+        let acts = is_ready && !self.cockpit.is_in_trouble();
         Some(Command { message, acts })
     }
 

@@ -144,7 +144,8 @@ impl VelocityStateDriver {
         let limits = *pilot.limits();
         match which {
             Which::Current => {
-                let acts = exchange.context.standing().acts_for(source);
+                let acts = exchange.context.standing().acts_for(source)
+                    && !exchange.cockpit.is_in_trouble();
                 tracing::debug!(%source, x = velocity.x, yaw = velocity.yaw, acts, "velocity set");
                 self.current = velocity;
                 let goal = Goal::Velocity(velocity);
