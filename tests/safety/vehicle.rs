@@ -173,6 +173,6 @@ impl Platform for Wheels {
     }
 
     fn fault(&self) -> Option<String> {
-        self.0.fault()
+        self.0.fault().map(str::to_owned)
     }
 }
