@@ -52,7 +52,7 @@ impl Travel {
 
 /// A vehicle under way that is looked at only after so long was held up with all that steers it:
 /// what its client wanted before counts no more.
-const HUNG: Duration = Duration::from_secs(1);
+const HUNG: Duration = Duration::from_millis(500);
 /// Between two looks at a vehicle in trouble.
 const LOOK: Duration = Duration::from_millis(100);
 
