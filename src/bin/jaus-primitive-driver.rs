@@ -30,6 +30,11 @@ struct Flags {
     #[arg(long, value_name = "SECONDS", default_value = "0.5", value_parser = seconds)]
     silence: Duration,
 
+    /// The motors brake by themselves when the program has not repeated its command for so many
+    /// seconds, because it hangs
+    #[arg(long, value_name = "SECONDS", default_value = "0.2", value_parser = seconds)]
+    deadline: Duration,
+
     /// After how many seconds control ends unless its client asks for it again; 0 for never
     #[arg(long, value_name = "SECONDS", default_value = "3")]
     control_timeout: u8,
@@ -89,7 +94,7 @@ impl Ready for Flags {
 impl Flags {
     fn motors(&self) -> Motors {
         #[cfg(all(feature = "gpio", target_os = "linux"))]
-        if let Some(motors) = self.gpio.motors(self.speed) {
+        if let Some(motors) = self.gpio.motors(self.speed, self.deadline) {
             return Motors::Gpio(motors);
         }
         Motors::Simulated(MotorConfig {
@@ -97,6 +102,7 @@ impl Flags {
             response: self.simulation.response,
             noise: self.simulation.noise,
             seed: self.simulation.seed,
+            deadline: self.deadline,
             ..MotorConfig::default()
         })
     }
@@ -105,6 +111,7 @@ impl Flags {
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 mod gpio {
     use std::path::PathBuf;
+    use std::time::Duration;
 
     use clap::Args;
     use jaus::actuator::StepperConfig;
@@ -137,7 +144,7 @@ mod gpio {
     }
 
     impl Gpio {
-        pub(super) fn motors(&self, top: f64) -> Option<GpioMotors> {
+        pub(super) fn motors(&self, top: f64, deadline: Duration) -> Option<GpioMotors> {
             Some(GpioMotors {
                 chip: self.gpio.clone()?,
                 stepper: StepperConfig {
@@ -145,6 +152,7 @@ mod gpio {
                     top,
                     acceleration: self.ramp,
                     deceleration: 2.0 * self.ramp,
+                    deadline,
                 },
                 left: self.left?,
                 right: self.right?,
