@@ -2,11 +2,11 @@
 
 use std::future::Future;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::group::own_group;
 use futures_util::{SinkExt, StreamExt};
-use jaus::component::{AccessControl, Component, Kind, Management};
+use jaus::component::{AccessControl, Component, Kind, Management, TimeOfDay};
 use jaus::link::Group;
 use jaus::node::{Config, Node};
 use jaus::ocu::{Listen, Station};
@@ -51,7 +51,7 @@ impl Scene {
         let node = Node::start(Config::loopback(101, 1).group(group)).unwrap();
         let platform = SkidSteer::new(SkidSteerConfig::default());
         let vehicle = Vehicle::new(Pilot::new(platform, Frame::at(52.5, 13.4)))
-            .with_time(Instant::now(), Duration::ZERO);
+            .with_clock(TimeOfDay::new(|| Duration::ZERO));
         let rover = rover(&vehicle, &node, timeout);
         let station = Station {
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
