@@ -8,6 +8,7 @@
 #[cfg(feature = "web")]
 mod communicator;
 mod drivers;
+mod keeper;
 mod knowledge_store;
 mod path_driver;
 mod planner;
@@ -20,10 +21,11 @@ mod velocity_sensor;
 
 use std::convert::Infallible;
 use std::future::Future;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::component::{self, Builder, Component, Kind};
 use crate::node::{Node, Port};
+use crate::service::TimeOfDay;
 
 #[cfg(feature = "web")]
 pub use communicator::{Communicator, DEBUG_ADDRESS};
@@ -78,12 +80,14 @@ pub enum PartError {
     Broken(String),
 }
 
-/// The time since the beginning of 1970; 0 on a computer whose clock is before that.
+/// The host's clock, which stamps the samples of parts; 1970 on a computer whose clock is before that.
 #[expect(
     clippy::disallowed_methods,
     reason = "parts run in real time, and their reports carry the time of day"
 )]
-fn time_of_day() -> Duration {
-    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
-    since_1970.unwrap_or_default()
+fn host_clock() -> TimeOfDay {
+    TimeOfDay::new(|| {
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+        since_1970.unwrap_or_default()
+    })
 }

@@ -1,12 +1,16 @@
 //! The primitive driver: wrench efforts to two wheel drives, and how far the wheels have travelled.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here the motors are looked after in real time"
+)]
 
 use std::convert::Infallible;
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::drivers::{Watchman, guard};
+use super::drivers::{FaultMonitor, Watchman, guard};
 use super::{Part, PartError, Seat};
 use crate::actuator::{Actuator, MotorConfig, Odometer, SimulatedMotor, Wheels, WheelsConfig};
 use crate::component::Component;
@@ -15,7 +19,8 @@ use crate::service::ground::{StageBoard, StageReport, StageState, WheelOdometry}
 use crate::service::mobility::Vehicle;
 use crate::vehicle::{Frame, Pilot};
 
-/// Drives the wheels of a vehicle as it is told, and stops them when it is not told any more.
+/// Drives the wheels of a vehicle as it is told, and stops them when it is not told any more. While a
+/// motor has a fault both sides stand still and the component is in Failure.
 ///
 /// It offers Primitive Driver, Wheel Odometry and Stage, behind Management and Access Control.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,8 +104,24 @@ impl GpioMotors {
 
 impl Part for PrimitiveDriver {
     async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
-        let odometer = Odometer::new(random());
         let [left, right] = self.motors.start()?;
+        self.run_with(left, right, seat).await
+    }
+}
+
+impl PrimitiveDriver {
+    /// The same with drives of your own in place of [`motors`](Self::motors).
+    ///
+    /// # Errors
+    /// Why it cannot go on.
+    pub async fn run_with(
+        self,
+        left: impl Actuator + 'static,
+        right: impl Actuator + 'static,
+        seat: Seat,
+    ) -> Result<Infallible, PartError> {
+        let odometer = Odometer::new(random());
+        let [left, right]: [Box<dyn Actuator>; 2] = [Box::new(left), Box::new(right)];
         let wheels = Wheels::new(left, right, self.wheels, odometer.clone());
         let pilot = Pilot::new(wheels, Frame::default()).give_up_after(self.silence);
         let vehicle = Vehicle::new(pilot);
@@ -144,10 +165,12 @@ impl Running {
     async fn watch(self) -> Result<Infallible, PartError> {
         let mut standings = self.component.watch_standing();
         let mut watchman = Watchman::default();
+        let mut faults = FaultMonitor::default();
         let mut looks = interval(Self::LOOK);
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             watchman.note(*standings.borrow_and_update());
+            self.check_motors(&mut faults).await;
             if self.board.tell(self.stage(&watchman)) {
                 self.component.changed::<QueryStage>().await;
             }
@@ -155,6 +178,19 @@ impl Running {
                 changed = standings.changed() => changed.map_err(|_| PartError::NodeStopped)?,
                 _ = looks.tick() => {}
             }
+        }
+    }
+
+    /// A motor's fault is a failure as long as it lasts.
+    async fn check_motors(&self, faults: &mut FaultMonitor) {
+        // Also at rest, when nothing else reads the motors.
+        self.vehicle.handle_time(Instant::now());
+        let condition = match self.odometer.fault() {
+            Some(fault) => faults.lacks(Instant::now(), &fault, Duration::ZERO),
+            None => faults.is_over(),
+        };
+        if let Some(condition) = condition {
+            self.component.set_condition(condition).await;
         }
     }
 
