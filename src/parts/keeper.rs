@@ -70,7 +70,11 @@ mod tests {
         let mut done = Some(done);
         let writer = kept.write(PAUSE, |value: u32| {
             attempts += 1;
-            let written = if attempts < 3 { Err("disk full") } else { Ok(()) };
+            let written = if attempts < 3 {
+                Err("disk full")
+            } else {
+                Ok(())
+            };
             if written.is_ok() {
                 let _ = done.take().map(|done| done.send(value));
             }
