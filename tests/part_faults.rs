@@ -19,7 +19,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use group::own_group;
-use jaus::actuator::{MotorConfig, SimulatedMotor};
+use jaus::actuator::{Actuator, MotorConfig, SimulatedMotor, SimulatedStop};
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Kind, State};
 use jaus::link::Group;
@@ -31,7 +31,9 @@ use jaus::messages::mobility::{
     primitive_driver,
 };
 use jaus::node::{Config, Node};
-use jaus::parts::{Part, PoseSensor, PrimitiveDriver, Seat, VectorDriver, VelocitySensor};
+use jaus::parts::{
+    Hardware, Part, PoseSensor, PrimitiveDriver, Seat, VectorDriver, VelocitySensor,
+};
 use jaus::service::ground::{StageReport, StageState};
 use tokio::task::JoinHandle;
 
@@ -165,8 +167,14 @@ async fn a_motor_fault_stops_both_sides_and_is_a_failure_until_it_is_gone() {
     let scene = Scene::new();
     let [left, right] = [(); 2].map(|()| SimulatedMotor::new(MotorConfig::default()));
     let switch = right.fault_switch();
-    let driver = PrimitiveDriver::default();
-    let running = scene.start(PRIMITIVE, |seat| driver.run_with(left, right, seat));
+    let hardware = Hardware {
+        left: Box::new(left),
+        right: Box::new(right),
+        stop: None,
+    };
+    let running = scene.start(PRIMITIVE, |seat| {
+        PrimitiveDriver::default().run_on(hardware, seat)
+    });
     let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
     let moved = scene.until("motion", || async {
         control.send(&ahead()).unwrap();
@@ -247,6 +255,93 @@ async fn a_sensor_that_stays_away_is_a_failure_of_the_driver_until_it_is_back() 
     for part in [wheels, pose, velocity, driver] {
         part.stop().await;
     }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
+    let scene = Scene::new();
+    let [left, right] = [(); 2].map(|()| {
+        let motor = SimulatedMotor::new(MotorConfig::default());
+        Box::new(motor) as Box<dyn Actuator>
+    });
+    let button = SimulatedStop::default();
+    let stop = Some(Box::new(button.clone()) as _);
+    let hardware = Hardware { left, right, stop };
+    let running = scene.start(PRIMITIVE, |seat| {
+        PrimitiveDriver::default().run_on(hardware, seat)
+    });
+    let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    let moves = async |before: f64| {
+        scene
+            .until("motion", || async {
+                let _ = control.send(&ahead());
+                (scene.wheels().await.0 > before + 0.1).then_some(())
+            })
+            .await;
+    };
+    moves(0.0).await;
+    button.press();
+    scene
+        .until_state(PRIMITIVE, State::Emergency, &control, &ahead())
+        .await;
+    // Another one, whose setter does not come back.
+    scene.client.set_emergency(PRIMITIVE).await.unwrap();
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    let before = scene.wheels().await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert_eq!(scene.wheels().await, before, "it stands");
+    button.release();
+    scene
+        .until_state(PRIMITIVE, State::Standby, &control, &ahead())
+        .await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    let _ = control.send(&ahead());
+    assert_eq!(scene.wheels().await, before, "not before it is resumed");
+    control.resume().await.unwrap();
+    moves(before.0).await;
+    running.stop().await;
+}
+
+/// A drive that shows what it was commanded last.
+struct Shown(std::sync::Arc<std::sync::Mutex<jaus::actuator::Command>>);
+
+impl Actuator for Shown {
+    fn handle_time(&mut self, _: Instant) {}
+
+    fn command(&mut self, command: jaus::actuator::Command) {
+        *self.0.lock().unwrap() = command;
+    }
+
+    fn travel(&self) -> f64 {
+        0.0
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn motors_are_commanded_to_stop_when_the_part_is_stopped() {
+    let scene = Scene::new();
+    let last = std::sync::Arc::<std::sync::Mutex<jaus::actuator::Command>>::default();
+    let hardware = Hardware {
+        left: Box::new(Shown(last.clone())),
+        right: Box::new(SimulatedMotor::new(MotorConfig::default())),
+        stop: None,
+    };
+    let running = scene.start(PRIMITIVE, |seat| {
+        PrimitiveDriver::default().run_on(hardware, seat)
+    });
+    let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    scene
+        .until("a command", || async {
+            control.send(&ahead()).unwrap();
+            (last.lock().unwrap().drive > 0.0).then_some(())
+        })
+        .await;
+    running.stop().await;
+    scene
+        .until("the stop", || async {
+            (*last.lock().unwrap() == jaus::actuator::Command::STOP).then_some(())
+        })
+        .await;
 }
 
 /// Milliseconds since midnight.

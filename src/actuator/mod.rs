@@ -24,16 +24,18 @@ mod motor;
 #[cfg(feature = "parts")]
 mod pulses;
 mod stepper;
+mod stop;
 mod wheels;
 
 use std::time::Instant;
 
 #[cfg(all(feature = "gpio", target_os = "linux"))]
-pub use gpio::{GpioError, GpioLines};
+pub use gpio::{GpioError, GpioLines, GpioStop};
 pub use motor::{FaultSwitch, MotorConfig, SimulatedMotor};
 #[cfg(feature = "parts")]
 pub use pulses::{Lines, PulseMotor};
 pub use stepper::{Stepper, StepperConfig, StepperPoll};
+pub use stop::{Interlock, SimulatedStop, StopFile, StopInput};
 pub use wheels::{Odometer, Wheels, WheelsConfig};
 
 /// One drive: a wheel, or the wheels of one side, with the motor that turns them and counts how far.

@@ -28,7 +28,8 @@ pub trait Lines: Send {
     fn set_step(&mut self, high: bool) -> io::Result<()>;
 }
 
-/// A stepper motor on its lines.
+/// A stepper motor on its lines. Dropping it ramps it down to a stop, and waits for that: half a second
+/// at the most with the default settings.
 pub struct PulseMotor {
     shared: Arc<Shared>,
     steps_per_metre: f64,
@@ -133,7 +134,10 @@ impl Actuator for PulseMotor {
 
 impl Drop for PulseMotor {
     fn drop(&mut self) {
-        self.shared.lock().ends = true;
+        let mut state = self.shared.lock();
+        state.ends = true;
+        state.command = Command::STOP;
+        drop(state);
         self.shared.news.notify_one();
         if let Some(thread) = self.thread.take() {
             // A thread that has panicked sends no pulses either.
@@ -142,15 +146,16 @@ impl Drop for PulseMotor {
     }
 }
 
-/// Sends pulses until the motor is dropped. While a line cannot be set the motor stands still and
+/// Sends pulses until the motor is dropped, and then those of the ramp to a stop. While a line cannot be set the motor stands still and
 /// has a fault.
 fn run(shared: &Shared, mut stepper: Stepper, mut lines: impl Lines) {
     let mut direction = None;
     let mut state = shared.lock();
-    while !state.ends {
+    loop {
         let now = Instant::now();
         stepper.command(state.command_at(now));
         match stepper.poll(now) {
+            StepperPoll::Wait(None) if state.ends => return,
             StepperPoll::Wait(next) => {
                 let wake = state.wakes_at(next);
                 state = wait_for_news(shared, state, wake, now);

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use super::{Actuator, Command};
+use super::{Actuator, Command, Interlock};
 use crate::vehicle::{Acceleration, Drive, Effort, Limits, Motion, Platform, Pose, Velocity};
 use crate::vehicle::{DeadReckoning, WheelCount};
 
@@ -81,6 +81,7 @@ pub struct Wheels<A> {
     motion: Motion,
     /// When the counter began, and when it was read last.
     times: Option<(Instant, Instant)>,
+    interlock: Interlock,
 }
 
 impl<A: Actuator> Wheels<A> {
@@ -97,7 +98,20 @@ impl<A: Actuator> Wheels<A> {
             reckoning: DeadReckoning::at(Pose::default()),
             motion: Motion::default(),
             times: None,
+            interlock: Interlock::default(),
         }
+    }
+
+    /// Stands still while an interlock is open.
+    #[must_use]
+    pub fn with_interlock(mut self, interlock: Interlock) -> Self {
+        self.interlock = interlock;
+        self
+    }
+
+    /// Whether both sides have to stand still, whatever is commanded.
+    fn is_locked(&self) -> bool {
+        self.interlock.is_open() || self.fault().is_some()
     }
 
     /// Drives both sides at speeds in metres per second; what is too fast for one side slows both,
@@ -115,8 +129,8 @@ impl<A: Actuator> Wheels<A> {
 
     /// Commands both sides. With a fault on either, both stop: one side alone would turn the vehicle.
     fn command(&mut self, left: Command, right: Command) {
-        let faulty = self.fault().is_some();
-        let [left, right] = [left, right].map(|it| if faulty { Command::STOP } else { it });
+        let locked = self.is_locked();
+        let [left, right] = [left, right].map(|it| if locked { Command::STOP } else { it });
         self.left.command(left);
         self.right.command(right);
     }
@@ -172,7 +186,7 @@ impl<A: Actuator> Platform for Wheels<A> {
     fn handle_time(&mut self, now: Instant) {
         self.left.handle_time(now);
         self.right.handle_time(now);
-        if self.fault().is_some() {
+        if self.is_locked() {
             self.command(Command::STOP, Command::STOP);
         }
         self.read(now);

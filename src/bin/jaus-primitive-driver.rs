@@ -1,5 +1,6 @@
 //! `jaus-primitive-driver`: the wheels of a vehicle, simulated or on stepper motors.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -9,7 +10,7 @@ use jaus::address::JausId;
 use jaus::cli::failure::Failure;
 use jaus::cli::runtime::{between, seconds};
 use jaus::cli::{Ready, launch};
-use jaus::parts::{Motors, Part, PrimitiveDriver};
+use jaus::parts::{Motors, Part, PrimitiveDriver, Stop};
 use jaus::vehicle::Limits;
 
 #[derive(Args)]
@@ -38,6 +39,10 @@ struct Flags {
     /// After how many seconds control ends unless its client asks for it again; 0 for never
     #[arg(long, value_name = "SECONDS", default_value = "3")]
     control_timeout: u8,
+
+    /// Stop while this file exists: a simulated stop input
+    #[arg(long, value_name = "FILE")]
+    stop_file: Option<PathBuf>,
 
     #[command(flatten)]
     simulation: Simulation,
@@ -75,6 +80,7 @@ impl Ready for Flags {
     fn part(self) -> Result<impl Part, Failure> {
         Ok(PrimitiveDriver {
             motors: self.motors(),
+            stop: self.stop(),
             wheels: WheelsConfig {
                 track: self.track,
                 top: self.speed,
@@ -92,6 +98,14 @@ impl Ready for Flags {
 }
 
 impl Flags {
+    fn stop(&self) -> Option<Stop> {
+        #[cfg(all(feature = "gpio", target_os = "linux"))]
+        if let Some((chip, line)) = self.gpio.stop_line.clone() {
+            return Some(Stop::Gpio { chip, line });
+        }
+        self.stop_file.clone().map(Stop::File)
+    }
+
     fn motors(&self) -> Motors {
         #[cfg(all(feature = "gpio", target_os = "linux"))]
         if let Some(motors) = self.gpio.motors(self.speed, self.deadline) {
@@ -133,6 +147,12 @@ mod gpio {
         #[arg(long, value_name = "STEP,DIRECTION", value_parser = lines, requires = "gpio")]
         right: Option<(u32, u32)>,
 
+        /// A stop input: a normally closed contact between this line and ground, such as
+        /// /dev/gpiochip0:5. An open contact or a cut wire stops the motors; closed again, it ends all
+        /// emergencies
+        #[arg(long, value_name = "CHIP:LINE", value_parser = chip_and_line, conflicts_with = "stop_file")]
+        pub(super) stop_line: Option<(PathBuf, u32)>,
+
         /// Pulses for a metre of travel, from 1 to 1000000
         #[arg(long, value_name = "PULSES", default_value = "2546", value_parser = |text: &str| between(text, 1.0, 1e6))]
         steps_per_metre: f64,
@@ -158,6 +178,14 @@ mod gpio {
                 right: self.right?,
             })
         }
+    }
+
+    fn chip_and_line(text: &str) -> Result<(PathBuf, u32), String> {
+        let pair = text.rsplit_once(':').filter(|(chip, _)| !chip.is_empty());
+        pair.and_then(|(chip, line)| Some((PathBuf::from(chip), line.parse().ok()?)))
+            .ok_or_else(|| {
+                "write a chip and the number of a line such as /dev/gpiochip0:5".to_owned()
+            })
     }
 
     fn lines(text: &str) -> Result<(u32, u32), String> {

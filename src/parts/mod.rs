@@ -15,6 +15,7 @@ mod planner;
 mod pose_file;
 mod pose_sensor;
 mod primitive_driver;
+mod stop_line;
 pub mod tester;
 mod vector_driver;
 mod velocity_sensor;
@@ -35,7 +36,7 @@ pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 pub use primitive_driver::GpioMotors;
-pub use primitive_driver::{Motors, PrimitiveDriver};
+pub use primitive_driver::{Hardware, Motors, PrimitiveDriver, Stop};
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 
