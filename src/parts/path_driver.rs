@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
-use super::drivers::{Helm, HelmSettings, Language, Next, Order, Sense, guard};
+use super::drivers::{FaultMonitor, Helm, HelmSettings, Language, Next, Order, Sense, guard};
 use super::{Part, PartError, Seat};
 use crate::messages::mobility::{SetLocalVector, local_vector_driver, set_local_vector};
 use crate::service::ground::StageBoard;
@@ -73,6 +73,7 @@ impl Part for PathDriver {
             authority: self.authority,
             // A list is executed once, and on purpose.
             settling: Duration::ZERO,
+            sensors: FaultMonitor::default(),
         };
         tokio::select! {
             end = poses.steer(&helm) => end,

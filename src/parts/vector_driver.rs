@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
-use super::drivers::{Helm, HelmSettings, Language, Next, Order, Sense, guard};
+use super::drivers::{FaultMonitor, Helm, HelmSettings, Language, Next, Order, Sense, guard};
 use super::{Part, PartError, Seat};
 use crate::messages::mobility::{SetWrenchEffort, primitive_driver};
 use crate::service::ground::StageBoard;
@@ -72,6 +72,7 @@ impl Part for VectorDriver {
             language: Efforts(Throttle::new(self.limits)),
             authority: self.authority,
             settling: self.silence,
+            sensors: FaultMonitor::default(),
         };
         tokio::select! {
             end = poses.steer(&helm) => end,

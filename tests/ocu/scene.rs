@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use crate::group::own_group;
 use futures_util::{SinkExt, StreamExt};
-use jaus::component::{AccessControl, Builder, Component, Handlers, Kind, Management};
+use jaus::component::{AccessControl, Builder, Component, Handlers, Kind, Management, TimeOfDay};
 use jaus::link::Group;
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
@@ -65,7 +65,7 @@ impl Scene {
         let node = Node::start(Config::loopback(101, 1).group(group)).unwrap();
         let platform = SkidSteer::new(SkidSteerConfig::default());
         let vehicle = Vehicle::new(Pilot::new(platform, Frame::at(52.5, 13.4)))
-            .with_time(Instant::now(), Duration::ZERO);
+            .with_clock(TimeOfDay::new(|| Duration::ZERO));
         let rover = rover(&vehicle, &node, timeout, frozen.as_ref());
         let station = Station {
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),

@@ -5,7 +5,7 @@
     reason = "the simulation runs in real time and knows the time of day"
 )]
 
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use jaus::address::JausId;
@@ -16,6 +16,7 @@ use jaus::cli::runtime::{self, Clock, between};
 use jaus::cli::tree;
 use jaus::component::{
     AccessControl, Builder, Component, Condition, Kind, Management, Standing, State, Time,
+    TimeOfDay,
 };
 use jaus::node::Node;
 use jaus::service::mobility::Vehicle;
@@ -105,13 +106,14 @@ impl VehicleCommand {
         let navigation = self.navigation(id)?;
         runtime::run(async {
             let node = Node::start(config).map_err(Failure::of)?;
-            let vehicle = self.simulation.vehicle();
+            let time = TimeOfDay::new(time_of_day);
+            let vehicle = self.simulation.vehicle().with_clock(time.clone());
             let control = AccessControl::new()
                 .authority(self.authority)
                 .timeout(self.timeout);
             let manager = Component::builder(Kind::Vehicle, name.clone()).access_control(control);
             let driver = Component::builder(Kind::Vehicle, name).component_name("Navigation");
-            let driver = drivable(driver, &vehicle, control);
+            let driver = drivable(driver, &vehicle, control, time);
             let attach = |builder: Builder, id: JausId| {
                 builder.attach(&node, id.component()).map_err(Failure::of)
             };
@@ -208,15 +210,20 @@ impl Simulation {
             noise: self.noise,
             seed: self.seed,
         });
-        Vehicle::new(Pilot::new(platform, self.at)).with_time(Instant::now(), time_of_day())
+        Vehicle::new(Pilot::new(platform, self.at))
     }
 }
 
 /// A component with all that it takes to be driven.
-fn drivable(builder: Builder, vehicle: &Vehicle, control: AccessControl) -> Builder {
+fn drivable(
+    builder: Builder,
+    vehicle: &Vehicle,
+    control: AccessControl,
+    time: TimeOfDay,
+) -> Builder {
     builder
         .management(Management::new().access_control(control).initializes())
-        .offer(Time::new(time_of_day))
+        .offer(Time::new(time))
         .offer(vehicle.list_manager())
         .offer(vehicle.velocity_state_sensor())
         .offer(vehicle.local_pose_sensor())

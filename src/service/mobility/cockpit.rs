@@ -5,7 +5,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::clock::Clock;
+use super::clock::SampleClock;
 use super::place::Place;
 use crate::messages::core::set_element::ElementRec;
 use crate::messages::mobility::{
@@ -68,7 +68,7 @@ pub(super) struct Cockpit {
     /// The list that the list drivers work off.
     pub(super) elements: Elements,
     pub(super) travel: Travel,
-    pub(super) clock: Option<Clock>,
+    pub(super) clock: Option<SampleClock>,
     /// Magnetic north as seen from true north, in radians, once set.
     pub(super) magnetic_variation: f64,
 }
