@@ -69,6 +69,8 @@ pub use events::EventSettings;
 pub use guard::{MotionGuard, MotionPolicy, StopCause, Validity};
 pub use handlers::Handlers;
 pub use inquiries::{Inquiry, NoAnswer, Patience};
+#[cfg(feature = "ra-gateway")]
+pub(crate) use life::{Life, Rank};
 pub use list::{ElementList, Elements, ListManager};
 pub use liveness::Liveness;
 pub use outbox::Outbox;
