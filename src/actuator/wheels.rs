@@ -354,25 +354,4 @@ mod tests {
         run(&mut pilot, now, 2.0);
         assert!(pilot.motion().velocity.is_rest());
     }
-
-    #[test]
-    fn nobody_who_is_silent_for_too_long_keeps_it_moving() {
-        let (pilot, _) = rover();
-        let mut pilot = pilot.give_up_after(Duration::from_millis(500));
-        let start = Instant::now();
-        pilot.handle_time(start);
-        let mut now = start;
-        for _ in 0..10 {
-            pilot.pursue(effort(1.0, 0.0));
-            now = run(&mut pilot, now, 0.4);
-        }
-        assert!(pilot.motion().velocity.x > 1.9 && !pilot.was_left_alone());
-        now = run(&mut pilot, now, 0.2);
-        assert!(pilot.was_left_alone());
-        now = run(&mut pilot, now, 2.0);
-        assert!(pilot.is_at_rest());
-        pilot.pursue(effort(1.0, 0.0));
-        run(&mut pilot, now, 0.4);
-        assert!(!pilot.is_at_rest() && !pilot.was_left_alone());
-    }
 }

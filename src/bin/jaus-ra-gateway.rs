@@ -30,6 +30,11 @@ struct Flags {
     #[arg(long, value_name = "CODE", default_value = "255")]
     authority: u8,
 
+    /// Seconds without a Request Control after which a JAUS client's control of an RA component ends,
+    /// with a quarter's grace; 0 never ends it
+    #[arg(long, value_name = "SECONDS", default_value = "4")]
+    control_timeout: u8,
+
     /// Show only this JAUS subsystem to RA systems (repeatable) [default: all that have a number
     /// there]
     #[arg(long, value_name = "SUBSYSTEM", value_parser = clap::value_parser!(u16).range(1..=65534))]
@@ -204,6 +209,7 @@ impl Flags {
             ids: self.ids.settings(),
             patience: self.patience,
             authority: self.authority,
+            timeout: Duration::from_secs(self.control_timeout.into()),
             ..Settings::default()
         };
         if !self.show.is_empty() {

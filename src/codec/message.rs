@@ -17,8 +17,12 @@ pub trait Message: Sized + View + Clone + Debug + PartialEq + Send + Sync + 'sta
     const CODE: u16;
     /// The name in the definition, for example `ReportIdentification`.
     const NAME: &'static str;
-    /// Whether only the controlling client may send it.
+    /// Whether the definition calls it a command.
     const IS_COMMAND: bool;
+    /// Whether it is a command of a service that inherits Access Control: one that only the client
+    /// in control may give. Set Emergency and Clear Emergency are the exceptions, which Management
+    /// takes from anyone.
+    const NEEDS_CONTROL: bool;
 
     /// The octets that this message takes, its code included.
     fn encoded_len(&self) -> usize;

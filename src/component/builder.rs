@@ -12,7 +12,7 @@ use crate::address::JausId;
 use crate::node::{self, Node, Port};
 use crate::service::{
     AccessControl, Discovery, EventSettings, Kind, Liveness, Management, Patience, Profile, Scope,
-    Service, Stack, Timing, Transport,
+    Service, Stack, Timing, Transport, UnsafeService,
 };
 
 /// A component that is not attached yet. Transport, Discovery, Liveness and Events are always
@@ -44,6 +44,9 @@ pub enum AttachError {
     /// The node would not take it.
     #[error(transparent)]
     Node(#[from] node::AttachError),
+    /// A service moves something, or is set up, and what makes that safe is missing.
+    #[error(transparent)]
+    Unsafe(#[from] UnsafeService),
     /// Report Identification has one octet for the length of a name.
     #[error("the name \"{name}\" has {length} octets, and at most 255 can be told to others")]
     NameTooLong {
@@ -145,7 +148,8 @@ impl Builder {
     /// Brings the component to life on a node, under a number from 1 to 254.
     ///
     /// # Errors
-    /// If the number or a name is unusable, or the number is taken.
+    /// If the number or a name is unusable, the number is taken, or a service is
+    /// [not safe](UnsafeService) by itself.
     ///
     /// # Panics
     /// Outside of a tokio runtime, which a running node has.
@@ -158,7 +162,7 @@ impl Builder {
     /// this host, which another process runs ([`Host::attach`](node::Host::attach)).
     ///
     /// # Errors
-    /// If a name is unusable.
+    /// If a name is unusable, or a service is [not safe](UnsafeService) by itself.
     ///
     /// # Panics
     /// Outside of a tokio runtime, which a port has.
@@ -167,6 +171,7 @@ impl Builder {
         let id = port.id();
         let patience = self.patience;
         let stack = self.stack(id);
+        stack.check()?;
         let (commands, inbox) = mpsc::channel(Shared::COMMANDS);
         let (directory, directories) = watch::channel(Arc::new(stack.directory().clone()));
         let (standing, standings) = watch::channel(*stack.standing());

@@ -74,7 +74,8 @@ pub(super) enum NotControlled {
 /// How control is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Condition {
-    Held,
+    /// The peer has granted it and reported this status last.
+    Held(Option<u8>),
     Lost(ControlLost),
     /// The peer has been told, or will never answer.
     Released,
@@ -167,13 +168,18 @@ impl Clients {
                 let Some(reply) = self.asking.remove(&id) else {
                     return;
                 };
-                let (condition, told) = watch::channel(Condition::Held);
+                let (condition, told) = watch::channel(Condition::Held(None));
                 self.controls.insert(id, condition);
                 let _ = reply.send(Ok((self.ticket(Goodbye::Control(id)), told)));
             }
             ControlNews::Refused(why) => {
                 if let Some(reply) = self.asking.remove(&id) {
                     let _ = reply.send(Err(NotControlled::Refused(why)));
+                }
+            }
+            ControlNews::Status(status) => {
+                if let Some(condition) = self.controls.get(&id) {
+                    condition.send_replace(Condition::Held(Some(status)));
                 }
             }
             ControlNews::Lost(why) => {

@@ -1,5 +1,6 @@
 //! Control over a peer in the hands of an application.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
@@ -12,6 +13,7 @@ use crate::messages::core::{
     ClearEmergency, QueryStatus, ReportStatus, Reset, Resume, SetEmergency, Standby,
 };
 use crate::service::State;
+use crate::wire::Priority;
 
 /// How long a peer may take to reach a state …
 const STATE_LIMIT: Duration = Duration::from_secs(1);
@@ -22,7 +24,11 @@ const STATE_PAUSE: Duration = Duration::from_millis(100);
 /// dropping it gives control back.
 ///
 /// Control can be lost at any time: to a client with a greater authority, to an emergency, to a
-/// broken network. It is not asked for again by itself, because whoever took it had a reason.
+/// restart of the peer, to a broken network. It is not requested again automatically, because
+/// another client may have had a reason to take it.
+///
+/// While control is held the peer's status is asked for five times a second. After
+/// [`resume`](Self::resume) commands can be sent as long as the peer says that it is ready.
 #[derive(Debug)]
 pub struct Control {
     /// Dropped before the component is.
@@ -30,6 +36,8 @@ pub struct Control {
     component: Component,
     peer: JausId,
     condition: watch::Receiver<Condition>,
+    /// Whether the application has made the peer ready, and not put it into standby since.
+    expects_ready: AtomicBool,
 }
 
 impl Control {
@@ -44,6 +52,7 @@ impl Control {
             component,
             peer,
             condition,
+            expects_ready: AtomicBool::new(false),
         }
     }
 
@@ -56,14 +65,14 @@ impl Control {
     /// Whether control is held, as far as is known now.
     #[must_use]
     pub fn is_held(&self) -> bool {
-        self.check().is_ok()
+        self.check_held().is_ok()
     }
 
     /// Waits until control is lost, and says why. Waits for ever while it is held.
     pub async fn lost(&mut self) -> ControlError {
-        let over = self.condition.wait_for(|now| *now != Condition::Held).await;
-        drop(over);
-        match self.check() {
+        let is_over = |now: &Condition| !matches!(now, Condition::Held(_));
+        drop(self.condition.wait_for(is_over).await);
+        match self.check_held() {
             Err(error) => error,
             Ok(()) => ControlError::Stopped,
         }
@@ -72,7 +81,7 @@ impl Control {
     /// Sends a command and forgets it.
     ///
     /// # Errors
-    /// If control is lost, or the message could not be sent.
+    /// Those of [`check`](Self::check), or if the message could not be sent.
     pub fn send<M: Message>(&self, command: &M) -> Result<(), ControlError> {
         self.check()?;
         Ok(self.component.send(self.peer, command)?)
@@ -82,7 +91,7 @@ impl Control {
     /// has carried it out.
     ///
     /// # Errors
-    /// If control is lost, or the message is not known to have arrived.
+    /// Those of [`check`](Self::check), or if the message is not known to have arrived.
     pub async fn deliver<M: Message>(&self, command: &M) -> Result<(), ControlError> {
         self.check()?;
         Ok(self.component.deliver(self.peer, command).await?)
@@ -93,7 +102,9 @@ impl Control {
     /// # Errors
     /// If control is lost, or the peer does not say so.
     pub async fn resume(&self) -> Result<(), ManageError> {
-        self.manage(&Resume {}, State::Ready).await
+        self.manage(&Resume {}, State::Ready).await?;
+        self.expects_ready.store(true, Ordering::Relaxed);
+        Ok(())
     }
 
     /// Makes the peer stop and wait, and waits until it says that it does.
@@ -101,6 +112,7 @@ impl Control {
     /// # Errors
     /// If control is lost, or the peer does not say so.
     pub async fn standby(&self) -> Result<(), ManageError> {
+        self.expects_ready.store(false, Ordering::Relaxed);
         self.manage(&Standby {}, State::Standby).await
     }
 
@@ -127,22 +139,40 @@ impl Control {
     }
 
     async fn manage<M: Message>(&self, command: &M, wanted: State) -> Result<(), ManageError> {
-        self.check()?;
-        self.component.bring(self.peer, command, wanted).await
+        self.check_held()?;
+        self.component
+            .bring(Priority::High, self.peer, command, wanted)
+            .await
     }
 
-    /// The same as [`is_held`](Self::is_held), with the reason.
+    /// Whether commands can be sent.
     ///
     /// # Errors
-    /// If control is lost: why.
+    /// If control is lost: why. [`ControlError::NotReady`] if the peer was made ready and has said
+    /// since that it is in another state; [`resume`](Self::resume) may help.
     pub fn check(&self) -> Result<(), ControlError> {
+        self.check_held()?;
         match *self.condition.borrow() {
-            Condition::Held if self.condition.has_changed().is_ok() => Ok(()),
+            Condition::Held(Some(state))
+                if state != State::Ready as u8 && self.expects_ready.load(Ordering::Relaxed) =>
+            {
+                Err(ControlError::NotReady {
+                    peer: self.peer,
+                    state,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_held(&self) -> Result<(), ControlError> {
+        match *self.condition.borrow() {
+            Condition::Held(_) if self.condition.has_changed().is_ok() => Ok(()),
             Condition::Lost(why) => Err(ControlError::Lost {
                 peer: self.peer,
                 why,
             }),
-            Condition::Held | Condition::Released => Err(ControlError::Stopped),
+            Condition::Held(_) | Condition::Released => Err(ControlError::Stopped),
         }
     }
 }
@@ -158,7 +188,8 @@ impl Component {
         let set = SetEmergency {
             emergency_code: 1.into(),
         };
-        self.bring(peer, &set, State::Emergency).await
+        self.bring(Priority::SafetyCritical, peer, &set, State::Emergency)
+            .await
     }
 
     /// Takes an emergency back that this component has set, and waits until the peer says that it is
@@ -171,18 +202,21 @@ impl Component {
             emergency_code: 1.into(),
         };
         let over = |state: u8| state != State::Emergency as u8;
-        self.tell_until(peer, &clear, over).await.map(drop)
+        self.tell_until(Priority::SafetyCritical, peer, &clear, over)
+            .await
+            .map(drop)
     }
 
     /// Tells a peer to be in a state, until it says that it is.
     async fn bring<M: Message>(
         &self,
+        priority: Priority,
         peer: JausId,
         command: &M,
         wanted: State,
     ) -> Result<(), ManageError> {
         let reached = |state: u8| state == wanted as u8;
-        match self.tell_until(peer, command, reached).await? {
+        match self.tell_until(priority, peer, command, reached).await? {
             found if reached(found) => Ok(()),
             found => Err(ManageError::State {
                 peer,
@@ -197,13 +231,15 @@ impl Component {
     /// what the status is in the end.
     async fn tell_until<M: Message>(
         &self,
+        priority: Priority,
         peer: JausId,
         command: &M,
         wanted: impl Fn(u8) -> bool,
     ) -> Result<u8, ManageError> {
         let start = Instant::now();
         loop {
-            self.send(peer, command).map_err(ControlError::from)?;
+            self.send_with(priority, peer, command)
+                .map_err(ControlError::from)?;
             let report: ReportStatus = self.query(peer, &QueryStatus {}).await?;
             let found = report.status.0;
             if wanted(found) || start.elapsed() > STATE_LIMIT {

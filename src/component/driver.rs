@@ -1,20 +1,24 @@
 //! The task of a component: it gives the services messages and the time, and carries out what
-//! they want.
+//! they want. However it ends, the services stop what they move.
 
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot, watch};
+use tokio::task::JoinSet;
 
 use super::clients::{Clients, Goodbye, Hold};
 use super::watch::Outlet;
 use crate::address::JausId;
+use crate::codec::Message;
 use crate::endpoint::Received;
-use crate::node::{self, Port};
+use crate::messages::core::QueryHeartbeatPulse;
+use crate::node::{self, Port, Resident};
 use crate::service::{
     Change, Condition, Directory, Event, Inquiry, NoAnswer, Patience, Service, Stack, Standing,
+    StopCause, UnsafeService,
 };
 
 /// What the application wants of its component.
@@ -29,7 +33,7 @@ pub(super) enum Command {
     /// To have something that lasts.
     Hold(Hold),
     /// To offer one more service.
-    Offer(Box<dyn Service>),
+    Offer(Box<dyn Service>, oneshot::Sender<Result<(), UnsafeService>>),
     /// To offer one less.
     Withdraw(&'static str),
     /// To show how the component is.
@@ -66,6 +70,9 @@ impl Drop for Publisher {
 pub(super) struct Driver {
     stack: Stack,
     port: Port,
+    resident: Resident,
+    /// Probes that wait to be acknowledged, each with its receiver.
+    unacknowledged: JoinSet<Option<JausId>>,
     inbox: mpsc::Receiver<Command>,
     publisher: Publisher,
     patience: Patience,
@@ -85,7 +92,9 @@ impl Driver {
         let (bid, goodbyes) = mpsc::unbounded_channel();
         Self {
             stack,
+            resident: port.reside(),
             port,
+            unacknowledged: JoinSet::new(),
             inbox,
             publisher,
             patience,
@@ -95,7 +104,10 @@ impl Driver {
         }
     }
 
-    /// Runs until the node has stopped or nobody holds the component any more.
+    /// How long a component that ends tries to give back what it controls.
+    const LEAVE: Duration = Duration::from_millis(900);
+
+    /// Runs until the node stops or the last handle of the component is dropped.
     pub(super) async fn run(mut self) {
         self.stack.start(Instant::now());
         self.settle();
@@ -107,13 +119,57 @@ impl Driver {
                     None => return,
                 },
                 command = self.inbox.recv() => match command {
-                    Some(command) => self.obey(command),
-                    None => return self.take_leave(),
+                    Some(command) => {
+                        self.part();
+                        self.obey(command);
+                    }
+                    None => return self.leave().await,
                 },
+                () = self.resident.closing() => return self.leave().await,
                 Some(goodbye) = self.goodbyes.recv() => {
                     self.clients.part(&mut self.stack, goodbye);
                 }
+                Some(acknowledged) = self.unacknowledged.join_next() => {
+                    self.note_acknowledged(acknowledged.ok().flatten());
+                }
                 () = sleep_until(wake) => self.stack.handle_timeout(Instant::now()),
+            }
+            self.settle();
+        }
+    }
+
+    /// Ends what was dropped before a command was given, so that the command finds it ended.
+    fn part(&mut self) {
+        while let Ok(goodbye) = self.goodbyes.try_recv() {
+            self.clients.part(&mut self.stack, goodbye);
+        }
+    }
+
+    fn note_acknowledged(&mut self, peer: Option<JausId>) {
+        if let Some(peer) = peer {
+            self.stack.handle_acknowledged(Instant::now(), peer);
+        }
+    }
+
+    /// Stops what the services move, gives back what others keep for this component, and waits for a
+    /// moment until they have confirmed that.
+    async fn leave(mut self) {
+        let now = Instant::now();
+        self.stack.stop(&StopCause::Ended);
+        self.stack.take_leave(now);
+        self.settle();
+        let end = now + Self::LEAVE;
+        while self.stack.is_releasing() {
+            let wake = self.stack.poll_timeout().map_or(end, |wake| wake.min(end));
+            tokio::select! {
+                received = self.port.recv() => match received {
+                    Some(message) => self.stack.handle_message(Instant::now(), &message),
+                    None => return,
+                },
+                () = sleep_until(Some(wake)) => self.stack.handle_timeout(Instant::now()),
+            }
+            if Instant::now() >= end {
+                return;
             }
             self.settle();
         }
@@ -141,7 +197,10 @@ impl Driver {
                 }
             }
             Command::Hold(hold) => self.hold(hold),
-            Command::Offer(service) => self.stack.offer(Instant::now(), service),
+            Command::Offer(service, reply) => {
+                // The application may not wait for it.
+                let _ = reply.send(self.stack.offer(Instant::now(), service));
+            }
             Command::Withdraw(urn) => {
                 self.stack.withdraw(Instant::now(), urn);
             }
@@ -151,12 +210,6 @@ impl Driver {
             }
             Command::Announce(query) => self.stack.announce(Instant::now(), query),
         }
-    }
-
-    /// Gives back what others keep for this component.
-    fn take_leave(&mut self) {
-        self.stack.take_leave(Instant::now());
-        self.settle();
     }
 
     /// Carries out whatever the services want.
@@ -200,13 +253,16 @@ impl Driver {
             port,
             clients,
             patience,
+            unacknowledged,
             ..
         } = self;
-        clients.obey(stack, hold, *patience, |stack| transmit(stack, port));
+        clients.obey(stack, hold, *patience, |stack| {
+            transmit(stack, port, unacknowledged)
+        });
     }
 
     fn transmit(&mut self) -> Result<(), node::SendError> {
-        transmit(&mut self.stack, &self.port)
+        transmit(&mut self.stack, &self.port, &mut self.unacknowledged)
     }
 
     /// Gives up the questions whose askers have gone away.
@@ -222,10 +278,29 @@ impl Driver {
     }
 }
 
-/// Sends everything; tells the first error.
-fn transmit(stack: &mut Stack, port: &Port) -> Result<(), node::SendError> {
+/// The most probes whose acknowledgement is waited for at a time.
+const MOST_UNACKNOWLEDGED: usize = 64;
+
+/// Sends everything; returns the first error.
+fn transmit(
+    stack: &mut Stack,
+    port: &Port,
+    unacknowledged: &mut JoinSet<Option<JausId>>,
+) -> Result<(), node::SendError> {
     let mut result = Ok(());
     while let Some(message) = stack.poll_transmit() {
+        // An acknowledged probe is a sign of life.
+        let is_probe = message
+            .payload
+            .starts_with(&QueryHeartbeatPulse::CODE.to_le_bytes());
+        if message.acknowledge && is_probe && unacknowledged.len() < MOST_UNACKNOWLEDGED {
+            let (sender, peer) = (port.sender(), message.destination);
+            unacknowledged.spawn(async move {
+                let delivered = sender.deliver(message).await;
+                delivered.ok().map(|()| peer)
+            });
+            continue;
+        }
         let sent = port.send(message).map(|_| ());
         result = result.and(sent);
     }

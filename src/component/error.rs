@@ -160,6 +160,17 @@ pub enum ControlError {
         /// What has happened.
         why: ControlLost,
     },
+    /// Control is held, and the peer acts on no command: it was made ready, and is no longer.
+    #[error(
+        "{peer} is not ready any more: it reports the status {state}; `resume` makes it ready, \
+         unless it is in an emergency or has failed"
+    )]
+    NotReady {
+        /// Who is controlled.
+        peer: JausId,
+        /// The code of its state, as in Report Status.
+        state: u8,
+    },
     /// A message could not be sent.
     #[error(transparent)]
     NotSent(#[from] SendError),

@@ -15,9 +15,12 @@ use super::{
 };
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
-use crate::endpoint::Received;
+use crate::endpoint::{Outgoing, Received};
 use crate::node;
-use crate::service::{Change, Condition, Directory, Kind, Offer, Service, Standing, Topic, When};
+use crate::service::{
+    Change, Condition, Directory, Kind, Offer, Service, Standing, Topic, UnsafeService, When,
+};
+use crate::wire::Priority;
 
 /// A component that lives on a node. Cheap to clone; it stops when the last clone is dropped.
 #[derive(Debug, Clone)]
@@ -87,7 +90,7 @@ impl Component {
 
     /// Tells how this component is, which Management shows to everybody.
     pub async fn set_condition(&self, condition: Condition) {
-        // As in `offer`.
+        // An error means that the component has stopped.
         let _ = self
             .shared
             .commands
@@ -97,7 +100,7 @@ impl Component {
 
     /// Tells whoever subscribed to the query `Q` that its answer is another now.
     pub async fn changed<Q: Message>(&self) {
-        // As in `offer`.
+        // As in `set_condition`.
         let _ = self.shared.commands.send(Command::Announce(Q::CODE)).await;
     }
 
@@ -105,7 +108,7 @@ impl Component {
     /// done what it was to do: for services that [`tell_end_of`](crate::service::Handlers::tell_end_of)
     /// it.
     pub async fn ended<C: Message>(&self, successful: bool) {
-        // As in `offer`.
+        // As in `set_condition`.
         let _ = self
             .shared
             .commands
@@ -131,8 +134,25 @@ impl Component {
     /// If the wire cannot carry it or the node would not take it. That it was sent does not mean
     /// that it arrives.
     pub fn send<M: Message>(&self, destination: JausId, message: &M) -> Result<(), SendError> {
+        self.send_with(Priority::Standard, destination, message)
+    }
+
+    /// The same as [`send`](Self::send), with a priority: more urgent messages overtake others in
+    /// every queue on their way.
+    ///
+    /// # Errors
+    /// Those of [`send`](Self::send).
+    pub fn send_with<M: Message>(
+        &self,
+        priority: Priority,
+        destination: JausId,
+        message: &M,
+    ) -> Result<(), SendError> {
         let payload = message.encode()?;
-        let outgoing = crate::endpoint::Outgoing::new(self.id(), destination, payload);
+        let outgoing = Outgoing {
+            priority,
+            ..Outgoing::new(self.id(), destination, payload)
+        };
         self.shared.sender.send(outgoing)?;
         Ok(())
     }
@@ -148,7 +168,7 @@ impl Component {
         message: &M,
     ) -> Result<(), DeliverError> {
         let payload = message.encode()?;
-        let outgoing = crate::endpoint::Outgoing::new(self.id(), destination, payload);
+        let outgoing = Outgoing::new(self.id(), destination, payload);
         Ok(self.shared.sender.deliver(outgoing).await?)
     }
 
@@ -381,18 +401,20 @@ impl Component {
     }
 
     /// Offers one more service, and tells the peers. Without effect if the component has stopped.
-    pub async fn offer(&self, service: impl Service + 'static) {
-        // An error means that there is nobody left to offer anything to.
-        let _ = self
-            .shared
-            .commands
-            .send(Command::Offer(Box::new(service)))
-            .await;
+    ///
+    /// # Errors
+    /// If the service is [not safe](UnsafeService) by itself.
+    pub async fn offer(&self, service: impl Service + 'static) -> Result<(), UnsafeService> {
+        let (reply, answer) = oneshot::channel();
+        let command = Command::Offer(Box::new(service), reply);
+        // An error, here and below, means that the component has stopped.
+        let _ = self.shared.commands.send(command).await;
+        answer.await.unwrap_or(Ok(()))
     }
 
     /// Takes a service back, in all its versions, and tells the peers.
     pub async fn withdraw(&self, urn: &'static str) {
-        // As in `offer`.
+        // As in `set_condition`.
         let _ = self.shared.commands.send(Command::Withdraw(urn)).await;
     }
 }

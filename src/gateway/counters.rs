@@ -35,6 +35,8 @@ counters! {
     NotInControl = "refused: sender not in control",
     /// Refused: a command for an RA component in an emergency.
     InEmergency = "refused: in an emergency",
+    /// Refused: a driving command for an RA component that its client has sent to Standby.
+    InStandby = "refused: in standby",
     /// Refused: a query that is waiting for its answer already.
     Repeated = "refused: question repeated while it waits",
     /// Refused: more than may wait for an answer.

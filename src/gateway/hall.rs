@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use super::counters::{Counter, Tally};
-use super::front::{self, Front, Plan, Target};
+use super::front::{self, Front, Plan, QUERY_STATUS, STATUS, Target};
 use super::{Action, Gateway, roles};
 use crate::address::JausId;
 use crate::codec::Message as _;
@@ -15,10 +15,6 @@ use crate::ra::{Message, RaId, node};
 use crate::service::{Event, Kind, Profile, code_of};
 use crate::wire::Broadcast;
 
-/// Query Component Status.
-const QUERY_STATUS: u16 = 0x2002;
-/// Report Component Status.
-const STATUS: u16 = 0x4002;
 /// The most JAUS components that one RA message is given to.
 const MOST_RECIPIENTS: usize = 64;
 
@@ -88,9 +84,10 @@ impl Gateway {
             ids: self.known.clone(),
             patience: self.settings.patience,
             authority: self.settings.authority,
+            timeout: self.settings.timeout,
         });
         self.actions.push_back(Action::Attach(id));
-        front.stack.start(now);
+        front.start(now);
         self.former.remove(&id);
         self.fronts.insert(id, front);
         self.with_front(now, id, |_, _| {});
@@ -169,6 +166,9 @@ impl Gateway {
         let Some(mut front) = self.fronts.remove(&id) else {
             return;
         };
+        if let Some(heard) = self.ra.heard(front.ra().subsystem) {
+            front.hear_subsystem(heard);
+        }
         act(&mut front, &mut self.tally);
         while let Some(event) = front.stack.poll_event() {
             match event {
@@ -176,7 +176,7 @@ impl Gateway {
                 event => front.handle_event(now, event, &mut self.tally),
             }
         }
-        while let Some(message) = front.stack.poll_transmit() {
+        while let Some(message) = front.poll_transmit() {
             self.actions.push_back(Action::Send(message));
         }
         for message in front.take_said() {
@@ -237,11 +237,11 @@ impl Gateway {
     }
 
     fn handle_for_us(&mut self, now: Instant, message: &Message) {
-        if message.code == QUERY_STATUS {
-            return self.send_ra(now, &message.answer(STATUS, front::ready()));
-        }
         let front = self.ids.jaus_of(message.source);
         let front = front.filter(|id| self.fronts.contains_key(id));
+        if message.code == QUERY_STATUS && front.is_none() {
+            return self.send_ra(now, &message.answer(STATUS, front::status(false)));
+        }
         let Some(id) = front else {
             let source = message.source;
             return self
@@ -306,7 +306,7 @@ fn profile(subsystem: &node::Subsystem, ra: RaId, component: &node::Component) -
 /// What an RA subsystem is, told by what is in it: RA systems do not say.
 fn kind(subsystem: &node::Subsystem) -> Kind {
     let has = |wanted: fn(u8) -> bool| subsystem.components().any(|(id, _)| wanted(id.component));
-    let drives = |part| matches!(part, 33 | 34 | 43..=48);
+    let drives = |part| RaComponent(part).is_driver();
     let commands = |part| matches!(part, 32 | 40);
     if has(drives) {
         Kind::Vehicle

@@ -215,12 +215,24 @@ impl Gateway {
         self.settle(now);
     }
 
-    /// Ends all that runs with others, with one word each.
-    pub fn take_leave(&mut self, now: Instant) {
+    /// Stops and releases what is controlled on either side, and gives control to no client any more.
+    /// Releases that are not confirmed are repeated while the gateway still gets its time.
+    pub fn release_all(&mut self, now: Instant) {
         let all: Vec<JausId> = self.fronts.keys().copied().collect();
         for id in all {
             self.with_front(now, id, |front, tally| front.take_leave(now, tally));
         }
+    }
+
+    /// Whether everything is released that was controlled on either side.
+    #[must_use]
+    pub fn is_released(&self) -> bool {
+        self.fronts.values().all(Front::is_released)
+    }
+
+    /// Releases what is still controlled, and ends all else that runs with others.
+    pub fn take_leave(&mut self, now: Instant) {
+        self.release_all(now);
         for (_, shown) in std::mem::take(&mut self.shown) {
             self.ra.withdraw(now, shown);
         }

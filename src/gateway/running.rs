@@ -20,7 +20,7 @@ use crate::address::JausId;
 use crate::endpoint::Received;
 use crate::link::udp::{self, UdpLink};
 use crate::link::{Group, Interface, Interfaces, Ip, STANDARD_PORT, Slab};
-use crate::node::{Node, Port};
+use crate::node::{Node, Port, Resident};
 use crate::parts::{Part, PartError, Seat};
 use crate::ra::carrier::To;
 use crate::wire::Priority;
@@ -83,16 +83,24 @@ impl Part for RaGateway {
         let gateway = Gateway::new(seat.port.id(), settings).map_err(|error| broken(&error))?;
         let (id, ra) = (gateway.id(), gateway.ra_id());
         tracing::info!("{id} is {ra} among RA systems, UDP {}", link.local());
-        let mut running = Running {
+        let resident = seat.port.reside();
+        let mut running = Leaver(Some(Running {
             gateway,
             link,
             slab: Slab::new(),
+            _resident: seat.port.reside(),
             ports: BTreeMap::from([(id, seat.port)]),
             node,
             reports: self.reports,
             reporter: self.reporter,
+        }));
+        let Some(running) = &mut running.0 else {
+            return Err(PartError::NodeStopped);
         };
-        running.go().await
+        tokio::select! {
+            ended = running.go() => ended,
+            () = resident.closing() => Err(PartError::NodeStopped),
+        }
     }
 }
 
@@ -128,11 +136,26 @@ fn first_interface(node: &Node) -> Option<Interface> {
     interfaces.find(|it| it.address.is_ipv4())
 }
 
+/// A gateway that leaves in order when it is dropped.
+struct Leaver(Option<Running>);
+
+impl Drop for Leaver {
+    /// Also when the program ends: the node waits for its residents.
+    fn drop(&mut self) {
+        let runtime = tokio::runtime::Handle::try_current();
+        if let (Some(running), Ok(runtime)) = (self.0.take(), runtime) {
+            runtime.spawn(running.leave());
+        }
+    }
+}
+
 /// A gateway with what it needs to run.
 struct Running {
     gateway: Gateway,
     link: UdpLink,
     slab: Slab,
+    /// Makes a stopping node wait until everything is released.
+    _resident: Resident,
     /// The doors of the gateway's own component and of all counterparts.
     ports: BTreeMap<JausId, Port>,
     node: Node,
@@ -166,6 +189,38 @@ impl Running {
                 () = tick(&mut ticks) => (self.reporter)(&self.gateway.report()),
             }
         }
+    }
+
+    /// How long a gateway that ends tries to release what it controls.
+    const LEAVE: Duration = Duration::from_millis(900);
+
+    /// Stops and releases what is controlled on either side, until that is confirmed or for a moment.
+    async fn leave(mut self) {
+        if self.reports.is_some() {
+            (self.reporter)(&self.gateway.report());
+        }
+        let end = now() + Self::LEAVE;
+        self.gateway.release_all(now());
+        self.carry_out();
+        while !self.gateway.is_released() && now() < end {
+            let wake = self
+                .gateway
+                .poll_timeout()
+                .map_or(end, |wake| wake.min(end));
+            tokio::select! {
+                arrival = poll_fn(|cx| self.poll_arrival(cx)) => match arrival {
+                    Arrival::Datagram(from, datagram) => {
+                        self.gateway.handle_datagram(now(), from, datagram);
+                    }
+                    Arrival::Message(message) => self.gateway.handle_message(now(), &message),
+                    Arrival::NodeStopped => return,
+                },
+                () = sleep_until(Some(wake)) => self.gateway.handle_timeout(now()),
+            }
+            self.carry_out();
+        }
+        self.gateway.take_leave(now());
+        self.carry_out();
     }
 
     /// The next datagram or message; sends what waits for the network meanwhile.
@@ -215,18 +270,6 @@ impl Running {
         match self.node.attach_as(id) {
             Ok(port) => drop(self.ports.insert(id, port)),
             Err(error) => tracing::warn!(%error, "an RA component cannot be shown"),
-        }
-    }
-}
-
-impl Drop for Running {
-    /// Also when the program ends: control is given back, and RA systems are told that their guests
-    /// leave.
-    fn drop(&mut self) {
-        self.gateway.take_leave(now());
-        self.carry_out();
-        if self.reports.is_some() {
-            (self.reporter)(&self.gateway.report());
         }
     }
 }

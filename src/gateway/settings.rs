@@ -18,6 +18,9 @@ pub struct Settings {
     pub patience: Duration,
     /// The most authority that is claimed of RA components, whatever a JAUS client has.
     pub authority: u8,
+    /// Control of an RA component ends this long after the client's last Request Control, with a
+    /// quarter's grace: whole seconds to 255, zero for never.
+    pub timeout: Duration,
     /// The most RA components that JAUS sees.
     pub max_components: usize,
     /// How long changes of a JAUS subsystem are gathered before RA systems are told.
@@ -55,6 +58,7 @@ impl Default for Settings {
             show: Show::All,
             patience: Duration::from_secs(1),
             authority: u8::MAX,
+            timeout: Duration::from_secs(4),
             max_components: 253,
             gather: Duration::from_millis(300),
             ra: node::Settings::default(),

@@ -17,6 +17,7 @@ use super::awaiting::{Awaiting, Waiter};
 use super::error::SendError;
 use super::links::{self, Links};
 use super::mailbox::{Mailbox, MailboxLimits};
+use super::resident::Residents;
 use super::tap::Taps;
 use crate::address::JausId;
 use crate::endpoint::{
@@ -49,6 +50,7 @@ pub(super) struct Shared {
     pub(super) stopped: watch::Sender<bool>,
     /// Whether no component process can come in (any more).
     pub(super) closed: watch::Sender<bool>,
+    pub(super) residents: Residents,
 }
 
 impl Shared {
@@ -59,6 +61,7 @@ impl Shared {
             core: Mutex::new(core),
             stopped: watch::Sender::new(false),
             closed: watch::Sender::new(true),
+            residents: Residents::default(),
         }
     }
 

@@ -45,6 +45,7 @@ mod local;
 mod mailbox;
 mod port;
 mod replies;
+mod resident;
 mod tap;
 
 use std::net::SocketAddr;
@@ -61,6 +62,7 @@ pub use self::error::{HostError, SendError, StartError, Undelivered};
 pub use self::host::{Host, HostEvent, HostEvents};
 pub use self::mailbox::{MailboxCounters, MailboxLimits};
 pub use self::port::{Port, Sender};
+pub use self::resident::Resident;
 pub use self::tap::{Content, Passage, Tap, Tapped, Way};
 pub use crate::endpoint::AttachError;
 pub use crate::link::local::{Address, Local, Process};
@@ -257,9 +259,11 @@ impl Node {
         }
     }
 
-    /// Stops the node: sends what waits, takes leave on its connections (both for a quarter of a
+    /// Stops the node: lets the components of this process stop what they move and release what they
+    /// control (for a second at most), sends what waits, takes leave on its connections (both for a quarter of a
     /// second at most), closes the links, and lets every [`Port::recv`] end once its mailbox is read.
     pub async fn shutdown(self) {
+        self.shared().residents.close().await;
         let mut stopped = self.shared().stopped.subscribe();
         self.shared().lock().stop();
         // An error would mean that the node is gone, and that is what is waited for.

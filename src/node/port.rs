@@ -11,6 +11,7 @@ use super::awaiting::Waiter;
 use super::core::Shared;
 use super::host::{HostEvents, Line};
 use super::mailbox::{Mailbox, MailboxCounters};
+use super::resident::Resident;
 use super::{Guard, SendError, Undelivered};
 use crate::address::JausId;
 use crate::endpoint::{self, MessageHandle, Outgoing, Received};
@@ -91,6 +92,16 @@ impl Port {
     /// The same as [`recv`](Self::recv) for who writes futures by hand.
     pub fn poll_recv(&mut self, cx: &mut Context<'_>) -> Poll<Option<Received>> {
         self.mailbox.poll_pop(cx)
+    }
+
+    /// Makes a stopping node of the same process wait for a moment, so that the component can
+    /// release what it holds.
+    #[must_use]
+    pub fn reside(&self) -> Resident {
+        match &self.sender.way {
+            Way::Here(shared) => Resident::of(shared),
+            Way::Host(_) => Resident::elsewhere(),
+        }
     }
 
     /// What has become of the messages for this component.

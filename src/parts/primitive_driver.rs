@@ -19,6 +19,7 @@ use crate::actuator::{
 };
 use crate::component::{Component, Condition, State};
 use crate::messages::ground::QueryStage;
+use crate::service::MotionPolicy;
 use crate::service::ground::{StageBoard, StageReport, StageState, WheelOdometry};
 use crate::service::mobility::Vehicle;
 use crate::vehicle::{Frame, Pilot};
@@ -184,8 +185,9 @@ impl PrimitiveDriver {
         let odometer = Odometer::new(random());
         let wheels = Wheels::new(left, right, self.wheels, odometer.clone());
         let wheels = wheels.with_interlock(interlock.clone());
-        let pilot = Pilot::new(wheels, Frame::default()).give_up_after(self.silence);
-        let vehicle = Vehicle::new(pilot);
+        let pilot = Pilot::new(wheels, Frame::default());
+        let policy = MotionPolicy::Expire(self.silence);
+        let vehicle = Vehicle::new(pilot).motion_policy(policy);
         let board = StageBoard::default();
         let component = seat
             .component("Primitive Driver")
@@ -199,7 +201,6 @@ impl PrimitiveDriver {
             vehicle,
             odometer,
             board,
-            silence: self.silence,
             interlock,
             stop,
             stopped: false,
@@ -227,7 +228,6 @@ struct Running {
     vehicle: Vehicle,
     odometer: Odometer,
     board: StageBoard,
-    silence: Duration,
     interlock: Interlock,
     stop: Option<StopLine>,
     /// Whether the stop input has set an emergency that lasts.
@@ -314,9 +314,8 @@ impl Running {
         if let Some(reason) = watchman.emergency() {
             return told(StageState::Blocked, reason.to_owned());
         }
-        if self.vehicle.was_left_alone() {
-            let seconds = self.silence.as_secs_f64();
-            let reason = format!("stopped: no effort was set for {seconds:.1} s");
+        if let Some(cause) = self.vehicle.last_stop() {
+            let reason = format!("stopped: {cause}");
             return told(StageState::Idle, reason);
         }
         match self.vehicle.is_under_way() {

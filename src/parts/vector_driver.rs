@@ -19,7 +19,7 @@ use crate::vehicle::{Effort, Frame, Limits, Motion, Pilot, Throttle};
 pub struct VectorDriver {
     /// What the vehicle can do at most; speed and yaw rate are those of full effort.
     pub limits: Limits,
-    /// It stops when it has not been commanded for so long.
+    /// After it has stood down it obeys again when it has not been commanded for so long.
     pub silence: Duration,
     /// It stops when pose or velocity are older than this.
     pub stale: Duration,
@@ -53,7 +53,7 @@ impl Part for VectorDriver {
             stale: self.stale,
             by_heading: false,
         });
-        let pilot = Pilot::new(helm.clone(), Frame::default()).give_up_after(self.silence);
+        let pilot = Pilot::new(helm.clone(), Frame::default());
         let vehicle = Vehicle::new(pilot);
         let board = StageBoard::default();
         let component = seat

@@ -2,10 +2,12 @@
 //! and how it says that something has changed or is done.
 
 use std::collections::BTreeSet;
+use std::time::Instant;
 
 use bytes::Bytes;
 
-use super::{Outbox, Standing};
+use super::life::Life;
+use super::{Outbox, Standing, StopCause};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
@@ -17,6 +19,8 @@ pub(crate) struct News {
     pub(crate) changed: BTreeSet<u16>,
     /// The codes of commands that have come to an end, and whether to the wanted one.
     pub(crate) ended: Vec<(u16, bool)>,
+    /// A service has found out that something is broken, or that it is no more.
+    pub(crate) fault: Option<Result<(), StopCause>>,
 }
 
 /// One service's view of its component while it handles something.
@@ -24,6 +28,7 @@ pub(crate) struct News {
 pub struct Context<'a> {
     out: &'a mut Outbox,
     standing: &'a Standing,
+    life: &'a Life,
     news: &'a mut News,
 }
 
@@ -31,11 +36,13 @@ impl<'a> Context<'a> {
     pub(super) const fn new(
         out: &'a mut Outbox,
         standing: &'a Standing,
+        life: &'a Life,
         news: &'a mut News,
     ) -> Self {
         Self {
             out,
             standing,
+            life,
             news,
         }
     }
@@ -50,6 +57,24 @@ impl<'a> Context<'a> {
     #[must_use]
     pub const fn standing(&self) -> &Standing {
         self.standing
+    }
+
+    /// When a client showed its last sign of life, if it is in control, or if a service
+    /// [depends](super::Service::depends_on) on it.
+    #[must_use]
+    pub fn last_sign(&self, client: JausId) -> Option<Instant> {
+        self.life.last_sign(client)
+    }
+
+    /// Reports that something is broken: a component with Management goes to
+    /// [`State::Failure`](super::State::Failure), which ends control, until the service [recovers](Self::recover).
+    pub fn fail(&mut self, cause: StopCause) {
+        self.news.fault = Some(Err(cause));
+    }
+
+    /// Reports that what led to [`fail`](Self::fail) is no more: the component goes to standby.
+    pub fn recover(&mut self) {
+        self.news.fault = Some(Ok(()));
     }
 
     /// Sends a message to one component.

@@ -5,14 +5,26 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::time::Instant;
 
-use super::{Context, Handled, Service, Standing, code_of};
+use super::{
+    Context, Handled, Hazards, MotionGuard, MotionPolicy, Service, Standing, StopCause, Validity,
+    code_of,
+};
 use crate::address::JausId;
 use crate::codec::{DecodeError, Message, ServiceId};
 use crate::endpoint::Received;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
 /// Handles a message, or says why its octets are no message of its type.
-type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) -> Result<(), DecodeError> + Send>;
+type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) -> Result<Taken, DecodeError> + Send>;
+
+/// What became of a message.
+#[derive(Clone, Copy)]
+enum Taken {
+    /// It moves nothing, or its sender may not give it.
+    Message,
+    /// It is a command, carried out and valid for a while.
+    Command(Validity),
+}
 
 /// A service whose messages are answered by functions of the application.
 ///
@@ -22,6 +34,28 @@ type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) -> Result<(), DecodeEr
 ///
 /// let speedometer = Handlers::new(mobility::velocity_state_sensor::LATEST)
 ///     .answer(|_query: QueryVelocityState| ReportVelocityState::default());
+/// ```
+///
+/// # Commands
+///
+/// | method | for | obeys |
+/// |---|---|---|
+/// | [`command`](Self::command) | what makes something act | the client in control while the component is ready |
+/// | [`configure`](Self::configure) | what sets something up | the client in control |
+/// | [`receive`](Self::receive) | everything else | anyone |
+///
+/// A command that moves something needs a stop action, [`on_stop`](Self::on_stop). It is called when
+/// the command is not repeated within 500 ms (or as [`Validity`] and [`MotionPolicy`] say), when
+/// control or readiness is lost, in an emergency, and when the component ends. A component without
+/// Management, or handlers without a stop action, cannot be attached with a command.
+///
+/// A command of a service that inherits Access Control cannot be taken from anyone by mistake:
+///
+/// ```compile_fail
+/// use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
+/// use jaus::service::Handlers;
+///
+/// Handlers::new(primitive_driver::LATEST).receive(|effort: SetWrenchEffort, _, _| {});
 /// ```
 ///
 /// # Several versions
@@ -45,6 +79,8 @@ pub struct Handlers {
     by_code: BTreeMap<u16, Vec<(TypeId, Handler)>>,
     told: BTreeSet<u16>,
     stops: Vec<Stop>,
+    guard: MotionGuard,
+    hazards: Hazards,
 }
 
 impl Handlers {
@@ -56,6 +92,8 @@ impl Handlers {
             by_code: BTreeMap::new(),
             told: BTreeSet::new(),
             stops: Vec::new(),
+            guard: MotionGuard::default(),
+            hazards: Hazards::default(),
         }
     }
 
@@ -75,45 +113,88 @@ impl Handlers {
         self.handle::<Q>(move |received, context| {
             let query = Q::decode(&received.payload)?;
             context.reply(received, &function(query));
-            Ok(())
+            Ok(Taken::Message)
         });
         self
     }
 
-    /// Takes every message of type `M` with its sender's header, whoever sent it; the context is
-    /// for whatever is to be said to it.
+    /// Takes every message of type `M` from any sender; the context sends answers.
+    ///
+    /// Does not compile for a [command that needs control](Message::NEEDS_CONTROL).
     #[must_use]
     pub fn receive<M: Message>(
         self,
         function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
     ) -> Self {
-        self.receive_if(|_, _| true, function)
+        const {
+            assert!(
+                !M::NEEDS_CONTROL,
+                "this is a command of a service with Access Control: take it with `command` or \
+                 `configure`, or from anyone with `receive_unguarded`"
+            );
+        }
+        self.receive_unguarded(function)
     }
 
-    /// Takes messages of type `M` from the client in control, and ignores all others: what sets
-    /// something up.
+    /// The same for any message, also for a command that needs control: anyone may give it at any
+    /// time, and nothing stops it.
     #[must_use]
-    pub fn configure<M: Message>(
+    pub fn receive_unguarded<M: Message>(
         self,
         function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
     ) -> Self {
-        self.receive_if(Standing::obeys, function)
+        self.receive_if(|_, _| true, Taken::Message, function)
+    }
+
+    /// Takes messages of type `M` from the client in control, and ignores all others: what sets
+    /// something up. The component must offer Access Control or Management.
+    #[must_use]
+    pub fn configure<M: Message>(
+        mut self,
+        function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
+    ) -> Self {
+        self.hazards.set_up_by = Some(M::NAME);
+        self.receive_if(Standing::obeys, Taken::Message, function)
     }
 
     /// Takes messages of type `M` from the client in control while the component is ready, and
-    /// ignores all others: what makes something act.
+    /// ignores all others: what makes something act. The component must offer Management, and there
+    /// must be a stop action, [`on_stop`](Self::on_stop).
+    ///
+    /// The command is valid for as long as [`Validity::of`] its code says: 500 ms unless it is one of
+    /// the standard's vectors or goals.
     #[must_use]
     pub fn command<M: Message>(
         self,
         function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
     ) -> Self {
-        self.receive_if(Standing::acts_for, function)
+        self.command_valid(Validity::of(M::CODE), function)
     }
 
-    /// Calls a function whenever the component may no longer act, or another client takes control:
-    /// what moves something stops it there.
+    /// The same as [`command`](Self::command), with a validity of one's own choice.
+    #[must_use]
+    pub fn command_valid<M: Message>(
+        mut self,
+        validity: Validity,
+        function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
+    ) -> Self {
+        self.hazards.acts_on = Some(M::NAME);
+        self.receive_if(Standing::acts_for, Taken::Command(validity), function)
+    }
+
+    /// How long brief commands are valid; 500 ms without this.
+    #[must_use]
+    pub const fn motion_policy(mut self, policy: MotionPolicy) -> Self {
+        self.guard.set_policy(policy);
+        self
+    }
+
+    /// Calls a function whenever what the commands have set in motion must stop: at the end of a
+    /// command's validity, when control or readiness is lost, in an emergency, and when the component
+    /// ends. It may be called when nothing moves.
     #[must_use]
     pub fn on_stop(mut self, stop: impl FnMut(&mut Context<'_>) + Send + 'static) -> Self {
+        self.hazards.stops = true;
         self.stops.push(Box::new(stop));
         self
     }
@@ -130,23 +211,30 @@ impl Handlers {
     fn receive_if<M: Message>(
         mut self,
         may: fn(&Standing, JausId) -> bool,
+        taken: Taken,
         mut function: impl FnMut(M, &Received, &mut Context<'_>) + Send + 'static,
     ) -> Self {
         self.handle::<M>(move |received, context| {
             if may(context.standing(), received.source) {
                 function(M::decode(&received.payload)?, received, context);
-            } else {
-                tracing::debug!(source = %received.source, message = M::NAME, "not in control");
+                return Ok(taken);
             }
-            Ok(())
+            tracing::debug!(source = %received.source, message = M::NAME, "not in control");
+            Ok(Taken::Message)
         });
         self
+    }
+
+    fn stop(&mut self, context: &mut Context<'_>) {
+        for stop in &mut self.stops {
+            stop(context);
+        }
     }
 
     /// Sets the handler of a layout, behind those of other layouts with the same code.
     fn handle<M: Message>(
         &mut self,
-        handler: impl FnMut(&Received, &mut Context<'_>) -> Result<(), DecodeError> + Send + 'static,
+        handler: impl FnMut(&Received, &mut Context<'_>) -> Result<Taken, DecodeError> + Send + 'static,
     ) {
         let (layout, handler) = (TypeId::of::<M>(), Box::new(handler));
         let layouts = self.by_code.entry(M::CODE).or_default();
@@ -173,7 +261,7 @@ impl Service for Handlers {
 
     fn handle_message(
         &mut self,
-        _: Instant,
+        now: Instant,
         message: &Received,
         context: &mut Context<'_>,
     ) -> Handled {
@@ -183,7 +271,11 @@ impl Service for Handlers {
         };
         for (_, handler) in layouts {
             match handler(message, context) {
-                Ok(()) => break,
+                Ok(Taken::Message) => break,
+                Ok(Taken::Command(validity)) => {
+                    self.guard.accept(now, message.source, validity);
+                    break;
+                }
                 Err(error) => {
                     tracing::debug!(source = %message.source, %error, "message cannot be read");
                 }
@@ -192,16 +284,32 @@ impl Service for Handlers {
         Handled::Yes
     }
 
-    fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {
-        if context.standing().stops(before) {
-            for stop in &mut self.stops {
-                stop(context);
-            }
+    fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {
+        self.guard.note_life(|owner| context.last_sign(owner));
+        if self.guard.expire(now).is_some() {
+            self.stop(context);
         }
+    }
+
+    fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
+        self.guard.stop(cause.clone());
+        self.stop(context);
+    }
+
+    fn depends_on(&self) -> Option<JausId> {
+        self.guard.depends_on()
+    }
+
+    fn hazards(&self) -> Hazards {
+        self.hazards.clone()
     }
 
     fn tells_end_of(&self, command: u16) -> bool {
         self.told.contains(&command)
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.guard.expires_at()
     }
 }
 

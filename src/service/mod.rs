@@ -30,8 +30,10 @@ mod discovery;
 mod events;
 #[cfg(feature = "ground")]
 pub mod ground;
+mod guard;
 mod handlers;
 mod inquiries;
+mod life;
 mod list;
 mod liveness;
 #[cfg(test)]
@@ -41,6 +43,7 @@ pub mod mobility;
 mod outbox;
 #[cfg(test)]
 mod rig;
+mod safety;
 mod stack;
 #[cfg(test)]
 mod stack_rig;
@@ -50,6 +53,7 @@ mod transport;
 
 use std::time::Instant;
 
+use crate::address::JausId;
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 
@@ -62,11 +66,15 @@ pub use control::{AccessControl, Condition, Management};
 pub use directory::{Component, Directory, Identification, Kind, Level, Node, Offer, Subsystem};
 pub use discovery::{Change, Discovery, Loss, Profile, Scope, Timing};
 pub use events::EventSettings;
+pub use guard::{MotionGuard, MotionPolicy, StopCause, Validity};
 pub use handlers::Handlers;
 pub use inquiries::{Inquiry, NoAnswer, Patience};
+#[cfg(feature = "ra-gateway")]
+pub(crate) use life::{Life, Rank};
 pub use list::{ElementList, Elements, ListManager};
 pub use liveness::Liveness;
 pub use outbox::Outbox;
+pub use safety::{Hazards, UnsafeService};
 pub use stack::{Event, Stack};
 pub use standing::{Controller, Standing, State};
 pub use time::{Time, TimeOfDay};
@@ -91,11 +99,29 @@ pub trait Service: Send {
         let _ = (now, context);
     }
 
+    /// The one stop: whatever this service moves must stand still, and must not move again without
+    /// a new command. Called when control or readiness is lost, in an emergency, on a fault, and
+    /// when the component ends or panics; also when nothing moves.
+    fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
+        let _ = (cause, context);
+    }
+
     /// The component's [`Standing`] was `before` until now, and is the context's from now on:
-    /// control was taken or lost, or the state changed. A service that moves something stops here
-    /// unless the component still [may act](Standing::may_act).
+    /// control was taken or lost, or the state changed. What had to stop has
+    /// [stopped](Self::handle_stop).
     fn handle_standing(&mut self, now: Instant, before: &Standing, context: &mut Context<'_>) {
         let _ = (now, before, context);
+    }
+
+    /// The client on whose life a motion depends now: it is asked for signs of life four times a
+    /// second.
+    fn depends_on(&self) -> Option<JausId> {
+        None
+    }
+
+    /// Which commands this service takes, and how it stops: what it needs beside it to be safe.
+    fn hazards(&self) -> Hazards {
+        Hazards::default()
     }
 
     /// Whether this service tells the end of the commands with this code, with [`Context::ended`]:

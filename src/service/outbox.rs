@@ -34,22 +34,34 @@ impl Outbox {
 
     /// Sends a message to one component.
     pub fn send<M: Message>(&mut self, destination: JausId, message: &M) {
-        self.push(destination, Broadcast::None, Priority::Standard, message);
+        self.push(
+            destination,
+            Broadcast::None,
+            Priority::Standard,
+            false,
+            message,
+        );
+    }
+
+    /// Sends a message to one component with a priority, until its node acknowledges it.
+    pub fn send_acknowledged<M: Message>(
+        &mut self,
+        destination: JausId,
+        priority: Priority,
+        message: &M,
+    ) {
+        self.push(destination, Broadcast::None, priority, true, message);
     }
 
     /// Answers a message: to its sender alone, however many it went to, with its priority.
     pub fn reply<M: Message>(&mut self, to: &Received, message: &M) {
-        self.push(to.source, Broadcast::None, to.priority, message);
+        self.push(to.source, Broadcast::None, to.priority, false, message);
     }
 
     /// The same, until the receiver has acknowledged it: for answers of many datagrams, of which one
     /// that is lost would cost all.
     pub fn reply_until_acknowledged<M: Message>(&mut self, to: &Received, message: &M) {
-        let next = self.queue.len();
-        self.reply(to, message);
-        if let Some(reply) = self.queue.get_mut(next) {
-            reply.acknowledge = true;
-        }
+        self.push(to.source, Broadcast::None, to.priority, true, message);
     }
 
     /// Sends a message to every component of every subsystem.
@@ -58,6 +70,7 @@ impl Outbox {
             JausId::EVERYONE,
             Broadcast::Global,
             Priority::Standard,
+            false,
             message,
         );
     }
@@ -68,6 +81,7 @@ impl Outbox {
             self.source.whole_subsystem(),
             Broadcast::Local,
             Priority::Standard,
+            false,
             message,
         );
     }
@@ -94,6 +108,7 @@ impl Outbox {
         destination: JausId,
         broadcast: Broadcast,
         priority: Priority,
+        acknowledge: bool,
         message: &M,
     ) {
         match message.encode() {
@@ -102,7 +117,7 @@ impl Outbox {
                 destination,
                 priority,
                 broadcast,
-                acknowledge: false,
+                acknowledge,
                 payload,
             }),
             // A service built a message with more elements than its count can say.

@@ -3,7 +3,8 @@
 use std::time::{Duration, Instant};
 
 use super::context::News;
-use super::{Context, Controller, Handled, Outbox, Service, Standing, State};
+use super::life::{Life, Rank};
+use super::{Context, Controller, Handled, Outbox, Service, Standing, State, StopCause};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
@@ -19,6 +20,9 @@ pub(crate) struct Rig {
     pub(crate) services: Vec<Box<dyn Service>>,
     pub(crate) now: Instant,
     pub(crate) news: News,
+    /// Whether [`CLIENT`] shows life at each wake-up.
+    pub(crate) client_lives: bool,
+    life: Life,
     standing: Standing,
     out: Outbox,
 }
@@ -34,6 +38,8 @@ impl Rig {
             services,
             now: Instant::now(),
             news: News::default(),
+            client_lives: true,
+            life: Life::new(),
             standing: Standing::default(),
             out: Outbox::new(JausId::new(101, 1, 1)),
         };
@@ -54,7 +60,11 @@ impl Rig {
             },
         );
         for service in &mut self.services {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
+            let mut context =
+                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            if let Some(cause) = StopCause::of(&before, &self.standing) {
+                service.handle_stop(&cause, &mut context);
+            }
             service.handle_standing(self.now, &before, &mut context);
         }
     }
@@ -71,7 +81,8 @@ impl Rig {
             to: self.out.source(),
         };
         self.services.iter_mut().any(|service| {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
+            let mut context =
+                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
             service.handle_message(self.now, &received, &mut context) == Handled::Yes
         })
     }
@@ -111,8 +122,13 @@ impl Rig {
     }
 
     fn wake(&mut self) {
+        if self.client_lives {
+            self.life.watch(self.now, CLIENT, Rank::Controller);
+            self.life.hear(self.now, CLIENT, None);
+        }
         for service in &mut self.services {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
+            let mut context =
+                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
             service.handle_timeout(self.now, &mut context);
         }
     }

@@ -1,6 +1,7 @@
 //! All services of one component behind one door.
 
 use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use bytes::Bytes;
@@ -10,10 +11,12 @@ use super::context::News;
 use super::control::{AccessControl, Condition, Control, Management};
 use super::events::{CommandTrial, EventSettings, Events, Outcome, Refusal};
 use super::inquiries::Inquiries;
+use super::life::{Life, Rank};
+use super::safety;
 use super::{
     CannotSubscribe, Change, Context, ControlId, ControlNews, ControlRefused, Directory, Discovery,
-    Handled, Inquiry, NoAnswer, Outbox, Patience, Service, Standing, SubscriptionId,
-    SubscriptionNews, Topic, code_of,
+    Handled, Inquiry, NoAnswer, Outbox, Patience, Service, Standing, StopCause, SubscriptionId,
+    SubscriptionNews, Topic, UnsafeService, code_of,
 };
 use crate::address::JausId;
 use crate::codec::Message;
@@ -29,6 +32,12 @@ pub struct Stack {
     control: Control,
     /// What the services know of the control.
     standing: Standing,
+    /// Whether the clients that matter are alive.
+    life: Life,
+    /// The client in control whose death would go unnoticed, once that is logged.
+    mute: Option<JausId>,
+    /// Whether a service has put the component into failure.
+    is_faulty: bool,
     news: News,
     inquiries: Inquiries,
     subscriptions: Subscriptions,
@@ -65,6 +74,9 @@ impl Stack {
             subscribers: Events::new(EventSettings::default()),
             control: Control::default(),
             standing: Standing::default(),
+            life: Life::new(),
+            mute: None,
+            is_faulty: false,
             news: News::default(),
             inquiries: Inquiries::default(),
             subscriptions: Subscriptions::default(),
@@ -101,6 +113,19 @@ impl Stack {
         self.control = control;
         self.tell_offers();
         self
+    }
+
+    /// Checks that each service has beside it what makes it safe.
+    ///
+    /// # Errors
+    /// [`UnsafeService`] says what to add.
+    pub fn check(&self) -> Result<(), UnsafeService> {
+        let mut services = self.services.iter();
+        services.try_for_each(|service| self.check_service(service.as_ref()))
+    }
+
+    fn check_service(&self, service: &dyn Service) -> Result<(), UnsafeService> {
+        safety::check(service, self.control.has_management(), &self.standing)
     }
 
     /// The component's id.
@@ -167,6 +192,10 @@ impl Stack {
 
     /// A message for this component has arrived.
     pub fn handle_message(&mut self, now: Instant, message: &Received) {
+        // Control that has timed out is not renewed by a message that waited.
+        self.control.handle_timeout(now, &mut self.out);
+        self.life
+            .hear(now, message.source, code_of(&message.payload));
         self.discovery.hear(now, message.source);
         self.subscriptions.hear(now, message.source);
         let answered = self.inquiries.handle_message(now, message, &mut self.out);
@@ -178,7 +207,7 @@ impl Stack {
             handled = self.handle_event_request(now, message);
         }
         if handled == Handled::No {
-            handled = self.control.handle_message(now, message, &mut self.out);
+            handled = self.handle_control(now, message);
         }
         if handled == Handled::No {
             handled = self.handle_message_for_services(now, message);
@@ -196,6 +225,21 @@ impl Stack {
         }
     }
 
+    fn handle_control(&mut self, now: Instant, message: &Received) -> Handled {
+        let is_alive = |client| self.life.is_alive(now, client);
+        let control = &mut self.control;
+        let handled = control.handle_message(now, message, is_alive, &mut self.out);
+        if self.control.has_emergency_of(message.source) {
+            self.life.watch(now, message.source, Rank::EmergencySetter);
+        }
+        handled
+    }
+
+    /// The node of a peer has acknowledged a message that wanted it.
+    pub fn handle_acknowledged(&mut self, now: Instant, peer: JausId) {
+        self.life.acknowledged(now, peer);
+    }
+
     /// Hands a message to the services. A command takes the place of the one with the same code
     /// whose end somebody waits for.
     fn handle_message_for_services(&mut self, now: Instant, message: &Received) -> Handled {
@@ -208,9 +252,10 @@ impl Stack {
     }
 
     fn handle_by_services(&mut self, now: Instant, message: &Received) -> Handled {
-        let (out, standing, news) = (&mut self.out, &self.standing, &mut self.news);
+        let (out, standing, life, news) =
+            (&mut self.out, &self.standing, &self.life, &mut self.news);
         let handled = self.services.iter_mut().any(|service| {
-            let mut context = Context::new(out, standing, news);
+            let mut context = Context::new(out, standing, life, news);
             service.handle_message(now, message, &mut context) == Handled::Yes
         });
         if handled { Handled::Yes } else { Handled::No }
@@ -227,6 +272,9 @@ impl Stack {
                 let events = &mut self.subscribers;
                 events.conclude(now, &trial, report, &mut self.out);
             }
+        }
+        if self.subscribers.has(message.source) {
+            self.life.watch(now, message.source, Rank::Subscriber);
         }
         Handled::Yes
     }
@@ -264,9 +312,7 @@ impl Stack {
         let out = std::mem::replace(&mut self.out, Outbox::new(id));
         let news = std::mem::take(&mut self.news);
         let discovered = self.discovery.handle_quoted(now, &message, &mut self.out);
-        if discovered == Handled::No
-            && self.control.handle_message(now, &message, &mut self.out) == Handled::No
-        {
+        if discovered == Handled::No && self.handle_control(now, &message) == Handled::No {
             self.handle_by_services(now, &message);
         }
         self.news = news;
@@ -365,27 +411,55 @@ impl Stack {
         self.controls.release(now, control, &mut self.out);
     }
 
-    /// Ends all subscriptions and gives back all control, with one word each: the component stops
-    /// before there could be an answer.
+    /// Ends all subscriptions and gives back all control.
     pub fn take_leave(&mut self, now: Instant) {
         self.subscriptions.farewell(now, &mut self.out);
         self.controls.farewell(now, &mut self.out);
     }
 
+    /// Whether control is being given back, and a peer has not confirmed that.
+    #[must_use]
+    pub fn is_releasing(&self) -> bool {
+        self.controls.is_releasing()
+    }
+
     /// Adds a service while the component runs, and tells the peers.
-    pub fn offer(&mut self, now: Instant, service: Box<dyn Service>) {
+    ///
+    /// # Errors
+    /// As [`check`](Self::check).
+    pub fn offer(&mut self, now: Instant, service: Box<dyn Service>) -> Result<(), UnsafeService> {
+        self.check_service(service.as_ref())?;
         self.services.push(service);
         self.publish_offers(now);
         self.wake(now);
+        Ok(())
     }
 
-    /// Takes a service back, whatever its version, and tells the peers. Says whether it was there.
+    /// Takes a service back, whatever its version, stops what it moves, and tells the peers. Says
+    /// whether it was there.
     pub fn withdraw(&mut self, now: Instant, urn: &str) -> bool {
-        let before = self.services.len();
-        self.services
-            .retain(|service| service.offers().iter().all(|id| id.urn != urn));
+        let is_meant = |service: &mut Box<dyn Service>| {
+            let offers = service.offers();
+            offers.iter().any(|id| id.urn == urn)
+        };
+        let withdrawn: Vec<_> = self.services.extract_if(.., is_meant).collect();
+        let is_any = !withdrawn.is_empty();
+        for mut service in withdrawn {
+            let mut context =
+                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            service.handle_stop(&StopCause::Ended, &mut context);
+        }
         self.publish_offers(now);
-        self.services.len() < before
+        is_any
+    }
+
+    /// Stops whatever the services move.
+    pub fn stop(&mut self, cause: &StopCause) {
+        for service in &mut self.services {
+            let mut context =
+                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            service.handle_stop(cause, &mut context);
+        }
     }
 
     fn publish_offers(&mut self, now: Instant) {
@@ -420,6 +494,7 @@ impl Stack {
         services
             .chain(self.discovery.poll_timeout())
             .chain(self.control.poll_timeout())
+            .chain(self.life.poll_timeout())
             .chain(self.subscribers.poll_timeout())
             .chain(self.inquiries.poll_timeout())
             .chain(self.subscriptions.poll_timeout())
@@ -430,15 +505,87 @@ impl Stack {
     fn wake(&mut self, now: Instant) {
         self.discovery.handle_timeout(now, &mut self.out);
         self.control.handle_timeout(now, &mut self.out);
+        self.probe(now);
         self.subscribers.expire(now, &mut self.out);
         for service in &mut self.services {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
+            let mut context =
+                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
             service.handle_timeout(now, &mut context);
         }
         self.inquiries.handle_timeout(now, &mut self.out);
         self.subscriptions.handle_timeout(now, &mut self.out);
         self.controls.handle_timeout(now, &mut self.out);
         self.collect(now);
+    }
+
+    /// Looks after the clients that matter: probes the silent, and forgets the dead.
+    fn probe(&mut self, now: Instant) {
+        let services = self.services.iter();
+        let moving: Vec<_> = services.filter_map(|it| it.depends_on()).collect();
+        let (control, subscribers) = (&self.control, &self.subscribers);
+        let rank = |client| {
+            let ranks = [
+                (moving.contains(&client), Rank::MovingController),
+                (control.is_controller(client), Rank::Controller),
+                (control.has_emergency_of(client), Rank::EmergencySetter),
+                (subscribers.has(client), Rank::Subscriber),
+            ];
+            ranks.into_iter().find_map(|(is, rank)| is.then_some(rank))
+        };
+        self.life.handle_timeout(now, rank, &mut self.out);
+        while let Some(client) = self.life.poll_dead() {
+            tracing::info!(id = %self.out.source(), %client, "a client is dead: it answers no more");
+            self.control.forget(client, &mut self.out);
+            self.subscribers.forget(client);
+        }
+        self.warn_of_mute(now);
+    }
+
+    /// A client in control that never answers and need not renew could be dead.
+    fn warn_of_mute(&mut self, now: Instant) {
+        let controller = self.standing.controller.map(|it| it.id);
+        let mute =
+            controller.filter(|&id| !self.control.has_timeout() && self.life.is_mute(now, id));
+        if let Some(client) = mute
+            && self.mute != mute
+        {
+            tracing::warn!(
+                id = %self.out.source(), %client,
+                "the client in control answers no Query Heartbeat Pulse, and control has no \
+                 timeout: only standby, release or an emergency will stop what it has set in motion"
+            );
+            self.mute = mute;
+        }
+    }
+
+    /// Watches the client in control, and those on whose life a motion depends.
+    fn watch_clients(&mut self, now: Instant) {
+        if let Some(controller) = self.standing.controller {
+            self.life.watch(now, controller.id, Rank::Controller);
+        }
+        for service in &self.services {
+            if let Some(client) = service.depends_on() {
+                self.life.watch(now, client, Rank::MovingController);
+            }
+        }
+    }
+
+    /// A service has found out that something is broken, or mended.
+    fn follow_faults(&mut self) {
+        let condition = match self.news.fault.take() {
+            Some(Err(cause)) => {
+                tracing::error!(id = %self.out.source(), %cause, "failure");
+                self.is_faulty = true;
+                Condition::Failed
+            }
+            Some(Ok(())) if self.is_faulty => {
+                tracing::info!(id = %self.out.source(), "the failure is over");
+                self.is_faulty = false;
+                Condition::Initialized
+            }
+            Some(Ok(())) | None => return,
+        };
+        self.control.handle_condition(condition, &mut self.out);
     }
 
     fn collect(&mut self, now: Instant) {
@@ -451,7 +598,9 @@ impl Stack {
             self.news.changed.extend(Discovery::QUERIES);
             self.events.push_back(Event::Change(change));
         }
+        self.follow_faults();
         self.follow_control(now);
+        self.watch_clients(now);
         self.tell_subscribers(now);
         while let Some((inquiry, failure)) = self.inquiries.poll_failure() {
             self.events.push_back(Event::Answer(inquiry, Err(failure)));
@@ -480,8 +629,12 @@ impl Stack {
                 .changed
                 .extend([QueryControl::CODE, QueryAuthority::CODE]);
         }
+        if let Some(cause) = StopCause::of(&before, &after) {
+            self.stop(&cause);
+        }
         for service in &mut self.services {
-            let mut context = Context::new(&mut self.out, &self.standing, &mut self.news);
+            let mut context =
+                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
             service.handle_standing(now, &before, &mut context);
         }
         self.events.push_back(Event::Standing(after));
@@ -501,6 +654,22 @@ impl Stack {
             let report = self.answer(now, due.client(), &due.query);
             let events = &mut self.subscribers;
             events.report_due(now, &due, report, &mut self.out);
+        }
+    }
+}
+
+impl Drop for Stack {
+    /// Whatever ends a component, a panic of one of its functions included, ends what it moves.
+    fn drop(&mut self) {
+        for service in &mut self.services {
+            let mut context =
+                Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
+            // Another stop action must not be skipped because one panics, nor may a panic during
+            // a panic end the process before the last one.
+            let stop = || service.handle_stop(&StopCause::Ended, &mut context);
+            if catch_unwind(AssertUnwindSafe(stop)).is_err() {
+                tracing::error!("a stop action has panicked");
+            }
         }
     }
 }

@@ -1,13 +1,15 @@
-//! For tests: a whole component without a network, its clients, and the clock that it lives by.
+//! For tests: a whole component without a network, its clients, and the clock that it lives by. The
+//! clients answer Query Heartbeat Pulse by themselves, unless they are dead.
 
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use super::{Discovery, Kind, Profile, Scope, Service, Stack, Timing};
+use super::{Discovery, Kind, Profile, Scope, Service, Stack, Timing, code_of};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
+use crate::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse};
 use crate::wire::{Broadcast, Priority};
 
 /// The component.
@@ -19,6 +21,8 @@ pub(crate) type Told = (JausId, Bytes);
 pub(crate) struct StackRig {
     pub(crate) stack: Stack,
     pub(crate) now: Instant,
+    /// Clients that answer no more.
+    pub(crate) dead: Vec<JausId>,
 }
 
 impl StackRig {
@@ -36,6 +40,7 @@ impl StackRig {
         Self {
             stack: settings(Stack::new(discovery, services)),
             now: Instant::now(),
+            dead: Vec::new(),
         }
     }
 
@@ -54,11 +59,18 @@ impl StackRig {
         self.said()
     }
 
-    /// What has been said since this was asked last.
+    /// What has been said since this was asked last, but for the probes.
     pub(crate) fn said(&mut self) -> Vec<Told> {
-        std::iter::from_fn(|| self.stack.poll_transmit())
-            .map(|message| (message.destination, message.payload))
-            .collect()
+        let mut said = Vec::new();
+        while let Some(message) = self.stack.poll_transmit() {
+            let client = message.destination;
+            if code_of(&message.payload) != Some(QueryHeartbeatPulse::CODE) {
+                said.push((client, message.payload));
+            } else if !self.dead.contains(&client) {
+                said.extend(self.hear(client, &ReportHeartbeatPulse {}));
+            }
+        }
+        said
     }
 
     /// Lets time pass, and wakes the component once.

@@ -17,7 +17,8 @@ pub enum State {
     Standby = 2,
     /// Going away.
     Shutdown = 3,
-    /// Something is broken; only a reset or a shutdown helps.
+    /// Something is broken; it ends when that is mended, which the application says
+    /// ([`Condition::Initialized`](super::Condition::Initialized)).
     Failure = 4,
     /// Stopped by a client's emergency, until each client that set one has cleared it.
     Emergency = 5,

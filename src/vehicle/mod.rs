@@ -70,7 +70,7 @@ pub use deadline::CommandDeadline;
 pub use frame::{Frame, GlobalPose};
 pub use motion::{Acceleration, Motion, Pose, Velocity, wrap};
 pub use observed::Observed;
-pub use pilot::{Goal, Pilot, Ticket};
+pub use pilot::{Goal, Heading, Pilot, Ticket, Trouble};
 pub use platform::{Drive, Effort, Limits, Platform};
 #[cfg(feature = "ground")]
 pub(crate) use random::Random;

@@ -15,13 +15,12 @@ pub enum Goal {
     Effort(Effort),
     /// To move with a velocity along and about its own axes.
     Velocity(Velocity),
-    /// To keep a speed in metres per second and a heading in radians; without a heading, to go
-    /// straight on.
+    /// To keep a speed and a heading; without a heading, to go straight on.
     Vector {
         /// Metres per second.
         speed: f64,
-        /// Radians clockwise from the local X axis.
-        heading: Option<f64>,
+        /// Where to head for.
+        heading: Option<Heading>,
     },
     /// To drive to a place.
     Waypoint {
@@ -45,6 +44,26 @@ pub enum Goal {
     },
 }
 
+/// A heading in radians, clockwise seen from above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Heading {
+    /// From the local X axis.
+    Local(f64),
+    /// From true north, wherever the local frame lies at the time.
+    North(f64),
+}
+
+/// Why a [`Pilot`] cannot steer or drive.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Trouble {
+    /// The platform reports a fault.
+    Fault(String),
+    /// The pose is older than may be steered by.
+    PoseStale(Duration),
+    /// Part of the pose is not known (NaN).
+    PoseUnknown,
+}
+
 /// Names one goal of a [`Pilot`], so that whoever set it can tell it from later ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Ticket(u64);
@@ -63,9 +82,10 @@ pub struct Pilot {
     tickets: u64,
     steps: u64,
     time: Option<Instant>,
-    /// How long a goal is pursued that nobody sets again.
-    patience: Option<Duration>,
-    left_alone: bool,
+    /// The oldest pose that is steered by.
+    max_pose_age: Duration,
+    /// What has ended the last goal, until that is asked for.
+    trouble: Option<Trouble>,
 }
 
 /// What a course wants of the platform.
@@ -79,8 +99,6 @@ enum Wish {
 struct Course {
     goal: Goal,
     ticket: Ticket,
-    /// When it was set, once that is known.
-    since: Option<Instant>,
     has_arrived: bool,
     /// Whether it is at its waypoint, and only turns.
     is_turning: bool,
@@ -96,6 +114,8 @@ impl Pilot {
     /// The longest time that is made up for at once. What is longer was no driving, but a computer
     /// that slept.
     pub const LONGEST_GAP: Duration = Duration::from_secs(2);
+    /// The oldest pose that is steered by, unless another limit is chosen.
+    pub const MAX_POSE_AGE: Duration = Duration::from_millis(500);
 
     /// A pilot without a goal, on a platform whose local frame lies at a place of the globe.
     #[must_use]
@@ -110,16 +130,16 @@ impl Pilot {
             tickets: 0,
             steps: 0,
             time: None,
-            patience: None,
-            left_alone: false,
+            max_pose_age: Self::MAX_POSE_AGE,
+            trouble: None,
         }
     }
 
-    /// Gives a goal up, and stops, when it has not been set again for so long: whoever commands has
-    /// to go on saying so.
+    /// The oldest pose that is steered by; [`MAX_POSE_AGE`](Self::MAX_POSE_AGE) without this. It
+    /// counts for platforms that say [when they measured](Motion::sampled_at).
     #[must_use]
-    pub const fn give_up_after(mut self, patience: Duration) -> Self {
-        self.patience = Some(patience);
+    pub const fn max_pose_age(mut self, age: Duration) -> Self {
+        self.max_pose_age = age;
         self
     }
 
@@ -140,8 +160,7 @@ impl Pilot {
         while time + Self::STEP <= now {
             time += Self::STEP;
             self.steps += 1;
-            self.note_silence(time);
-            self.control();
+            self.control(time);
             self.platform.handle_time(time);
         }
         self.time = Some(time);
@@ -153,7 +172,6 @@ impl Pilot {
     /// Pursues another goal from now on, instead of any earlier one.
     pub fn pursue(&mut self, goal: Goal) -> Ticket {
         self.tickets += 1;
-        self.left_alone = false;
         let ticket = Ticket(self.tickets);
         let ahead = match &goal {
             Goal::Path { curve, .. } => self.ahead_on(curve),
@@ -162,7 +180,6 @@ impl Pilot {
         self.course = Some(Course {
             goal,
             ticket,
-            since: self.time,
             has_arrived: false,
             is_turning: false,
             ahead,
@@ -198,23 +215,29 @@ impl Pilot {
         course.is_some_and(|course| course.has_arrived)
     }
 
-    /// Whether the last goal was [given up](Self::give_up_after) because nobody set it again.
-    #[must_use]
-    pub const fn was_left_alone(&self) -> bool {
-        self.left_alone
+    /// What has ended a goal since this was asked last: a fault of the platform, or a pose that was
+    /// not known or too old for a goal that needs one.
+    pub const fn take_trouble(&mut self) -> Option<Trouble> {
+        self.trouble.take()
     }
 
-    /// Gives up a goal that has not been set again for too long.
-    fn note_silence(&mut self, time: Instant) {
-        let since = self.course.as_ref().and_then(|course| course.since);
-        let Some((since, patience)) = since.zip(self.patience) else {
-            return;
-        };
-        if time.saturating_duration_since(since) > patience {
-            tracing::info!(?patience, "stopped: nobody has said to go on");
-            self.left_alone = true;
-            self.course = None;
+    /// A fault of the platform.
+    #[must_use]
+    pub fn fault(&self) -> Option<Trouble> {
+        self.platform.fault().map(Trouble::Fault)
+    }
+
+    /// What keeps the pose from being steered by at `now`.
+    #[must_use]
+    pub fn pose_trouble(&self, now: Instant) -> Option<Trouble> {
+        let Motion {
+            pose, sampled_at, ..
+        } = self.motion();
+        if pose.x.is_nan() || pose.y.is_nan() || pose.yaw.is_nan() {
+            return Some(Trouble::PoseUnknown);
         }
+        let age = now.saturating_duration_since(sampled_at?);
+        (age > self.max_pose_age).then_some(Trouble::PoseStale(age))
     }
 
     /// Gives up whatever goal there is, and stops.
@@ -339,12 +362,22 @@ impl Pilot {
         stands && course.is_none_or(|course| course.has_arrived)
     }
 
-    /// One moment of control.
-    fn control(&mut self) {
+    /// One moment of control. In trouble it stops, and does not go on afterwards.
+    fn control(&mut self, time: Instant) {
+        let course = self.course.as_ref().filter(|course| !course.has_arrived);
+        if let Some(course) = course {
+            let is_steered = course.goal.needs_pose();
+            let trouble = is_steered.then(|| self.pose_trouble(time)).flatten();
+            if let Some(trouble) = self.fault().or(trouble) {
+                self.trouble = Some(trouble);
+                self.course = None;
+            }
+        }
         let pose = self.motion().pose;
         let limits = self.limits;
+        let north = -self.frame.heading;
         let wish = match &mut self.course {
-            Some(course) => course.command(&pose, &limits),
+            Some(course) => course.command(&pose, north, &limits),
             None => Wish::Drive(Drive::Stop),
         };
         match wish {
@@ -377,14 +410,28 @@ impl Drop for Pilot {
     }
 }
 
+impl Goal {
+    /// Whether it takes a pose to pursue it.
+    const fn needs_pose(&self) -> bool {
+        match self {
+            Self::Effort(_) | Self::Velocity(_) => false,
+            Self::Vector { .. } | Self::Waypoint { .. } | Self::Path { .. } => true,
+        }
+    }
+}
+
 impl Course {
     /// What to do now; notes the arrival.
-    fn command(&mut self, pose: &Pose, limits: &Limits) -> Wish {
+    fn command(&mut self, pose: &Pose, north: f64, limits: &Limits) -> Wish {
         match self.goal {
             Goal::Effort(effort) => Wish::Drive(Drive::Effort(effort)),
             Goal::Velocity(velocity) => Wish::Drive(Drive::Velocity(velocity)),
             Goal::Vector { speed, heading } => Wish::Head {
-                heading: heading.unwrap_or(self.straight),
+                heading: match heading {
+                    Some(Heading::Local(heading)) => heading,
+                    Some(Heading::North(heading)) => heading + north,
+                    None => self.straight,
+                },
                 speed,
             },
             Goal::Waypoint { to, speed, goes_on } => self.reach(pose, to, speed, goes_on, limits),

@@ -172,7 +172,7 @@ fn a_vector_is_kept() {
     let heading = Some(-FRAC_PI_2);
     track.pilot.pursue(Goal::Vector {
         speed: 1.5,
-        heading,
+        heading: heading.map(Heading::Local),
     });
     track.run(6.0);
     let motion = track.pilot.motion();

@@ -219,6 +219,8 @@ fn its_departure_is_told() {
 #[test]
 fn what_has_no_counterpart_is_refused_and_counted() {
     let (mut world, ra, _) = world();
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
+    world.run(Duration::from_secs(1));
     let before = world.count(Counter::NoCounterpart);
     world.ra_says(ra, &says(RA_DRIVER, 0x0406, "0000"));
     assert_eq!(world.count(Counter::NoCounterpart), before + 1);

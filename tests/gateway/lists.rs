@@ -8,8 +8,8 @@ use jaus::codec::{FormattedBlob, Message as _};
 use jaus::gateway::{Counter, Settings};
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec};
 use jaus::messages::core::{
-    QueryElementCount, QueryStatus, ReportElementCount, ReportStatus, SetElement, SetEmergency,
-    list_manager, set_emergency,
+    QueryElementCount, QueryStatus, ReportElementCount, ReportStatus, Resume, SetElement,
+    SetEmergency, list_manager, set_emergency,
 };
 use jaus::messages::mobility::{
     ExecuteList, QueryActiveElement, QueryTravelSpeed, ReportActiveElement, ReportTravelSpeed,
@@ -81,6 +81,11 @@ fn take_control(world: &mut World, operator: usize) {
         .request_control(now, JAUS_WAYPOINTS, 127, patience)
         .unwrap();
     world.run(Duration::from_secs(2));
+    world.tell(operator, JAUS_WAYPOINTS, &Resume {});
+    world.run(Duration::from_millis(500));
+    for peer in &mut world.ra {
+        peer.rover.iter_mut().for_each(|it| it.speeds.clear());
+    }
 }
 
 /// Three waypoints, one north of the other.
@@ -161,6 +166,7 @@ fn in_an_emergency_a_list_is_stopped_and_none_is_executed_until_that_is_over() {
     // The first finds out that the emergency is over.
     world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
     speeds(&mut world);
+    world.tell(operator, JAUS_WAYPOINTS, &Resume {});
     world.tell(operator, JAUS_WAYPOINTS, &execute(Some(0), 2.0));
     assert_ne!(speeds(&mut world).last(), Some(&bytes("0000")));
 }

@@ -18,6 +18,7 @@ mod ra_vehicle;
 #[cfg(feature = "view")]
 mod replay;
 mod rover;
+mod safety;
 #[cfg(feature = "view")]
 #[path = "../support/shared.rs"]
 mod shared;

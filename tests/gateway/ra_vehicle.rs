@@ -151,12 +151,18 @@ fn take_control(world: &mut World, who: usize, authority: u8) -> Vec<ControlNews
         .request_control(now, JAUS_DRIVER, authority, patience)
         .unwrap();
     world.run(seconds(3.0));
+    world.tell(who, JAUS_DRIVER, &Resume {});
+    world.run(seconds(0.5));
+    for peer in &mut world.ra {
+        peer.rover.iter_mut().for_each(|it| it.efforts.clear());
+    }
     control_news(world, who)
 }
 
 fn control_news(world: &mut World, who: usize) -> Vec<ControlNews> {
     let events = std::mem::take(&mut world.jaus[who].events);
     let news = |event| match event {
+        Event::Control(_, ControlNews::Status(_)) => None,
         Event::Control(_, news) => Some(news),
         _ => None,
     };
@@ -181,7 +187,8 @@ fn it_is_driven_by_who_controls_it_and_by_nobody_else() {
     ));
     world.tell(operator, JAUS_DRIVER, &effort());
     let efforts = |world: &World| world.ra[ra].rover.as_ref().unwrap().efforts.len();
-    assert_eq!(efforts(&world), 0);
+    let moving = |world: &World| world.ra[ra].rover.as_ref().unwrap().drives(world.now);
+    assert!(!moving(&world));
     assert_eq!(
         take_control(&mut world, operator, 127),
         [ControlNews::Granted]
@@ -317,6 +324,9 @@ fn in_an_emergency_it_is_stopped_by_what_it_obeys_and_not_driven_until_that_is_o
     // Somebody else has taken the emergency back, which the next command finds out.
     world.ra[ra].rover.as_mut().unwrap().state = 1;
     assert_eq!(drive(&mut world), 2);
+    assert_eq!(drive(&mut world), 2, "it is in standby");
+    assert_eq!(world.count(Counter::InStandby), 1);
+    world.tell(operator, JAUS_DRIVER, &Resume {});
     assert_eq!(drive(&mut world), 3);
 }
 

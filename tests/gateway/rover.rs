@@ -1,5 +1,7 @@
 //! An RA vehicle as OpenJAUS 3.3.1's simulator behaves: it reports by service connections, obeys the
-//! component in control, and wants to know that this one is ready.
+//! component in control, and anybody while there is none. It keeps the last effort, and drives with it
+//! as long as its controller reports ready or standby over a service connection. It keeps the last
+//! speed, and drives with it in any case. It does not tell who controls it.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -34,6 +36,15 @@ pub(crate) struct Rover {
     pub(crate) mute: bool,
     /// What its controller says of itself.
     pub(crate) controller_ready: bool,
+    /// Whether it reports who controls it, as RA systems other than OpenJAUS do.
+    pub(crate) reports_control: bool,
+    /// When its controller said last that it is ready or in standby.
+    controller_heard: Option<Instant>,
+    next_connection: Option<Instant>,
+    /// The component that is controlled.
+    driver: Option<RaId>,
+    /// Vectors.
+    pub(crate) vectors: Vec<Bytes>,
     pub(crate) state: u8,
     said: Vec<Message>,
 }
@@ -52,8 +63,30 @@ impl Rover {
         }
     }
 
+    /// For so long it drives on when its controller does not say that it is ready.
+    const CONTROLLER_TIMEOUT: Duration = Duration::from_millis(1500);
+
+    /// Whether it drives now.
+    pub(crate) fn drives(&self, now: Instant) -> bool {
+        let heard = self.controller_heard.filter(|_| self.controller.is_some());
+        let is_ready = heard.is_some_and(|at| now < at + Self::CONTROLLER_TIMEOUT);
+        let pushes = |effort: &Bytes| effort[0] & 1 != 0 && effort[2..4] != [0, 0];
+        let effort = is_ready && self.efforts.last().is_some_and(pushes);
+        let is_fast = |speed: &Bytes| speed[..2] != [0, 0];
+        // The least of the integer is no speed.
+        let is_vector = |vector: &Bytes| vector[..4] != [1, 0, 0, 0x80];
+        effort
+            || self.speeds.last().is_some_and(is_fast)
+            || self.vectors.last().is_some_and(is_vector)
+    }
+
     pub(crate) fn handle_message(&mut self, now: Instant, message: &Message) {
         let from = message.source;
+        let obeys = self.controller.is_none_or(|(id, _)| id == from);
+        let is_command = matches!(message.code, 0x0002..=0x0007 | 0x000E | 0x0400..=0x04FF);
+        if is_command && !obeys {
+            return;
+        }
         match message.code {
             0x0008 => self.connect(now, message),
             0x000C => {
@@ -62,25 +95,30 @@ impl Rover {
                 self.connections.remove(&report);
             }
             0x000D => self.request_control(message),
-            0x000E => self.controller = None,
+            0x000E if Some(message.destination) == self.driver => self.end_control(),
+            0x200D if self.reports_control => {
+                let id = self.controller.map_or(RaId::new(0, 0, 0, 0), |(id, _)| id);
+                let body = vec![id.subsystem, id.node, id.component, id.instance, 0];
+                self.said.push(message.answer(0x400D, body.into()));
+            }
             0x0009 => {}
             0x4002 => {
                 let is_controller = self.controller.is_some_and(|(id, _)| id == from);
                 self.controller_ready = is_controller && message.data[0] == 1;
+                if is_controller {
+                    let may_drive = matches!(message.data[0], 1 | 2);
+                    self.controller_heard = may_drive.then_some(now);
+                    self.next_connection = Some(now + Self::CONTROLLER_TIMEOUT);
+                }
             }
             0x0003 => self.state = 2,
             0x0004 => self.state = 1,
             0x0006 => self.state = 5,
             0x0007 => self.state = 2,
-            0x0405 if self.controller.is_some_and(|(id, _)| id == from) => {
-                self.efforts.push(message.data.clone());
-            }
-            0x040C if self.controller.is_some_and(|(id, _)| id == from) => {
-                self.waypoints.push(message.data.clone());
-            }
-            0x040A if self.controller.is_some_and(|(id, _)| id == from) => {
-                self.speeds.push(message.data.clone());
-            }
+            0x0405 => self.efforts.push(message.data.clone()),
+            0x040C => self.waypoints.push(message.data.clone()),
+            0x040A => self.speeds.push(message.data.clone()),
+            0x0408 => self.vectors.push(message.data.clone()),
             0x240C if !self.mute => {
                 let mut waypoints = self.waypoints.iter();
                 if let Some(held) = waypoints.find(|held| held[1..3] == message.data[..2]) {
@@ -144,14 +182,31 @@ impl Rover {
             self.said
                 .push(Message::new(DRIVER, before, 0x0010, Bytes::new()));
         }
-        self.controller = Some((from, authority));
+        let rank = self.controller.map_or(0, |(_, rank)| rank);
+        self.controller = Some((from, authority.max(rank)));
+        self.driver = Some(message.destination);
         self.said
             .push(message.answer(0x000F, Bytes::from_static(&[0])));
-        // It wants to know that its controller is ready, five times a second.
+        self.connect_to(message.destination, from);
+    }
+
+    /// It wants to know that its controller is ready, five times a second.
+    fn connect_to(&mut self, own: RaId, controller: RaId) {
         let body = bytes("02402c0100000000");
-        let mut connect = Message::new(message.destination, from, 0x0008, body);
+        let mut connect = Message::new(own, controller, 0x0008, body);
         connect.connection = true;
         self.said.push(connect);
+    }
+
+    fn end_control(&mut self) {
+        if let Some((id, _)) = self.controller.take() {
+            let body = Bytes::from_static(&[0x02, 0x40, 0]);
+            let own = self.driver.unwrap_or(DRIVER);
+            self.said.push(Message::new(own, id, 0x000C, body));
+        }
+        self.controller_heard = None;
+        self.controller_ready = false;
+        self.next_connection = None;
     }
 
     /// Somebody else takes control.
@@ -163,6 +218,12 @@ impl Rover {
     }
 
     pub(crate) fn handle_timeout(&mut self, now: Instant) {
+        if let Some((id, _)) = self.controller
+            && self.next_connection.is_some_and(|due| due <= now)
+        {
+            self.next_connection = Some(now + Self::CONTROLLER_TIMEOUT);
+            self.connect_to(self.driver.unwrap_or(DRIVER), id);
+        }
         let mut due = Vec::new();
         for (&report, stream) in self.streams.iter_mut().filter(|(_, it)| it.next <= now) {
             stream.next = now + stream.period;
@@ -176,7 +237,8 @@ impl Rover {
     }
 
     pub(crate) fn poll_timeout(&self) -> Option<Instant> {
-        self.streams.values().map(|stream| stream.next).min()
+        let streams = self.streams.values().map(|stream| stream.next);
+        streams.chain(self.next_connection).min()
     }
 
     pub(crate) fn take_said(&mut self) -> Vec<Message> {

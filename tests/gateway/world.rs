@@ -1,5 +1,6 @@
 //! Two networks in virtual time with a gateway between them. Datagrams and messages arrive at once;
-//! time goes from one wake-up to the next.
+//! time goes from one wake-up to the next. The gateway can be killed, suspended and started again, and
+//! cut off on either side.
 
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
@@ -32,6 +33,25 @@ pub(crate) struct World {
     pub(crate) jaus: Vec<JausPeer>,
     /// RA datagrams that the gateway has sent.
     pub(crate) sent: Vec<Bytes>,
+    pub(crate) power: Power,
+    /// Whether no datagram passes between the gateway and RA systems.
+    pub(crate) ra_cut: bool,
+    /// Whether no message passes between the gateway and JAUS components.
+    pub(crate) jaus_cut: bool,
+}
+
+/// Whether the gateway runs.
+pub(crate) enum Power {
+    On,
+    Killed,
+    /// What comes meanwhile.
+    Suspended(Vec<Arrival>),
+}
+
+/// What comes to the gateway.
+pub(crate) enum Arrival {
+    Datagram(SocketAddr, Bytes),
+    Message(Received),
 }
 
 /// An RA system: its node, what its components have received, and perhaps a vehicle.
@@ -80,6 +100,48 @@ impl World {
             ra: Vec::new(),
             jaus: Vec::new(),
             sent: Vec::new(),
+            power: Power::On,
+            ra_cut: false,
+            jaus_cut: false,
+        }
+    }
+
+    /// Starts a gateway with the same id in place of one that was killed.
+    pub(crate) fn restart_gateway(&mut self) {
+        self.gateway = Gateway::new(GATEWAY, Settings::default()).unwrap();
+        self.attached.clear();
+        self.gateway.start(self.now);
+        self.power = Power::On;
+    }
+
+    /// Lets a suspended gateway go on, which finds all that has come meanwhile.
+    pub(crate) fn resume_gateway(&mut self) {
+        let before = std::mem::replace(&mut self.power, Power::On);
+        if let Power::Suspended(waiting) = before {
+            waiting.into_iter().for_each(|it| self.arrive(it));
+        }
+        self.settle();
+    }
+
+    fn is_on(&self) -> bool {
+        matches!(self.power, Power::On)
+    }
+
+    fn arrive(&mut self, arrival: Arrival) {
+        let cut = match arrival {
+            Arrival::Datagram(..) => self.ra_cut,
+            Arrival::Message(_) => self.jaus_cut,
+        };
+        match (&mut self.power, arrival) {
+            _ if cut => {}
+            (Power::On, Arrival::Datagram(from, datagram)) => {
+                self.gateway.handle_datagram(self.now, from, datagram);
+            }
+            (Power::On, Arrival::Message(message)) => {
+                self.gateway.handle_message(self.now, &message);
+            }
+            (Power::Suspended(waiting), arrival) => waiting.push(arrival),
+            (Power::Killed, _) => {}
         }
     }
 
@@ -133,15 +195,15 @@ impl World {
         });
         let jaus = self.jaus.iter().filter(|peer| peer.up);
         let jaus = jaus.map(|peer| peer.stack.poll_timeout());
-        ra.chain(jaus)
-            .chain([self.gateway.poll_timeout()])
-            .flatten()
-            .min()
+        let gateway = self.gateway.poll_timeout().filter(|_| self.is_on());
+        ra.chain(jaus).chain([gateway]).flatten().min()
     }
 
     fn wake(&mut self) {
         let now = self.now;
-        self.gateway.handle_timeout(now);
+        if self.is_on() {
+            self.gateway.handle_timeout(now);
+        }
         for peer in &mut self.ra {
             peer.node.handle_timeout(now);
             if let Some(rover) = &mut peer.rover {
@@ -160,16 +222,19 @@ impl World {
 
     fn carry_ra(&mut self) -> bool {
         let (now, mut moved) = (self.now, false);
-        while let Some(transmit) = self.gateway.poll_transmit() {
+        while self.is_on()
+            && let Some(transmit) = self.gateway.poll_transmit()
+        {
             moved = true;
             self.sent.push(transmit.datagram.clone());
-            for peer in &mut self.ra {
+            for peer in self.ra.iter_mut().filter(|_| !self.ra_cut) {
                 if transmit.to == To::Group || transmit.to == To::Address(peer.address) {
                     let datagram = transmit.datagram.clone();
                     peer.node.handle_datagram(now, address(1), datagram);
                 }
             }
         }
+        let mut arrivals = Vec::new();
         for peer in &mut self.ra {
             while let Some(event) = peer.node.poll_event() {
                 moved = true;
@@ -186,22 +251,25 @@ impl World {
             let said = peer.rover.as_mut().map(Rover::take_said);
             for message in said.unwrap_or_default() {
                 moved = true;
-                peer.node.send(now, &message).unwrap();
+                // A peer that is gone is none.
+                let _ = peer.node.send(now, &message);
             }
             while let Some(transmit) = peer.node.poll_transmit() {
                 moved = true;
                 if transmit.to == To::Group || transmit.to == To::Address(address(1)) {
-                    let datagram = transmit.datagram;
-                    self.gateway.handle_datagram(now, peer.address, datagram);
+                    arrivals.push(Arrival::Datagram(peer.address, transmit.datagram));
                 }
             }
         }
+        arrivals.into_iter().for_each(|it| self.arrive(it));
         moved
     }
 
     fn carry_jaus(&mut self) -> bool {
         let mut sent = Vec::new();
-        while let Some(action) = self.gateway.poll_action() {
+        while self.is_on()
+            && let Some(action) = self.gateway.poll_action()
+        {
             match action {
                 Action::Attach(id) => assert!(self.attached.insert(id), "{id} twice"),
                 Action::Detach(id) => assert!(self.attached.remove(&id), "{id} is not there"),
@@ -240,10 +308,12 @@ impl World {
         };
         let meant = |id: &JausId| *id != message.source && message.destination.matches(*id);
         let attached: Vec<JausId> = self.attached.iter().copied().filter(meant).collect();
+        let from_gateway = self.attached.contains(&message.source);
         for id in attached {
-            self.gateway.handle_message(self.now, &received(id));
+            self.arrive(Arrival::Message(received(id)));
         }
-        for peer in self.jaus.iter_mut().filter(|peer| peer.up) {
+        let cut = self.jaus_cut && from_gateway;
+        for peer in self.jaus.iter_mut().filter(|peer| peer.up && !cut) {
             let id = peer.stack.id();
             if meant(&id) {
                 peer.stack.handle_message(self.now, &received(id));

@@ -28,8 +28,9 @@ mod rover;
 mod vehicle_process;
 
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
-use hosts::{TwoHosts, on_two_hosts};
+use hosts::{Process, TwoHosts, on_two_hosts};
 use vehicle_process::VehicleProcess;
 
 /// A running gateway; ended with a word when dropped.
@@ -46,6 +47,12 @@ impl Gateway {
             .stdout(Stdio::piped())
             .spawn();
         Self(child.unwrap())
+    }
+
+    /// Kills it without a word.
+    fn kill(mut self) {
+        self.0.kill().unwrap();
+        self.0.wait().unwrap();
     }
 
     /// Ends it; what it has printed.
@@ -102,6 +109,65 @@ fn watch_and_drive(hosts: &TwoHosts, flags: &[&str]) {
     let components = report["ra_components"].as_array().unwrap();
     let pose = components.iter().find(|it| it["ra"] == "20.1.38.1");
     assert_eq!(pose.unwrap()["jaus"], "20.1.38", "{printed}");
+}
+
+/// An RA vehicle on the first host that a JAUS client on the second drives through a gateway.
+fn driving(hosts: &TwoHosts) -> (Gateway, Process, Process) {
+    let gateway = Gateway::start(hosts, &[]);
+    let vehicle = hosts.start(0, "ra-vehicle");
+    vehicle.says("listening on");
+    let operator = hosts.start(1, "operator");
+    operator.says("in control");
+    vehicle.says("drives for the 1. time");
+    (gateway, vehicle, operator)
+}
+
+/// The vehicle stands and is free; another client drives it, and nothing has moved it meanwhile.
+fn is_driven_by_the_next_client_alone(hosts: &TwoHosts, vehicle: &Process) {
+    std::thread::sleep(Duration::from_secs(3));
+    let operator = hosts.start(1, "operator");
+    operator.says("in control");
+    assert_eq!(vehicle.says("drives for the"), "2. time");
+}
+
+#[test]
+fn after_a_gateway_was_killed_and_started_again_the_vehicle_moves_for_a_new_client_alone() {
+    let test =
+        "after_a_gateway_was_killed_and_started_again_the_vehicle_moves_for_a_new_client_alone";
+    on_two_hosts(test, |hosts| {
+        let (gateway, vehicle, operator) = driving(hosts);
+        gateway.kill();
+        vehicle.says("stands");
+        drop(operator);
+        let _gateway = Gateway::start(hosts, &[]);
+        vehicle.says("controlled by nobody");
+        is_driven_by_the_next_client_alone(hosts, &vehicle);
+    });
+}
+
+#[test]
+fn a_gateway_that_is_terminated_stops_and_releases_the_vehicle() {
+    let test = "a_gateway_that_is_terminated_stops_and_releases_the_vehicle";
+    on_two_hosts(test, |hosts| {
+        let (gateway, vehicle, operator) = driving(hosts);
+        gateway.end();
+        vehicle.says("stands");
+        vehicle.says("controlled by nobody");
+        drop(operator);
+        let _gateway = Gateway::start(hosts, &[]);
+        is_driven_by_the_next_client_alone(hosts, &vehicle);
+    });
+}
+
+#[test]
+fn the_vehicle_of_a_client_that_was_killed_stops_and_is_free() {
+    let test = "the_vehicle_of_a_client_that_was_killed_stops_and_is_free";
+    on_two_hosts(test, |hosts| {
+        let (_gateway, vehicle, operator) = driving(hosts);
+        drop(operator);
+        vehicle.says("stands");
+        vehicle.says("controlled by nobody");
+    });
 }
 
 #[test]

@@ -29,6 +29,9 @@ struct RaVehicle {
     controller: Option<RaId>,
     driven: bool,
     moves: bool,
+    /// Whether the RA vehicle drives, and how often it has begun to.
+    drives: bool,
+    drives_begun: u32,
 }
 
 pub(crate) async fn play() {
@@ -50,6 +53,8 @@ pub(crate) async fn play() {
         controller: None,
         driven: false,
         moves: false,
+        drives: false,
+        drives_begun: 0,
     };
     vehicle.run().await;
 }
@@ -84,7 +89,8 @@ impl RaVehicle {
                 self.next_effort,
             ];
             let wake = wake.into_iter().flatten().min();
-            let wake = wake.unwrap_or_else(|| Instant::now() + Duration::from_secs(1));
+            let look = Instant::now() + Duration::from_millis(100);
+            let wake = wake.map_or(look, |wake| wake.min(look));
             tokio::select! {
                 (from, datagram) = poll_fn(|cx| self.link.poll_recv(cx, &mut slab)) => {
                     self.node.handle_datagram(Instant::now(), from, datagram);
@@ -134,6 +140,15 @@ impl RaVehicle {
                 Some(id) => println!("controlled by {id}"),
                 None => println!("controlled by nobody"),
             }
+        }
+        let drives = self.rover.drives(Instant::now());
+        match (std::mem::replace(&mut self.drives, drives), drives) {
+            (false, true) => {
+                self.drives_begun += 1;
+                println!("drives for the {}. time", self.drives_begun);
+            }
+            (true, false) => println!("stands"),
+            _ => {}
         }
         if !self.driven && self.rover.efforts.len() > 10 && self.rover.controller_ready {
             self.driven = true;

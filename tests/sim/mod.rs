@@ -7,6 +7,7 @@
 //! and the same seed gives the same run.
 
 #![allow(
+    clippy::expect_used,
     clippy::panic,
     dead_code,
     unreachable_pub,
@@ -14,7 +15,9 @@
     reason = "each test binary uses its own part"
 )]
 
+mod clock;
 mod random;
+pub mod seeds;
 mod trace;
 mod wire;
 
@@ -28,10 +31,12 @@ use jaus::endpoint::{
 };
 use jaus::wire::judp;
 
+use clock::VirtualTime;
+pub use clock::WallClock;
 pub use random::Random;
 pub use trace::Trace;
+use wire::{Backlog, Flight, Wire};
 pub use wire::{Conditions, Socket};
-use wire::{Flight, Wire};
 
 /// The only link of each node.
 pub const WIRE: LinkId = LinkId(0);
@@ -93,14 +98,32 @@ struct Node<O> {
     endpoint: Endpoint,
     owner: O,
     address: SocketAddr,
-    up: bool,
+    process: Process,
+}
+
+/// What a node's process does.
+enum Process {
+    Running,
+    /// Stopped by a signal: it does nothing, and its socket fills up.
+    Suspended(Backlog),
+    Dead,
+}
+
+impl<O> Node<O> {
+    const fn is_running(&self) -> bool {
+        matches!(self.process, Process::Running)
+    }
 }
 
 /// The network. See the [module](self).
 pub struct Network<O = Mailbox> {
+    start: Instant,
     now: Instant,
+    time: VirtualTime,
     wire: Wire,
     nodes: Vec<Node<O>>,
+    /// The wall clock of each host; it survives a restart of the node.
+    clocks: Vec<WallClock>,
     carried: u64,
     multicast: u64,
     trace: Trace,
@@ -115,9 +138,12 @@ impl<O: Owner> Network<O> {
     pub fn new(seed: u64, conditions: Conditions) -> Self {
         let now = Instant::now();
         Self {
+            start: now,
             now,
+            time: VirtualTime::default(),
             wire: Wire::new(seed, conditions),
             nodes: Vec::new(),
+            clocks: Vec::new(),
             carried: 0,
             multicast: 0,
             trace: Trace::new(now),
@@ -125,15 +151,27 @@ impl<O: Owner> Network<O> {
     }
 
     /// Puts a node on the wire, at 10.0.0.n:3794.
-    pub fn join(&mut self, mut endpoint: Endpoint, owner: O) -> Host {
+    pub fn join(&mut self, endpoint: Endpoint, owner: O) -> Host {
+        self.join_with(endpoint, |_clock| owner)
+    }
+
+    /// Puts a node on the wire whose owner goes by the wall clock of its host.
+    pub fn join_with(
+        &mut self,
+        mut endpoint: Endpoint,
+        owner: impl FnOnce(WallClock) -> O,
+    ) -> Host {
         let host = self.nodes.len();
+        let clock = self.time.clock();
+        let owner = owner(clock.clone());
+        self.clocks.push(clock);
         let address = SocketAddr::from(([10, 0, 0, host as u8 + 1], judp::PORT));
         endpoint.add_link(WIRE, LinkProfile::judp([address]));
         self.nodes.push(Node {
             endpoint,
             owner,
             address,
-            up: true,
+            process: Process::Running,
         });
         Host(host)
     }
@@ -146,18 +184,59 @@ impl<O: Owner> Network<O> {
             endpoint,
             owner,
             address,
-            up: true,
+            process: Process::Running,
         };
     }
 
-    /// Lets a node die: it neither hears nor says anything.
+    /// Kills a node: it neither receives nor sends any more.
     pub fn kill(&mut self, host: Host) {
-        self.nodes[host.0].up = false;
+        self.nodes[host.0].process = Process::Dead;
+    }
+
+    /// Suspends a running node, as SIGSTOP does: it neither processes nor sends, and datagrams wait
+    /// in its socket until the buffer is full.
+    pub fn suspend(&mut self, host: Host) {
+        let process = &mut self.nodes[host.0].process;
+        if let Process::Running = process {
+            *process = Process::Suspended(Backlog::default());
+        }
+    }
+
+    /// Lets a suspended node go on, as SIGCONT does: it reads everything in its socket before it
+    /// looks at its timers, which is the more dangerous order.
+    pub fn resume(&mut self, host: Host) {
+        let process = &mut self.nodes[host.0].process;
+        let Process::Suspended(backlog) = process else {
+            return;
+        };
+        let backlog = std::mem::take(backlog);
+        *process = Process::Running;
+        for flight in backlog.flights {
+            self.arrive(flight);
+        }
+        self.wake(host.0);
+    }
+
+    /// The wall clock of a host.
+    pub fn clock(&self, host: Host) -> WallClock {
+        self.clocks[host.0].clone()
+    }
+
+    /// Moves the wall clock of a host by `nanoseconds`, backward if negative. Virtual time, by which
+    /// timers go, stays as it is.
+    pub fn step_clock(&mut self, host: Host, nanoseconds: i64) {
+        self.clocks[host.0].step(nanoseconds);
     }
 
     /// Cuts or joins the wire between two nodes.
     pub fn set_cut(&mut self, one: Host, other: Host, cut: bool) {
-        self.wire.set_cut(one.0, other.0, cut);
+        self.set_cut_one_way(one, other, cut);
+        self.set_cut_one_way(other, one, cut);
+    }
+
+    /// Cuts or joins the wire in one direction.
+    pub fn set_cut_one_way(&mut self, from: Host, to: Host, cut: bool) {
+        self.wire.set_cut(from.0, to.0, cut);
     }
 
     /// Makes the wire better or worse from now on.
@@ -230,7 +309,7 @@ impl<O: Owner> Network<O> {
         while self.next_time().is_some_and(|next| next <= end) {
             self.step();
         }
-        self.now = end;
+        self.set_now(end);
     }
 
     /// Goes on until nothing is left to happen.
@@ -252,7 +331,7 @@ impl<O: Owner> Network<O> {
         let Some(next) = self.next_time() else {
             return false;
         };
-        self.now = self.now.max(next);
+        self.set_now(self.now.max(next));
         while let Some(flight) = self.wire.receive(self.now) {
             self.arrive(flight);
         }
@@ -262,8 +341,14 @@ impl<O: Owner> Network<O> {
         true
     }
 
-    fn next_time(&self) -> Option<Instant> {
-        let alarms = self.nodes.iter().filter(|node| node.up);
+    fn set_now(&mut self, now: Instant) {
+        self.now = now;
+        self.time.set(now.saturating_duration_since(self.start));
+    }
+
+    /// The next time at which something happens.
+    pub fn next_time(&self) -> Option<Instant> {
+        let alarms = self.nodes.iter().filter(|node| node.is_running());
         let alarms =
             alarms.flat_map(|node| [node.endpoint.poll_timeout(), node.owner.poll_timeout()]);
         alarms.chain([self.wire.next_time()]).flatten().min()
@@ -271,24 +356,29 @@ impl<O: Owner> Network<O> {
 
     fn arrive(&mut self, flight: Flight) {
         let node = &mut self.nodes[flight.to];
-        if node.up {
-            let (to, from, length) = (flight.to, flight.from, flight.datagram.len());
-            let what = format_args!("{to} gets {length} octets from {from}");
-            self.trace.note(self.now, what);
-            let path = Path {
-                link: WIRE,
-                peer: flight.from.into(),
-            };
-            node.endpoint
-                .handle_datagram(self.now, path, flight.datagram);
-            self.settle(flight.to);
+        match &mut node.process {
+            Process::Dead => return,
+            Process::Suspended(backlog) => return self.wire.keep_for_later(flight, backlog),
+            Process::Running => {}
         }
+        let (to, from, length) = (flight.to, flight.from, flight.datagram.len());
+        let what = format_args!("{to} gets {length} octets from {from}");
+        self.trace.note(self.now, what);
+        let path = Path {
+            link: WIRE,
+            peer: flight.from.into(),
+        };
+        node.endpoint
+            .handle_datagram(self.now, path, flight.datagram);
+        self.settle(to);
     }
 
     fn wake(&mut self, host: usize) {
         let (now, node) = (self.now, &mut self.nodes[host]);
         let due = |timeout: Option<Instant>| timeout.is_some_and(|timeout| timeout <= now);
-        if !node.up || !(due(node.endpoint.poll_timeout()) || due(node.owner.poll_timeout())) {
+        if !node.is_running()
+            || !(due(node.endpoint.poll_timeout()) || due(node.owner.poll_timeout()))
+        {
             return;
         }
         node.endpoint.handle_timeout(now);
@@ -325,7 +415,7 @@ impl<O: Owner> Network<O> {
 
     /// Puts a datagram on the wire. The group is everybody, the sender included.
     fn carry(&mut self, from: usize, to: To, datagram: &Bytes) {
-        if !self.nodes[from].up {
+        if !self.nodes[from].is_running() {
             return;
         }
         self.carried += 1;

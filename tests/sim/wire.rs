@@ -75,6 +75,18 @@ pub(super) struct Flight {
     buffered: bool,
 }
 
+/// Datagrams in the socket of a suspended process, oldest first.
+#[derive(Default)]
+pub(super) struct Backlog {
+    pub(super) flights: Vec<Flight>,
+    octets: usize,
+}
+
+impl Backlog {
+    /// Octets that fit in if the conditions do not say: Linux's default.
+    const ROOM: usize = 212_992;
+}
+
 /// What is in a node's socket.
 #[derive(Clone, Copy, Default)]
 struct Buffer {
@@ -88,6 +100,7 @@ pub(super) struct Wire {
     pub(super) conditions: Conditions,
     random: Random,
     flights: BinaryHeap<Reverse<Flight>>,
+    /// Sender and receiver of each direction that is cut.
     cut: HashSet<(usize, usize)>,
     buffers: Vec<Buffer>,
     launched: u64,
@@ -107,13 +120,11 @@ impl Wire {
         }
     }
 
-    pub(super) fn set_cut(&mut self, one: usize, other: usize, cut: bool) {
-        for pair in [(one, other), (other, one)] {
-            if cut {
-                self.cut.insert(pair);
-            } else {
-                self.cut.remove(&pair);
-            }
+    pub(super) fn set_cut(&mut self, from: usize, to: usize, cut: bool) {
+        if cut {
+            self.cut.insert((from, to));
+        } else {
+            self.cut.remove(&(from, to));
         }
     }
 
@@ -188,6 +199,19 @@ impl Wire {
         flight.arrival = read;
         flight.buffered = true;
         self.flights.push(Reverse(flight));
+    }
+
+    /// Puts a datagram into the socket of a suspended process, if there is room.
+    pub(super) fn keep_for_later(&mut self, flight: Flight, backlog: &mut Backlog) {
+        let socket = self.conditions.socket;
+        let room = socket.map_or(Backlog::ROOM, |socket| socket.buffer);
+        let length = flight.datagram.len();
+        if backlog.octets + length > room {
+            self.overflowed += 1;
+            return;
+        }
+        backlog.octets += length;
+        backlog.flights.push(flight);
     }
 
     fn buffer(&mut self, host: usize) -> &mut Buffer {

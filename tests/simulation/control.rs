@@ -224,7 +224,7 @@ impl World {
         };
         let timeout = random.choose(&[0, 2, 5]);
         let mut network = Network::new(random.number(), conditions);
-        if crate::seeds::is_traced() {
+        if crate::sim::seeds::is_traced() {
             network.trace().print();
         }
         let now = network.now();

@@ -15,13 +15,12 @@ mod ledger;
 mod producer;
 mod rules;
 mod scenario;
-mod seeds;
 #[path = "../sim/mod.rs"]
 mod sim;
 mod streams;
 mod vehicle;
 
-use seeds::for_each_seed;
+use sim::seeds::for_each_seed;
 
 /// So many seeds are tried if nobody says otherwise.
 const SEEDS: u64 = 2000;

@@ -7,7 +7,7 @@ use jaus::endpoint::{Config, Counter, Endpoint, Event, LinkProfile, Outgoing, Pa
 use jaus::wire::Priority;
 
 use crate::ledger::{Ledger, Life};
-use crate::seeds::is_traced;
+use crate::sim::seeds::is_traced;
 use crate::sim::{Conditions, Host, Mailbox, Network, Random, Socket, WIRE};
 
 /// The longest message.

@@ -209,7 +209,7 @@ impl World {
         let habits = random.happens(600).then(|| Habits::choose(&mut random));
         let conditions = conditions(&mut random);
         let mut network = Network::new(random.number(), conditions.clone());
-        if crate::seeds::is_traced() {
+        if crate::sim::seeds::is_traced() {
             network.trace().print();
         }
         let now = network.now();

@@ -19,6 +19,8 @@ pub(super) struct Plan<'m> {
     pub(super) version: Option<String>,
     /// The services that declare it, the newest version first.
     pub(super) services: Vec<&'m Id>,
+    /// Whether only the client in control may give it.
+    pub(super) needs_control: bool,
 }
 
 impl Plan<'_> {
@@ -79,6 +81,10 @@ pub(super) fn message<'m>(
     out.push(format!("const CODE: u16 = 0x{:04X};", message.code));
     out.push(format!("const NAME: &'static str = {:?};", message.name));
     out.push(format!("const IS_COMMAND: bool = {};", message.is_command));
+    out.push(format!(
+        "const NEEDS_CONTROL: bool = {};",
+        plan.needs_control
+    ));
     codec(
         out,
         ident,

@@ -51,7 +51,7 @@ pub fn module<'m>(
     out.push(format!("use {runtime}{rename};"));
     let mut names = Names::reserving(&["codec"]);
     let versions = registry::versions(&services, &mut names);
-    let plans = plan(&services, &mut names);
+    let plans = plan(library, &services, &mut names);
     let messages = Messages {
         library,
         plans: &plans,
@@ -64,12 +64,13 @@ pub fn module<'m>(
 
 /// Which types there are to be: one for every code, name and layout; sorted by code, the newest
 /// layout of a message first.
-fn plan<'m>(services: &[&'m Service], names: &mut Names) -> Vec<Plan<'m>> {
+fn plan<'m>(library: &Library, services: &[&'m Service], names: &mut Names) -> Vec<Plan<'m>> {
     let mut messages: BTreeMap<(u16, &str), Vec<Declared<'m>>> = BTreeMap::new();
     for service in services {
         for message in service.messages() {
             let layouts = messages.entry((message.code, &message.name)).or_default();
-            declare(layouts, message, &service.id);
+            let needs_control = message.is_command && inherits_control(library, service);
+            declare(layouts, message, &service.id, needs_control);
         }
     }
     let mut plans = Vec::new();
@@ -93,6 +94,7 @@ fn plan<'m>(services: &[&'m Service], names: &mut Names) -> Vec<Plan<'m>> {
                 module: names.snake(&layout.message.name),
                 version,
                 services: layout.services,
+                needs_control: layout.needs_control,
             });
         }
     }
@@ -109,6 +111,7 @@ struct Declared<'m> {
     /// The newest declaration.
     message: &'m Message,
     services: Vec<&'m Id>,
+    needs_control: bool,
 }
 
 impl Declared<'_> {
@@ -118,13 +121,29 @@ impl Declared<'_> {
     }
 }
 
-fn declare<'m>(layouts: &mut Vec<Declared<'m>>, message: &'m Message, service: &'m Id) {
+/// Whether a service is derived from Access Control.
+fn inherits_control(library: &Library, service: &Service) -> bool {
+    let mut bases = library
+        .lineage(service)
+        .filter_map(|it| it.inherits_from.as_ref());
+    bases.any(|base| &*base.id.urn == ACCESS_CONTROL)
+}
+
+const ACCESS_CONTROL: &str = "urn:jaus:jss:core:AccessControl";
+
+fn declare<'m>(
+    layouts: &mut Vec<Declared<'m>>,
+    message: &'m Message,
+    service: &'m Id,
+    needs_control: bool,
+) {
     let layout = fingerprint::layout(message);
     match layouts
         .iter_mut()
         .find(|declared| declared.layout == layout)
     {
         Some(declared) => {
+            declared.needs_control |= needs_control;
             if service.version > declared.version() {
                 declared.message = message;
             }
@@ -136,6 +155,7 @@ fn declare<'m>(layouts: &mut Vec<Declared<'m>>, message: &'m Message, service: &
             layout,
             message,
             services: vec![service],
+            needs_control,
         }),
     }
 }

@@ -4,15 +4,25 @@
 use crate::codec::Message as _;
 use crate::messages::ra33;
 
+pub(super) const SHUTDOWN: u16 = ra33::Shutdown::CODE;
+pub(super) const STANDBY: u16 = ra33::Standby::CODE;
+pub(super) const RESUME: u16 = ra33::Resume::CODE;
 pub(super) const RESET: u16 = ra33::Reset::CODE;
 pub(super) const SET_EMERGENCY: u16 = ra33::SetEmergency::CODE;
+pub(super) const CLEAR_EMERGENCY: u16 = ra33::ClearEmergency::CODE;
 pub(super) const REQUEST_CONTROL: u16 = ra33::RequestComponentControl::CODE;
 pub(super) const RELEASE_CONTROL: u16 = ra33::ReleaseComponentControl::CODE;
 pub(super) const CONFIRM_CONTROL: u16 = ra33::ConfirmComponentControl::CODE;
 pub(super) const REJECT_CONTROL: u16 = ra33::RejectComponentControl::CODE;
+pub(super) const QUERY_CONTROL: u16 = ra33::QueryComponentControl::CODE;
+pub(super) const REPORT_CONTROL: u16 = ra33::ReportComponentControl::CODE;
+pub(super) const SET_EFFORT: u16 = ra33::SetWrenchEffort::CODE;
+pub(super) const SET_GLOBAL_VECTOR: u16 = ra33::SetGlobalVector::CODE;
+pub(super) const SET_LOCAL_VECTOR: u16 = ra33::SetLocalVector::CODE;
 pub(super) const SET_SPEED: u16 = ra33::SetTravelSpeed::CODE;
 pub(super) const SPEED: u16 = ra33::ReportTravelSpeed::CODE;
-pub(super) const STATUS: u16 = ra33::ReportComponentStatus::CODE;
+pub(in crate::gateway) const QUERY_STATUS: u16 = ra33::QueryComponentStatus::CODE;
+pub(in crate::gateway) const STATUS: u16 = ra33::ReportComponentStatus::CODE;
 
 /// Whether a message with this code is the RA component's business; all others are ours: transport,
 /// discovery, liveness, events, who is in control, and what JAUS drivers say of elements that the RA

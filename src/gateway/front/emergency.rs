@@ -1,66 +1,75 @@
-//! Emergencies of RA components. Components over OpenJAUS's library say that they are in one, and
-//! obey as before: the library keeps the state that it tells apart from the one that it acts upon.
-//! So whoever sets an emergency has the component stop by a command that it does obey, and nobody
-//! drives it until it says that the emergency is over. Who keeps to the standard stops anyway.
+//! Emergency and standby of RA components. Components over OpenJAUS's library report both, and obey
+//! as before: the library keeps the state that it reports apart from the one that it acts upon. So
+//! the gateway stops the component by a command that it does obey, and gives it no driving command
+//! until it reports that the emergency is over, or its client has sent Resume. A component that keeps
+//! to the standard stops anyway. As a JAUS component with Management, a driver is in standby after
+//! control was granted: a client that merely renews what an earlier gateway granted does not drive.
 
 use std::time::Instant;
 
 use bytes::Bytes;
 
 use super::Front;
-use super::codes::{STATUS, is_management, needs_control};
-use crate::codec::{Message, OutOfRange};
-use crate::messages::ra33::{SetTravelSpeed, SetWrenchEffort};
-use crate::ra::ids::RaComponent;
+use super::codes::{
+    CLEAR_EMERGENCY, RESET, RESUME, SET_EMERGENCY, SHUTDOWN, STANDBY, STATUS, is_management,
+    needs_control,
+};
+use super::ready::status;
+use crate::gateway::counters::Counter;
 
 /// The primary status code for an emergency.
 const EMERGENCY: u8 = 5;
+/// Those for ready and standby.
+const READY: u8 = 1;
+const STANDBY_STATE: u8 = 2;
 
 impl Front {
-    /// A status has come.
-    pub(super) fn heed_status(&mut self, status: &[u8]) {
-        self.in_emergency = status.first() == Some(&EMERGENCY);
-    }
-
-    /// Whether a command must wait until the emergency is over. If it may be by now, the RA component
-    /// is asked.
-    pub(super) fn holds_back(&mut self, now: Instant, code: u16) -> bool {
-        let held_back = self.in_emergency && needs_control(code) && !is_management(code);
-        let known = self.mirror.age(now, STATUS);
-        if held_back && known.is_none_or(|age| age >= Self::ASK_AGAIN) {
-            self.ask(STATUS);
+    /// A status as JAUS clients are told it: a component that is being reclaimed initializes, and one
+    /// that reports ready to a client that has not sent Resume is in standby.
+    pub(super) fn shown_status(&mut self, report: u16, data: Bytes) -> Bytes {
+        if report != STATUS {
+            return data;
         }
-        held_back
-    }
-
-    /// What stops the RA component, besides the emergency.
-    pub(super) fn stop(&self) -> Option<(u16, Bytes)> {
-        match RaComponent(self.ra.component) {
-            RaComponent::PRIMITIVE_DRIVER => said(&no_effort().ok()?),
-            RaComponent::GLOBAL_WAYPOINT_DRIVER
-            | RaComponent::LOCAL_WAYPOINT_DRIVER
-            | RaComponent::GLOBAL_PATH_SEGMENT_DRIVER
-            | RaComponent::LOCAL_PATH_SEGMENT_DRIVER => said(&SetTravelSpeed::default()),
-            _ => None,
+        self.in_emergency = data.first() == Some(&EMERGENCY);
+        self.in_standby |= self.in_emergency && self.lease.controller().is_some();
+        if self.lease.is_reclaiming() {
+            return status(false);
         }
+        let mut shown = data.to_vec();
+        if let Some(state) = shown.first_mut().filter(|state| **state == READY)
+            && self.in_standby
+        {
+            *state = STANDBY_STATE;
+        }
+        shown.into()
     }
-}
 
-/// Nothing that drives, and full brakes.
-fn no_effort() -> Result<SetWrenchEffort, OutOfRange> {
-    let mut effort = SetWrenchEffort::default();
-    effort.set_propulsive_linear_effort_x_percent(0.0)?;
-    effort.set_propulsive_linear_effort_y_percent(0.0)?;
-    effort.set_propulsive_linear_effort_z_percent(0.0)?;
-    effort.set_propulsive_rotational_effort_x_percent(0.0)?;
-    effort.set_propulsive_rotational_effort_y_percent(0.0)?;
-    effort.set_propulsive_rotational_effort_z_percent(0.0)?;
-    effort.set_resistive_linear_effort_x_percent(100.0)?;
-    Ok(effort)
-}
+    /// Why a command may not be given to the RA component now, if so. If an emergency may be over by
+    /// now, the RA component is asked.
+    pub(super) fn holds_back(&mut self, now: Instant, code: u16) -> Option<Counter> {
+        if !needs_control(code) || is_management(code) {
+            return None;
+        }
+        if self.in_emergency {
+            let known = self.mirror.age(now, STATUS);
+            if known.is_none_or(|age| age >= Self::ASK_AGAIN) {
+                self.ask(STATUS);
+            }
+            return Some(Counter::InEmergency);
+        }
+        self.in_standby.then_some(Counter::InStandby)
+    }
 
-/// Code and data of a message.
-fn said<M: Message>(message: &M) -> Option<(u16, Bytes)> {
-    let payload = message.encode().ok()?;
-    Some((M::CODE, payload.slice(2..)))
+    /// Stops the RA component when its client sends it to another state.
+    pub(super) fn heed_management(&mut self, code: u16) {
+        match code {
+            // Whether it is over, the next status tells.
+            CLEAR_EMERGENCY => return self.in_emergency = false,
+            RESUME => return self.in_standby &= self.in_emergency,
+            SHUTDOWN | STANDBY | RESET | SET_EMERGENCY => {}
+            _ => return,
+        }
+        self.in_standby = self.lease.controller().is_some();
+        self.stop();
+    }
 }

@@ -92,8 +92,10 @@ impl Front {
         if !self.lease.obeys(client) {
             return tally.refuse(now, Counter::NotInControl, code, client);
         }
-        if code == ExecuteList::CODE && self.holds_back(now, SET_SPEED) {
-            return tally.refuse(now, Counter::InEmergency, code, client);
+        if code == ExecuteList::CODE
+            && let Some(why) = self.holds_back(now, SET_SPEED)
+        {
+            return tally.refuse(now, why, code, client);
         }
         if let Some(listing) = &self.listing {
             listing.lock().handle_command(now, &message.payload);
@@ -184,7 +186,7 @@ impl Front {
                 0x2000.. => Counter::QueriesToRa,
                 _ => Counter::CommandsToRa,
             });
-            self.to_ra.push((code, data));
+            self.give(now, (code, data));
         }
         for answer in said.answers {
             if let Some(client) = client {

@@ -13,6 +13,7 @@ use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::messages::core::{
     QueryAuthority, QueryControl, QueryTimeout, ReportAuthority, ReportControl, ReportTimeout,
+    report_timeout,
 };
 
 use crate::service::{Context, Controller, Handled, Service, code_of};
@@ -95,6 +96,8 @@ pub(super) struct Mirrored {
     pub(super) mirror: Mirror,
     pub(super) words: Words,
     pub(super) offers: Vec<ServiceId>,
+    /// How long control lasts without a renewal; zero: until it is released or taken.
+    pub(super) timeout: Duration,
 }
 
 impl Service for Mirrored {
@@ -123,8 +126,11 @@ impl Service for Mirrored {
                 let authority_code = controller.map_or(0, |it| it.authority);
                 context.reply(message, &ReportAuthority { authority_code });
             }
-            // Control lasts until it is given back or taken.
-            Some(QueryTimeout::CODE) => context.reply(message, &ReportTimeout::default()),
+            Some(QueryTimeout::CODE) => {
+                let seconds = u8::try_from(self.timeout.as_secs()).unwrap_or(u8::MAX);
+                let timeout = report_timeout::Timeout(seconds);
+                context.reply(message, &ReportTimeout { timeout });
+            }
             _ => match self.mirror.answer(now, &message.payload, &self.words) {
                 Some(answer) => context.send_octets(message.source, answer),
                 None => return Handled::No,

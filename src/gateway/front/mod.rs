@@ -16,10 +16,14 @@ mod codes;
 mod emergency;
 mod entering;
 mod events;
+mod hold;
 mod lease;
 mod listing;
 mod mirror;
+mod motion;
 mod ra_event;
+mod ready;
+mod stop;
 mod streams;
 mod target;
 mod voice;
@@ -31,12 +35,16 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use self::codes::{
-    CONFIRM_CONTROL, REJECT_CONTROL, SET_EMERGENCY, STATUS, answer_to_command, crosses,
-    is_management, needs_control,
+    CONFIRM_CONTROL, REJECT_CONTROL, REPORT_CONTROL, answer_to_command, crosses, is_management,
+    needs_control,
 };
-use self::lease::Lease;
+pub(super) use self::codes::{QUERY_STATUS, STATUS};
+use self::lease::{Lease, Terms};
 use self::listing::{Listed, Listing};
 use self::mirror::{Mirror, Mirrored};
+use self::motion::Motion;
+use self::ready::Readiness;
+pub(super) use self::ready::status;
 use self::streams::Streams;
 pub(super) use self::target::Target;
 pub(super) use self::voice::Voice;
@@ -47,7 +55,7 @@ use super::roles::Role;
 use super::{pairs, roles};
 use crate::address::JausId;
 use crate::codec::Message as _;
-use crate::endpoint::Received;
+use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::{
     self, CreateEvent, ReleaseControl, RequestControl, SetAuthority, UpdateEvent,
 };
@@ -70,7 +78,12 @@ pub(super) struct Front {
     mirror: Mirror,
     /// Whether it has said last that it is in an emergency.
     in_emergency: bool,
+    /// Whether its client has sent it to Standby, and not to Resume after that.
+    in_standby: bool,
     lease: Lease,
+    motion: Motion,
+    /// What it is told of the gateway's readiness.
+    readiness: Readiness,
     /// The list of places, of a driver that goes to such.
     listing: Option<Listing>,
     streams: Streams,
@@ -95,6 +108,7 @@ pub(super) struct Plan {
     pub(super) ids: Ids,
     pub(super) patience: Duration,
     pub(super) authority: u8,
+    pub(super) timeout: Duration,
 }
 
 impl Front {
@@ -121,7 +135,14 @@ impl Front {
             mirror: mirror.clone(),
             words: words.clone(),
             offers: offers(plan.ra, role),
+            timeout: plan.timeout,
         };
+        let terms = Terms {
+            patience: plan.patience,
+            authority: plan.authority,
+            timeout: plan.timeout,
+        };
+        let halt = stop::halt(RaComponent(plan.ra.component));
         let listing = Listing::of(role, plan.patience);
         let mut services: Vec<Box<dyn Service>> = vec![
             Box::new(Transport),
@@ -140,7 +161,10 @@ impl Front {
             words,
             mirror,
             in_emergency: false,
-            lease: Lease::new(plan.patience, plan.authority),
+            in_standby: false,
+            lease: Lease::new(plan.own, plan.ra, halt, terms),
+            motion: Motion::new(plan.id),
+            readiness: Readiness::default(),
             listing,
             streams: Streams::new(plan.ra, plan.own),
             held: Vec::new(),
@@ -156,6 +180,14 @@ impl Front {
         }
     }
 
+    /// Begins to live. What an earlier gateway with our id has left held is released.
+    pub(super) fn start(&mut self, now: Instant) {
+        self.stack.start(now);
+        if !RaComponent(self.ra.component).is_infrastructure() {
+            self.lease.reclaim(now);
+        }
+    }
+
     /// The RA component.
     pub(super) const fn ra(&self) -> RaId {
         self.ra
@@ -164,6 +196,8 @@ impl Front {
     /// A message of a JAUS component has come.
     pub(super) fn handle_message(&mut self, now: Instant, message: &Received, tally: &mut Tally) {
         let client = message.source;
+        self.end_overdue(now);
+        self.motion.hear(now, message);
         match code_of(&message.payload) {
             Some(RequestControl::CODE) => {
                 if let Ok(request) = RequestControl::decode(&message.payload) {
@@ -240,14 +274,13 @@ impl Front {
         if needs_control(code) && !self.lease.obeys(client) {
             return tally.refuse(now, Counter::NotInControl, code, client);
         }
-        if self.holds_back(now, code) {
-            return tally.refuse(now, Counter::InEmergency, code, client);
+        if let Some(why) = self.holds_back(now, code) {
+            return tally.refuse(now, why, code, client);
         }
         tally.add(Counter::CommandsToRa);
         self.note_command(code, &words.1);
-        let stop = (code == SET_EMERGENCY).then(|| self.stop()).flatten();
-        self.to_ra.extend(stop);
-        self.to_ra.push(words);
+        self.heed_management(code);
+        self.give(now, words);
         if is_management(code) {
             self.mirror.outdate(STATUS);
             self.ask(STATUS);
@@ -266,6 +299,8 @@ impl Front {
         target: Option<Target>,
         tally: &mut Tally,
     ) {
+        self.end_overdue(now);
+        self.voice.life.hear(now, message.code);
         if self.connections.handle_message(now, message) {
             self.follow_connections(now, target, tally);
         } else if let Some(target) = target {
@@ -285,6 +320,12 @@ impl Front {
                 self.lease.handle_confirm(now, response);
             }
             REJECT_CONTROL => self.lease.handle_reject(),
+            QUERY_STATUS => self.to_ra.push((STATUS, self.own_status())),
+            REPORT_CONTROL => {
+                if let Some(controller) = ready::controller(message) {
+                    self.lease.handle_controller(now, controller);
+                }
+            }
             _ if pairs::query_of(code).is_some() => self.handle_report(now, code, data, tally),
             _ => tally.refuse(now, Counter::NoCounterpart, code, self.ra),
         }
@@ -298,6 +339,7 @@ impl Front {
                     self.provide(now, (id, request), target, tally);
                 }
                 connection::Event::Ended(id) => {
+                    self.readiness.disconnect(id);
                     if !self.streams.handle_end(now, id) {
                         self.voice.disconnect(now, id, &mut self.stack);
                     }
@@ -334,7 +376,8 @@ impl Front {
             }
             None if request.provider == self.own && request.code == STATUS => {
                 self.connections.accept(now, id);
-                self.connections.set_report(now, id, ready());
+                self.readiness.connect(now, id);
+                self.tell_readiness(now);
             }
             None => self
                 .connections
@@ -388,9 +431,7 @@ impl Front {
     }
 
     fn tell_state(&mut self, now: Instant, report: u16, data: Bytes, converted: &[u8]) {
-        if report == STATUS {
-            self.heed_status(&data);
-        }
+        let data = self.shown_status(report, data);
         let changed = self.mirror.keep(now, report, data);
         let (ready, held) = std::mem::take(&mut self.held)
             .into_iter()
@@ -403,6 +444,11 @@ impl Front {
         if let Some(query) = query.filter(|_| changed) {
             self.stack.announce(now, query);
         }
+    }
+
+    /// Its subsystem was heard last at this time.
+    pub(super) fn hear_subsystem(&mut self, at: Instant) {
+        self.voice.life.hear_subsystem(at);
     }
 
     /// A JAUS client is gone.
@@ -420,7 +466,12 @@ impl Front {
         if self.stack.poll_timeout().is_some_and(|due| due <= now) {
             self.stack.handle_timeout(now);
         }
-        self.lease.handle_timeout(now);
+        self.end_overdue(now);
+        self.tend_client(now, tally);
+        if self.voice.take_probe(now) {
+            self.ask(STATUS);
+        }
+        self.release_again(now);
         self.connections.handle_timeout(now);
         self.follow_connections(now, None, tally);
         self.to_ra.extend(self.streams.take_queries(now));
@@ -444,9 +495,13 @@ impl Front {
         if said.granted {
             tally.add(Counter::ControlOfRa);
         }
+        let before = self.mirror.controller_is(self.lease.controller());
+        if !before {
+            self.follow_controller(now);
+        }
         self.stop_list_where_due(now, tally);
         self.to_ra.extend(said.to_ra);
-        let before = self.mirror.controller_is(self.lease.controller());
+        self.tell_readiness(now);
         for (client, payload) in said.to_clients {
             self.stack.send_octets(client, payload);
         }
@@ -476,15 +531,26 @@ impl Front {
         wanted
     }
 
+    /// Whether everything is released that was controlled on either side.
+    pub(super) fn is_released(&self) -> bool {
+        self.lease.is_released() && !self.stack.is_releasing()
+    }
+
     /// Ends what runs with the RA component, because we stop.
     pub(super) fn take_leave(&mut self, now: Instant, tally: &mut Tally) {
-        if let Some(controller) = self.lease.controller() {
-            self.lease.release(now, controller.id);
-        }
+        self.lease.end(now);
+        self.voice.is_closed = true;
+        self.voice.end_control(now, &mut self.stack);
         let nothing = BTreeMap::new();
         self.streams.want(now, &nothing, &mut self.connections);
         self.follow(now, tally);
         self.stack.take_leave(now);
+    }
+
+    /// The next message for JAUS components.
+    pub(super) fn poll_transmit(&mut self) -> Option<Outgoing> {
+        let probe = self.motion.poll_transmit();
+        probe.or_else(|| self.stack.poll_transmit())
     }
 
     /// What is to be sent to the RA component since this was asked last.
@@ -508,9 +574,12 @@ impl Front {
         let listing = self.listing.as_ref();
         [
             self.voice.poll_timeout(),
+            self.voice.tend_at(),
             listing.and_then(|it| it.lock().poll_timeout()),
             self.stack.poll_timeout(),
             self.lease.poll_timeout(),
+            self.motion.poll_timeout(),
+            self.readiness.poll_timeout(),
             self.streams.poll_timeout(),
             self.connections.poll_timeout(),
             self.review,
@@ -550,9 +619,4 @@ fn state_of(words: &Words, query: &Bytes) -> Option<u16> {
     let (code, _) = crosses(code).then(|| words.to_ra(query).ok())??;
     let report = pairs::report_of(code)?;
     pairs::state(report).map(|_| report)
-}
-
-/// Report Component Status of one that is ready, without further words.
-pub(super) fn ready() -> Bytes {
-    Bytes::from_static(&[1, 0, 0, 0, 0])
 }

@@ -18,7 +18,10 @@ use super::super::convert::{self, Ids, Words};
 use super::super::counters::{Counter, Tally};
 use super::super::course::Entries;
 use super::super::pairs;
-use super::codes::{CONFIRM_CONTROL, REJECT_CONTROL, RELEASE_CONTROL, REQUEST_CONTROL};
+use super::codes::{
+    CONFIRM_CONTROL, REJECT_CONTROL, RELEASE_CONTROL, REQUEST_CONTROL, is_management, needs_control,
+};
+use super::hold::{ClientLife, Hold};
 use super::ra_event::RaEvent;
 use super::target::{Target, element_query, place_report, places};
 use crate::address::JausId;
@@ -39,7 +42,7 @@ pub(in crate::gateway) struct Voice {
     ids: Ids,
     asked: BTreeMap<Inquiry, (Message, Target)>,
     told: BTreeMap<SubscriptionId, Told>,
-    grips: BTreeMap<ControlId, Grip>,
+    pub(super) grips: BTreeMap<ControlId, Grip>,
     /// The places that it sets, by whom it sets them at.
     pub(super) entries: BTreeMap<RaId, (Target, Entries)>,
     /// Questions at which element a list is.
@@ -48,6 +51,12 @@ pub(in crate::gateway) struct Voice {
     pub(super) events: BTreeMap<SubscriptionId, RaEvent>,
     /// Messages for the RA component, from those whom it asked.
     pub(super) said: Vec<Message>,
+    /// Its signs of life.
+    pub(super) life: ClientLife,
+    /// When it was last told that it commands without control.
+    pub(super) rejected: Option<Instant>,
+    /// Whether the gateway stops, and requests control for nobody any more.
+    pub(super) is_closed: bool,
 }
 
 /// A service connection of the RA component.
@@ -67,10 +76,11 @@ pub(super) struct Common<'a> {
 
 /// Control of the RA component over a JAUS component.
 #[derive(Debug)]
-struct Grip {
-    request: Message,
-    peer: JausId,
-    held: bool,
+pub(super) struct Grip {
+    pub(super) request: Message,
+    pub(super) peer: JausId,
+    pub(super) held: bool,
+    pub(super) hold: Hold,
 }
 
 impl Voice {
@@ -96,6 +106,9 @@ impl Voice {
             active: BTreeMap::new(),
             events: BTreeMap::new(),
             said: Vec::new(),
+            life: ClientLife::default(),
+            rejected: None,
+            is_closed: false,
         }
     }
 
@@ -142,6 +155,13 @@ impl Voice {
         stack: &mut Stack,
         tally: &mut Tally,
     ) {
+        let drives = is_management(request.code) || matches!(request.code, 0x0400..=0x04FF);
+        if drives
+            && needs_control(request.code)
+            && self.refuse_uncontrolled(now, request, peer, tally)
+        {
+            return;
+        }
         if self.enter(now, request, peer, stack, tally)
             || self.handle_event_request(now, request, peer, stack, tally)
         {
@@ -159,6 +179,7 @@ impl Voice {
         };
         let Some(report) = code_of(&payload).and_then(pairs::report_of) else {
             tally.add(Counter::CommandsFromRa);
+            self.note_setpoint(now, (request, &payload), peer, stack);
             return stack.send_octets(peer.id, payload);
         };
         let same = |it: &Message| {
@@ -329,6 +350,9 @@ impl Voice {
             }
             return;
         }
+        if self.is_closed {
+            return self.reject_control(request);
+        }
         if self.grips.len() >= Self::MOST_GRIPS {
             tally.refuse(now, Counter::TooManyWaiting, request.code, request.source);
             return self.reject_control(request);
@@ -339,6 +363,7 @@ impl Voice {
                     request: request.clone(),
                     peer: peer.id,
                     held: false,
+                    hold: Hold::new(),
                 };
                 self.grips.insert(id, grip);
             }
@@ -387,6 +412,7 @@ impl Voice {
                 stack.release_control(now, id);
                 self.reject_control(&request);
             }
+            ControlNews::Status(_) => {}
             ControlNews::Released => drop(self.grips.remove(&id)),
         }
     }
@@ -397,7 +423,7 @@ impl Voice {
     }
 
     /// OpenJAUS takes any confirmation for a yes, and says no by rejecting.
-    fn reject_control(&mut self, request: &Message) {
+    pub(super) fn reject_control(&mut self, request: &Message) {
         self.said.push(request.answer(REJECT_CONTROL, Bytes::new()));
     }
 }

@@ -136,8 +136,8 @@ impl<L: Language> Next<L> {
                 self.tell(StageState::Blocked, self.find(), reason).await;
             } else if let Some(reason) = down.as_deref().or(watchman.emergency()) {
                 self.tell_down(reason).await;
-            } else if self.vehicle.was_left_alone() {
-                let why = "stopped: nobody has commanded it any more".to_owned();
+            } else if let Some(cause) = self.vehicle.last_stop() {
+                let why = format!("stopped: {cause}");
                 self.tell(StageState::Idle, None, why).await;
             } else if self.vehicle.has_arrived() {
                 self.tell(StageState::Done, None, String::new()).await;

@@ -61,6 +61,12 @@ components! {
 }
 
 impl RaComponent {
+    /// Whether it moves a vehicle: a driver, from the primitive to the path segment driver.
+    #[must_use]
+    pub const fn is_driver(self) -> bool {
+        matches!(self.0, 33 | 34 | 43..=48)
+    }
+
     /// Whether it stands for its node or subsystem rather than for a service: node manager and
     /// communicator.
     #[must_use]

@@ -276,6 +276,12 @@ impl RaNode {
         self.peers.values().map(|peer| &peer.subsystem)
     }
 
+    /// When anything of an RA subsystem was heard last; `None` if it is not known now.
+    #[must_use]
+    pub fn heard(&self, subsystem: u8) -> Option<Instant> {
+        self.peers.get(&subsystem).map(|peer| peer.heard)
+    }
+
     /// What we show, node managers and communicators included.
     pub fn own(&self) -> impl Iterator<Item = &Subsystem> + '_ {
         self.own.values().map(|own| &own.subsystem)

@@ -8,8 +8,8 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
 use crate::messages::core::{
-    ConfirmControl, QueryControl, QueryTimeout, RejectControl, ReleaseControl, ReportControl,
-    ReportTimeout, RequestControl,
+    ConfirmControl, QueryControl, QueryStatus, QueryTimeout, RejectControl, ReleaseControl,
+    ReportControl, ReportStatus, ReportTimeout, RequestControl,
 };
 use crate::service::{Handled, NoAnswer, Outbox, Patience, code_of, read};
 
@@ -24,9 +24,13 @@ pub enum ControlNews {
     Granted,
     /// The peer has not granted it, and it is over.
     Refused(ControlRefused),
-    /// It was granted and is lost, for good: nobody asks again by itself.
+    /// The peer, under control, has reported another status than before, by its code in Report
+    /// Status.
+    Status(u8),
+    /// It was granted and is lost, for good: it is not requested again automatically.
     Lost(ControlLost),
-    /// It was given back: the peer has said so, or has been told often enough.
+    /// It was given back: the peer has confirmed that, or its control has timed out since, or the
+    /// peer is controlled anew.
     Released,
 }
 
@@ -71,6 +75,9 @@ pub enum ControlLost {
     /// Another client with a greater authority has it: the renewal was refused.
     #[error("another client with a greater authority has it")]
     Outranked,
+    /// The peer was started again and knows nothing of it.
+    #[error("the peer was started again, or has dropped control without notice")]
+    Restarted,
     /// The peer has not confirmed it for longer than it lasts.
     #[error("the peer has not confirmed it since {:.1} s", .0.as_secs_f64())]
     Silent(Duration),
@@ -103,6 +110,16 @@ struct Control {
     /// When the peer had to begin to count the lifetime, at the latest known.
     confirmed: Instant,
     next: Instant,
+    status: Status,
+}
+
+/// What is known of the peer's status.
+#[derive(Debug, Default)]
+struct Status {
+    reported: Option<u8>,
+    /// Queries since the last report.
+    asked: u32,
+    next: Option<Instant>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,7 +128,8 @@ enum State {
     Held,
     /// The application has not let go yet.
     Lost(ControlLost),
-    Releasing,
+    /// Since when it is being given back.
+    Releasing(Instant),
 }
 
 impl Controls {
@@ -144,9 +162,12 @@ impl Controls {
             denied: false,
             confirmed: now,
             next: now,
+            status: Status::default(),
         };
         control.ask(now, peer, out);
-        self.all.insert(peer, control);
+        if let Some(before) = self.all.insert(peer, control) {
+            self.news.push_back((before.id, ControlNews::Released));
+        }
         Ok(id)
     }
 
@@ -162,15 +183,20 @@ impl Controls {
             self.news.push_back((id, ControlNews::Released));
             return;
         }
-        if control.state == State::Releasing {
+        if matches!(control.state, State::Releasing(_)) {
             return;
         }
-        control.state = State::Releasing;
-        control.asked = 0;
+        control.state = State::Releasing(now);
         control.give_back(now, peer, out);
     }
 
-    /// Gives everything back with one word, because there will be no time for more.
+    /// Whether something is being given back, and its peer has not confirmed that.
+    pub(in crate::service) fn is_releasing(&self) -> bool {
+        let mut all = self.all.values();
+        all.any(|it| matches!(it.state, State::Releasing(_)))
+    }
+
+    /// Gives everything back.
     pub(in crate::service) fn farewell(&mut self, now: Instant, out: &mut Outbox) {
         let held: Vec<_> = self.all.values().map(|it| it.id).collect();
         for id in held {
@@ -198,6 +224,9 @@ impl Controls {
                 let controller = JausId::new(it.subsystem_id, it.node_id, it.component_id);
                 control.handle_report(now, controller == out.source())
             }),
+            Some(ReportStatus::CODE) => {
+                read::<ReportStatus>(message).and_then(|it| control.handle_status(it.status.0))
+            }
             Some(ReportTimeout::CODE) => {
                 if let Some(report) = read::<ReportTimeout>(message) {
                     control.handle_lifetime(now, report.timeout.0);
@@ -238,8 +267,14 @@ impl ControlNews {
 }
 
 impl Control {
-    /// The longest time between two renewals. JAUS++ renews as often.
-    const RENEWAL: Duration = Duration::from_millis(1250);
+    /// The longest time between two renewals. JAUS++ renews every 1.25 s.
+    const RENEWAL: Duration = Duration::from_secs(1);
+    /// Between two queries for the peer's status: often enough to be a sign of life, too, for a peer
+    /// that stops when its client has been silent for a second.
+    const STATUS: Duration = Duration::from_millis(200);
+    /// A peer without Management does not report its status, and is asked no more after so many
+    /// queries.
+    const STATUS_TRIES: u32 = 10;
     /// Between renewals while it is not known how long control lasts.
     const HASTE: Duration = Duration::from_millis(200);
     /// How often the peer is asked how long control lasts.
@@ -247,6 +282,8 @@ impl Control {
     /// Control that is not confirmed for so long is lost, however long it lasts; and so long it
     /// lasts if the peer does not say. It is JAUS++'s time-out.
     const LIFETIME: Duration = Duration::from_secs(5);
+    /// A release that is not confirmed is repeated for so long: by then control has timed out.
+    const RELEASE_LIMIT: Duration = Duration::from_secs(5);
 
     /// For how long a confirmation is good.
     fn lifetime(&self) -> Duration {
@@ -275,6 +312,11 @@ impl Control {
             self.lifetime_asked += 1;
             out.send(peer, &QueryTimeout {});
         }
+        if self.state == State::Held {
+            // Before the request: its answer shows whether the peer still knows of its client, which
+            // one that was started again does not.
+            out.send(peer, &QueryControl {});
+        }
         let authority_code = self.authority;
         out.send(peer, &RequestControl { authority_code });
         if self.asked == 0 {
@@ -290,7 +332,6 @@ impl Control {
 
     fn give_back(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
         out.send(peer, &ReleaseControl {});
-        self.asked = self.asked.saturating_add(1);
         self.next = now + self.patience.interval;
     }
 
@@ -310,6 +351,7 @@ impl Control {
                 let granted = self.state == State::Asking;
                 self.state = State::Held;
                 self.next = now + self.renewal();
+                self.status.next.get_or_insert(now);
                 granted.then_some(ControlNews::Granted)
             }
             (State::Asking, code) => Some(ControlNews::Refused(match code {
@@ -331,20 +373,30 @@ impl Control {
                 out.send(peer, &ReleaseControl {});
                 None
             }
-            (State::Lost(_) | State::Releasing, _) => None,
+            (State::Lost(_) | State::Releasing(_), _) => None,
         }
     }
 
-    /// The peer tells who controls it. What it does not renew lasts on if it lasts for ever, and
+    /// The peer reports its status.
+    fn handle_status(&mut self, status: u8) -> Option<ControlNews> {
+        self.status.asked = 0;
+        let is_news = self.status.reported.replace(status) != Some(status);
+        (is_news && self.state == State::Held).then_some(ControlNews::Status(status))
+    }
+
+    /// The peer reports who controls it. What it does not renew lasts on if it lasts for ever, and
     /// ends with its lifetime otherwise.
     fn handle_report(&mut self, now: Instant, is_ours: bool) -> Option<ControlNews> {
-        if self.state != State::Held || !self.denied {
+        if self.state != State::Held {
             return None;
         }
         if !is_ours {
-            return self.lose(ControlLost::NotAvailable);
+            return self.lose(match self.denied {
+                true => ControlLost::NotAvailable,
+                false => ControlLost::Restarted,
+            });
         }
-        if self.lifetime == Some(Duration::ZERO) {
+        if self.denied && self.lifetime == Some(Duration::ZERO) {
             self.confirmed = now;
         }
         None
@@ -354,7 +406,7 @@ impl Control {
         match (self.state, code) {
             (State::Held, 0) => self.lose(ControlLost::TakenBack),
             (State::Held, _) => self.lose(ControlLost::NotAvailable),
-            (State::Releasing, _) => Some(ControlNews::Released),
+            (State::Releasing(_), _) => Some(ControlNews::Released),
             // The end of a control before this one.
             (State::Asking | State::Lost(_), _) => None,
         }
@@ -381,6 +433,7 @@ impl Control {
         if self.poll_timeout().is_none_or(|due| due > now) {
             return None;
         }
+        self.ask_status(now, peer, out);
         let exhausted = self.asked >= self.patience.tries.max(1);
         match self.state {
             State::Asking if exhausted => {
@@ -400,12 +453,15 @@ impl Control {
                     false => ControlLost::Silent(since),
                 })
             }
+            State::Held if self.next > now => None,
             State::Asking | State::Held => {
                 self.ask(now, peer, out);
                 None
             }
-            State::Releasing if exhausted => Some(ControlNews::Released),
-            State::Releasing => {
+            State::Releasing(since) if now >= since + Self::RELEASE_LIMIT => {
+                Some(ControlNews::Released)
+            }
+            State::Releasing(_) => {
                 self.give_back(now, peer, out);
                 None
             }
@@ -413,10 +469,29 @@ impl Control {
         }
     }
 
+    /// Asks for the status of a peer under control, if it is time to.
+    fn ask_status(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
+        if self.state != State::Held || self.status.next.is_none_or(|next| next > now) {
+            return;
+        }
+        let is_silent = self.status.reported.is_none() && self.status.asked >= Self::STATUS_TRIES;
+        self.status.next = (!is_silent).then(|| now + Self::STATUS);
+        if !is_silent {
+            self.status.asked = self.status.asked.saturating_add(1);
+            out.send(peer, &QueryStatus {});
+        }
+    }
+
     fn poll_timeout(&self) -> Option<Instant> {
         match self.state {
-            State::Asking | State::Releasing => Some(self.next),
-            State::Held => Some(self.next.min(self.confirmed + self.lifetime())),
+            State::Asking | State::Releasing(_) => Some(self.next),
+            State::Held => {
+                let end = self.confirmed + self.lifetime();
+                [Some(self.next), Some(end), self.status.next]
+                    .into_iter()
+                    .flatten()
+                    .min()
+            }
             State::Lost(_) => None,
         }
     }

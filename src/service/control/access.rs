@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::{AccessControl, Control, timeout_field, with};
+use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
 use crate::messages::core::confirm_control::ResponseCode as Confirmation;
@@ -20,11 +21,16 @@ impl Control {
         access: AccessControl,
         code: u16,
         message: &Received,
+        is_alive: impl Fn(JausId) -> bool,
         out: &mut Outbox,
     ) -> Handled {
         match code {
             RequestControl::CODE => with(message, |request: RequestControl| {
-                self.request(now, access, request.authority_code, message, out);
+                if self.is_available(is_alive) {
+                    self.request(now, access, request.authority_code, message, out);
+                } else {
+                    confirm(message, Confirmation::NOT_AVAILABLE, out);
+                }
             }),
             ReleaseControl::CODE => {
                 self.release(message, out);
@@ -65,9 +71,6 @@ impl Control {
         out: &mut Outbox,
     ) {
         let client = message.source;
-        if !self.is_available() {
-            return confirm(message, Confirmation::NOT_AVAILABLE, out);
-        }
         match self.standing.controller {
             // It has made itself too weak to keep control.
             Some(controller) if controller.id == client && authority < access.authority => {
@@ -132,9 +135,16 @@ impl Control {
             })
     }
 
-    /// Whether control can be had at all.
-    const fn is_available(&self) -> bool {
-        matches!(self.standing.state, State::Ready | State::Standby)
+    /// Whether control can be had at all: also in an emergency that only the client in control can
+    /// clear, while there is none.
+    fn is_available(&self, is_alive: impl Fn(JausId) -> bool) -> bool {
+        match self.standing.state {
+            State::Ready | State::Standby => true,
+            State::Emergency => {
+                !self.emergencies.is_empty() && !self.emergencies.iter().any(|&it| is_alive(it))
+            }
+            State::Initialize | State::Shutdown | State::Failure => false,
+        }
     }
 
     /// Ends control and says so; what was ready falls back to standby.

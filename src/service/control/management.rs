@@ -29,6 +29,7 @@ impl Control {
         &mut self,
         code: u16,
         message: &Received,
+        is_alive: impl Fn(JausId) -> bool,
         out: &mut Outbox,
     ) -> Handled {
         let client = message.source;
@@ -40,7 +41,7 @@ impl Control {
             Shutdown::CODE => self.shut_down(client, out),
             // Whatever the code of the emergency is: stopping is always right.
             SetEmergency::CODE => self.set_emergency(client),
-            ClearEmergency::CODE => self.clear_emergency(client),
+            ClearEmergency::CODE => self.clear_emergency(client, is_alive),
             _ => return Handled::No,
         }
         Handled::Yes
@@ -51,7 +52,8 @@ impl Control {
         if self.management.is_none() {
             return;
         }
-        if condition == Condition::Safe {
+        if condition == Condition::Safe && self.standing.state == State::Emergency {
+            tracing::warn!(id = %out.source(), "the emergency is cleared on the vehicle itself");
             self.emergencies.clear();
             self.end_emergency();
         }
@@ -109,12 +111,11 @@ impl Control {
     }
 
     fn set_emergency(&mut self, client: JausId) {
-        if self.emergencies.len() < MOST_EMERGENCIES {
-            self.emergencies.insert(client);
+        if self.emergencies.len() < MOST_EMERGENCIES && self.emergencies.insert(client) {
+            tracing::warn!(%client, "emergency");
         }
         let state = self.standing.state;
         if state != State::Emergency {
-            tracing::warn!(%client, "emergency");
             self.resting = match state {
                 State::Ready => State::Standby,
                 other => other,
@@ -123,9 +124,17 @@ impl Control {
         }
     }
 
-    fn clear_emergency(&mut self, client: JausId) {
-        if self.emergencies.remove(&client) && self.emergencies.is_empty() {
-            tracing::info!(%client, "the last emergency is cleared");
+    /// Clears the emergency of a client; for the client in control also those of the dead.
+    fn clear_emergency(&mut self, client: JausId, is_alive: impl Fn(JausId) -> bool) {
+        let mut cleared = self.emergencies.remove(&client);
+        if self.is_controller(client) {
+            for setter in self.emergencies.extract_if(.., |&setter| !is_alive(setter)) {
+                tracing::warn!(%client, %setter, "cleared the emergency of a client that shows no life");
+                cleared = true;
+            }
+        }
+        if cleared && self.emergencies.is_empty() {
+            tracing::warn!(%client, "the last emergency is cleared");
             self.end_emergency();
         }
     }

@@ -21,10 +21,14 @@
 //!   control must say Resume. Control itself is kept, as 1.1 has it.
 //! * **Release in an emergency** is refused with Not Available whether the client was in control or
 //!   not, as the public contests' judges expect it.
-//! * **The time-out** is 0 (never) unless set, as with the vehicles that contests were won with:
-//!   the contests' operators request control once and do not renew it. A client that discovery finds
-//!   gone loses control all the same. With a time-out, control ends a quarter of it late, which
-//!   JAUS++ clients, which renew it four times in its course, never meet.
+//! * **The timeout** is 4 s by default, and ends control a quarter of it late, so that a client that
+//!   does not renew controls nothing after 5 s. JAUS++ clients renew four times in its course. The
+//!   public contests' judging tool requests control once and never renews: for that, set it to 0.
+//! * **An emergency** ends when each client that set one clears it, as the standard has it. A client
+//!   that is dead, or that never existed because its id was forged, cannot: an emergency whose setter
+//!   shows no life for 4 s may also be cleared by the client in control, and if nobody is, control
+//!   can be had again for that purpose. The application on the vehicle may end all of them
+//!   ([`Condition::Safe`]).
 
 mod access;
 mod management;
@@ -54,12 +58,16 @@ pub struct AccessControl {
 }
 
 impl AccessControl {
-    /// Obeys any client with an authority of at least 1, for as long as the client is there.
+    /// After how many seconds control ends by default that its client does not request again.
+    pub const TIMEOUT: u8 = 4;
+
+    /// Obeys any client with an authority of at least 1, until it has not requested control for
+    /// [`TIMEOUT`](Self::TIMEOUT) and a quarter of it.
     #[must_use]
     pub const fn new() -> Self {
         Self {
             authority: 1,
-            timeout: 0,
+            timeout: Self::TIMEOUT,
         }
     }
 
@@ -70,7 +78,10 @@ impl AccessControl {
         self
     }
 
-    /// After how many seconds control ends unless its client requests it again; 0 for never.
+    /// After how many seconds control ends unless its client requests it again; 0 for never. A
+    /// client that has answered Query Heartbeat Pulse before and answers no more loses control
+    /// after 4 s in any case; for one that never did, 0 means that only standby, release or an
+    /// emergency stops the component.
     #[must_use]
     pub const fn timeout(mut self, seconds: u8) -> Self {
         self.timeout = seconds;
@@ -178,22 +189,24 @@ impl Control {
         offers
     }
 
+    /// Handles a message; `is_alive` says whether a client shows life.
     pub(super) fn handle_message(
         &mut self,
         now: Instant,
         message: &Received,
+        is_alive: impl Fn(JausId) -> bool,
         out: &mut Outbox,
     ) -> Handled {
         let Some(code) = code_of(&message.payload) else {
             return Handled::No;
         };
         if let Some(access) = self.access
-            && self.handle_access(now, access, code, message, out) == Handled::Yes
+            && self.handle_access(now, access, code, message, &is_alive, out) == Handled::Yes
         {
             return Handled::Yes;
         }
         if self.management.is_some() {
-            self.handle_management(code, message, out)
+            self.handle_management(code, message, is_alive, out)
         } else {
             Handled::No
         }
@@ -227,13 +240,27 @@ impl Control {
         }
     }
 
-    fn is_controller(&self, client: JausId) -> bool {
+    pub(super) fn is_controller(&self, client: JausId) -> bool {
         self.standing
             .controller
             .is_some_and(|controller| controller.id == client)
     }
 
-    /// Begins the time-out anew.
+    pub(super) const fn has_management(&self) -> bool {
+        self.management.is_some()
+    }
+
+    /// Whether control ends that is not renewed.
+    pub(super) fn has_timeout(&self) -> bool {
+        self.access.is_some_and(|access| access.timeout > 0)
+    }
+
+    /// Whether a client has set an emergency that is not over.
+    pub(super) fn has_emergency_of(&self, client: JausId) -> bool {
+        self.emergencies.contains(&client)
+    }
+
+    /// Begins the timeout anew.
     fn renew(&mut self, now: Instant) {
         let seconds = self.access.map_or(0, |access| access.timeout);
         let timeout = Duration::from_secs(seconds.into());

@@ -198,10 +198,121 @@ fn control_that_is_not_renewed_times_out() {
 }
 
 #[test]
-fn control_without_a_time_out_lasts() {
+fn by_default_control_ends_within_5_s_of_the_last_request() {
     let mut rig = Rig::ready();
-    rig.pass(Duration::from_secs(3600));
+    rig.run(Duration::from_millis(4990));
     assert_eq!(rig.state(), State::Ready);
+    rig.run(Duration::from_millis(10));
+    assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
+}
+
+/// A component whose client need not renew control.
+fn lasting() -> Rig {
+    let access = AccessControl::new().timeout(0);
+    let mut rig = Rig::with(|stack| stack.management(Management::new().access_control(access)));
+    rig.request(FIRST, 100);
+    rig.hear(FIRST, &Resume);
+    rig
+}
+
+#[test]
+fn control_without_a_timeout_lasts_while_its_client_shows_life() {
+    let mut rig = lasting();
+    rig.run(Duration::from_secs(3600));
+    assert_eq!(rig.state(), State::Ready);
+}
+
+#[test]
+fn a_client_that_has_answered_before_and_is_silent_for_4_s_is_dead() {
+    let mut rig = lasting();
+    rig.run(Duration::from_secs(10));
+    rig.dead.push(FIRST);
+    // The last answer came at most a second before.
+    rig.run(Duration::from_millis(4000));
+    assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
+}
+
+#[test]
+fn a_client_that_never_answers_is_left_to_the_timeout() {
+    let mut rig = lasting();
+    rig.dead.push(FIRST);
+    rig.run(Duration::from_secs(600));
+    assert_eq!(rig.state(), State::Ready);
+}
+
+#[test]
+fn acknowledgements_are_signs_of_life_of_a_client_that_answers_no_probe() {
+    let mut rig = lasting();
+    rig.dead.push(FIRST);
+    for _second in 0..20 {
+        rig.run(Duration::from_secs(1));
+        rig.stack.handle_acknowledged(rig.now, FIRST);
+    }
+    assert_eq!(rig.state(), State::Ready);
+    rig.run(Duration::from_secs(4));
+    assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
+}
+
+#[test]
+fn acknowledgements_are_no_signs_of_life_of_a_client_that_has_answered_before() {
+    let mut rig = lasting();
+    rig.run(Duration::from_secs(10));
+    rig.dead.push(FIRST);
+    for _second in 0..4 {
+        rig.run(Duration::from_secs(1));
+        rig.stack.handle_acknowledged(rig.now, FIRST);
+    }
+    assert_eq!(
+        rig.state(),
+        State::Standby,
+        "its node acknowledges, and it hangs"
+    );
+}
+
+#[test]
+fn the_emergency_of_a_dead_client_is_cleared_by_the_client_in_control() {
+    let mut rig = lasting();
+    rig.hear(THIRD, &STOP);
+    rig.hear(FIRST, &CLEAR);
+    assert_eq!(rig.state(), State::Emergency, "its setter lives");
+    rig.dead.push(THIRD);
+    rig.run(Duration::from_secs(5));
+    rig.hear(SECOND, &CLEAR);
+    assert_eq!(rig.state(), State::Emergency, "it is not in control");
+    rig.hear(FIRST, &CLEAR);
+    assert_eq!(
+        (rig.controller(), rig.state()),
+        (Some((FIRST, 100)), State::Standby)
+    );
+}
+
+#[test]
+fn a_forged_emergency_without_a_client_in_control_can_be_cleared_too() {
+    let mut rig = Rig::managed();
+    rig.dead.push(THIRD);
+    rig.hear(THIRD, &STOP);
+    let refused = confirmed(FIRST, Confirmation::NOT_AVAILABLE);
+    assert_eq!(rig.request(FIRST, 100), [refused]);
+    rig.run(Duration::from_secs(4));
+    assert_eq!(
+        rig.request(FIRST, 100),
+        [confirmed(FIRST, Confirmation::CONTROL_ACCEPTED)]
+    );
+    assert_eq!(rig.state(), State::Emergency);
+    rig.hear(FIRST, &CLEAR);
+    assert_eq!(rig.state(), State::Standby);
+}
+
+#[test]
+fn a_setter_that_shows_life_again_is_alive() {
+    let mut rig = lasting();
+    rig.hear(THIRD, &STOP);
+    rig.dead.push(THIRD);
+    rig.run(Duration::from_secs(10));
+    rig.dead.clear();
+    rig.hear(THIRD, &QueryStatus);
+    rig.hear(FIRST, &CLEAR);
+    assert_eq!(rig.state(), State::Emergency);
 }
 
 #[test]

@@ -51,7 +51,7 @@ use crate::messages::core::{
     QuerySubsystemList, RegisterServices, ReportConfiguration, ReportIdentification,
     ReportServices,
 };
-use pace::Budget;
+pub(super) use pace::Budget;
 pub use profile::{Profile, Scope, Timing};
 use search::Search;
 

@@ -33,7 +33,7 @@ impl Jitter {
 
 /// A token bucket: a burst now and then, and a rate in the long run.
 #[derive(Debug, Clone)]
-pub(super) struct Budget {
+pub(in crate::service) struct Budget {
     burst: u32,
     /// The time in which one token comes back.
     refill: Duration,
@@ -44,7 +44,7 @@ pub(super) struct Budget {
 
 impl Budget {
     /// A full bucket.
-    pub(super) const fn new(burst: u32, refill: Duration) -> Self {
+    pub(in crate::service) const fn new(burst: u32, refill: Duration) -> Self {
         Self {
             burst,
             refill,
@@ -54,7 +54,7 @@ impl Budget {
     }
 
     /// Takes a token if there is one.
-    pub(super) fn take(&mut self, now: Instant) -> bool {
+    pub(in crate::service) fn take(&mut self, now: Instant) -> bool {
         self.take_above(0, now)
     }
 

@@ -183,6 +183,11 @@ impl Events {
         }
     }
 
+    /// Whether a client holds any subscription.
+    pub(super) fn has(&self, client: JausId) -> bool {
+        self.table.of(client).next().is_some()
+    }
+
     fn update(&self, message: &Received, update: &UpdateEvent, out: &mut Outbox) -> Outcome {
         let name = (message.source, update.event_id);
         if self.table.get(name).is_none() {

@@ -89,6 +89,7 @@ mod tests {
     use super::*;
     use crate::actuator::{MotorConfig, SimulatedMotor, Wheels, WheelsConfig};
     use crate::messages::mobility::SetWrenchEffort;
+    use crate::service::MotionPolicy;
     use crate::service::rig::{CLIENT, Rig};
     use crate::vehicle::{Frame, Pilot};
 
@@ -97,7 +98,8 @@ mod tests {
         let odometer = Odometer::new(77);
         let motor = || SimulatedMotor::new(MotorConfig::default());
         let wheels = Wheels::new(motor(), motor(), WheelsConfig::default(), odometer.clone());
-        let vehicle = Vehicle::new(Pilot::new(wheels, Frame::default()));
+        let pilot = Pilot::new(wheels, Frame::default());
+        let vehicle = Vehicle::new(pilot).motion_policy(MotionPolicy::Hold);
         let odometry = WheelOdometry::new(odometer, vehicle.clone());
         let driver = vehicle.primitive_driver();
         let mut rig = Rig::new(vec![Box::new(driver), Box::new(odometry)]);

@@ -17,7 +17,9 @@ use crate::messages::ground::{
     SetDestination, StopMission, mission_planner, report_mission,
 };
 use crate::mission::{Destination, Mission, Path, Report, Settings};
-use crate::service::{Context, Handled, Service, Standing, State, code_of, read};
+use crate::service::{
+    Context, Handled, Hazards, Service, Standing, State, StopCause, code_of, read,
+};
 
 /// A planner's mission, shared by the service and whoever carries it out.
 #[derive(Clone)]
@@ -150,6 +152,21 @@ impl Service for MissionPlanner {
             _ => return Handled::No,
         }
         Handled::Yes
+    }
+
+    fn hazards(&self) -> Hazards {
+        Hazards {
+            acts_on: Some(SetDestination::NAME),
+            stops: true,
+            ..Hazards::default()
+        }
+    }
+
+    fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
+        // The other causes are changes of the standing, which say more.
+        if *cause == StopCause::Ended {
+            self.tell(context, |mission| mission.stop("the planner has ended"));
+        }
     }
 
     fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {

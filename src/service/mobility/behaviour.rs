@@ -13,6 +13,16 @@ pub(super) trait Behaviour: Send {
     /// Deals with a message that has this code.
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled;
 
+    /// The name of a command that moves the vehicle, if this service takes one.
+    fn acts_on(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// The name of a command that sets something up, if this service takes one.
+    fn set_up_by(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Whether this service tells the end of commands with this code.
     fn tells_end_of(&self, command: u16) -> bool {
         let _ = command;
@@ -24,7 +34,7 @@ pub(super) trait Behaviour: Send {
         let _ = (cockpit, context);
     }
 
-    /// The vehicle has been stopped, because the component may no longer act.
+    /// The vehicle has been stopped: what was commanded, or kept in standby, counts no more.
     fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
         let _ = (cockpit, context);
     }

@@ -3,6 +3,8 @@
 //!
 //! A component has one of each, whichever of its drivers is asked.
 
+use std::time::{Duration, Instant};
+
 use super::clock::SampleClock;
 use super::place::Place;
 use crate::messages::core::set_element::ElementRec;
@@ -11,8 +13,8 @@ use crate::messages::mobility::{
     QueryGlobalWaypointExt, QueryLocalPathSegment, QueryLocalPathSegmentExt, QueryLocalWaypoint,
     QueryLocalWaypointExt, QueryTravelSpeed, QueryTravelSpeedExt,
 };
-use crate::service::{Context, Elements, State};
-use crate::vehicle::{Pilot, Ticket};
+use crate::service::{Context, Elements, MotionGuard, State, StopCause};
+use crate::vehicle::{Pilot, Ticket, Trouble};
 
 /// A journey to a place, or along a list of places.
 #[derive(Debug, Default)]
@@ -48,9 +50,21 @@ impl Travel {
     }
 }
 
+/// A vehicle under way that is looked at only after so long was held up with all that steers it:
+/// what its client wanted before counts no more.
+const HUNG: Duration = Duration::from_millis(500);
+/// Between two looks at a vehicle in trouble.
+const LOOK: Duration = Duration::from_millis(100);
+
 /// What the services of a vehicle share.
 pub(super) struct Cockpit {
     pub(super) pilot: Pilot,
+    pub(super) guard: MotionGuard,
+    /// How often it has been stopped, for each service to see that it was.
+    pub(super) stops: u64,
+    /// What keeps it from driving until it is gone.
+    trouble: Option<StopCause>,
+    looked: Option<Instant>,
     /// The list that the list drivers work off.
     pub(super) elements: Elements,
     pub(super) travel: Travel,
@@ -64,11 +78,84 @@ impl Cockpit {
     pub(super) fn new(pilot: Pilot) -> Self {
         Self {
             pilot,
+            guard: MotionGuard::default(),
+            stops: 0,
+            trouble: None,
+            looked: None,
             elements: Elements::new(),
             travel: Travel::default(),
             clock: None,
             magnetic_variation: 0.0,
         }
+    }
+
+    /// Moves on to `now`, and stops at the end of the setpoint in force, or in trouble.
+    pub(super) fn advance(&mut self, now: Instant, context: &mut Context<'_>) {
+        self.guard.note_life(|owner| context.last_sign(owner));
+        let gap = now.saturating_duration_since(self.looked.unwrap_or(now));
+        let is_hung = gap > HUNG && self.pilot.is_under_way();
+        self.advance_within(now);
+        if let Some(cause) = self.guard.expire(now) {
+            self.halt(&cause);
+        }
+        self.pilot.handle_time(now);
+        self.looked = Some(now);
+        let hung = is_hung.then_some(StopCause::Hung(gap));
+        self.follow_trouble(hung, now, context);
+    }
+
+    /// Moves on to `now`, but not beyond the end of the setpoint in force.
+    pub(super) fn advance_within(&mut self, now: Instant) {
+        let end = self.guard.expires_at().unwrap_or(now);
+        self.pilot.handle_time(now.min(end));
+    }
+
+    /// The one stop of a vehicle.
+    pub(super) fn halt(&mut self, cause: &StopCause) {
+        if self.guard.is_active() || self.pilot.is_under_way() {
+            self.stops += 1;
+        }
+        self.guard.stop(cause.clone());
+        self.pilot.stop();
+    }
+
+    /// A vehicle in trouble puts its component into failure, until the trouble is gone.
+    fn follow_trouble(&mut self, hung: Option<StopCause>, now: Instant, context: &mut Context<'_>) {
+        let trouble = self.pilot.take_trouble().or_else(|| self.pilot.fault());
+        if let Some(cause) = hung.or_else(|| trouble.map(StopCause::from)) {
+            if self.trouble.is_none() {
+                self.halt(&cause);
+                context.fail(cause.clone());
+                self.trouble = Some(cause);
+            }
+        } else if let Some(cause) = &self.trouble {
+            let is_gone = match cause {
+                StopCause::Fault(_) | StopCause::Hung(_) => true,
+                _ => self.pilot.pose_trouble(now).is_none(),
+            };
+            if is_gone {
+                self.trouble = None;
+                context.recover();
+            }
+        }
+    }
+
+    /// Whether something keeps it from driving.
+    pub(super) const fn is_in_trouble(&self) -> bool {
+        self.trouble.is_some()
+    }
+
+    /// When to look again whether the trouble is gone.
+    pub(super) fn next_look(&self) -> Option<Instant> {
+        self.looked
+            .filter(|_| self.trouble.is_some())
+            .map(|at| at + LOOK)
+    }
+
+    /// Whether it drives to a place.
+    pub(super) fn is_travelling(&self) -> bool {
+        let ticket = self.travel.ticket;
+        ticket.is_some_and(|ticket| self.pilot.pursues(ticket))
     }
 
     /// How many elements of the list lie before the one that is driven to, in percent of all.
@@ -93,14 +180,21 @@ impl Cockpit {
             .is_some()
     }
 
-    /// Sets the place to drive to, for a command with this code, and sets out if there is a speed.
-    pub(super) fn set_place(&mut self, place: Place, command: u16, context: &mut Context<'_>) {
+    /// Sets the place to drive to, for a command with this code, and sets out if it acts and there is
+    /// a speed.
+    pub(super) fn set_place(
+        &mut self,
+        place: Place,
+        command: u16,
+        acts: bool,
+        context: &mut Context<'_>,
+    ) {
         self.take_up(command, context);
         self.travel.place = Some(place);
         self.travel.start = self.here();
         self.travel.active = None;
         self.travel.next = 0;
-        self.set_out();
+        self.set_out(acts);
     }
 
     /// From now on the journey is for another command.
@@ -119,33 +213,33 @@ impl Cockpit {
         }
     }
 
-    /// Changes the speed, and sets out or stops accordingly.
-    pub(super) fn set_speed(&mut self, speed: f64) {
+    /// Changes the speed; if it acts, sets out or stops accordingly.
+    pub(super) fn set_speed(&mut self, speed: f64, acts: bool) {
         self.travel.speed = speed;
         match self.travel.ticket.filter(|_| speed > 0.0) {
             Some(ticket) if self.pilot.pursues(ticket) => self.pilot.set_speed(ticket, speed),
-            _ => self.set_out(),
+            _ => self.set_out(acts),
         }
     }
 
     /// Works the list off from an element on; 0 stands for the first one. Says whether that is in
     /// the list.
-    pub(super) fn execute(&mut self, uid: u16, speed: f64) -> bool {
+    pub(super) fn execute(&mut self, uid: u16, speed: f64, acts: bool) -> bool {
         let Some(element) = self.elements.get(uid) else {
             return false;
         };
         self.travel.start = self.here();
-        self.begin(&element, speed);
+        self.begin(&element, speed, acts);
         true
     }
 
     /// Drives to an element of the list.
-    fn begin(&mut self, element: &ElementRec, speed: f64) {
+    fn begin(&mut self, element: &ElementRec, speed: f64, acts: bool) {
         self.travel.place = Place::of(element);
         self.travel.active = Some(element.element_uid);
         self.travel.next = element.next_uid;
         self.travel.speed = speed;
-        self.set_out();
+        self.set_out(acts);
     }
 
     /// Where the vehicle is, in the local frame.
@@ -154,12 +248,12 @@ impl Cockpit {
         (pose.x, pose.y)
     }
 
-    /// Drives to the place if there is a speed, and stops otherwise.
-    fn set_out(&mut self) {
+    /// Drives to the place if it acts and there is a speed, and stops otherwise.
+    fn set_out(&mut self, acts: bool) {
         let Travel {
             speed, next, start, ..
         } = self.travel;
-        let place = self.travel.place.filter(|_| speed > 0.0);
+        let place = self.travel.place.filter(|_| acts && speed > 0.0);
         let goal = place.and_then(|place| place.goal(self.pilot.frame(), start, speed, next != 0));
         if let Some(goal) = goal {
             self.travel.ticket = Some(self.pilot.pursue(goal));
@@ -183,7 +277,7 @@ impl Cockpit {
         let is_under_way = |ticket| self.pilot.pursues(ticket) && !self.pilot.has_arrived(ticket);
         if on_globe && self.travel.ticket.is_some_and(is_under_way) {
             self.travel.start = self.here();
-            self.set_out();
+            self.set_out(true);
         }
     }
 
@@ -210,9 +304,11 @@ impl Cockpit {
             self.abandon(context);
             return;
         };
-        if self.travel.next != element.next_uid {
+        let place = Place::of(&element);
+        if self.travel.next != element.next_uid || self.travel.place != place {
             self.travel.next = element.next_uid;
-            self.set_out();
+            self.travel.place = place;
+            self.set_out(true);
         } else if self.pilot.has_arrived(ticket) {
             tracing::info!(element = active, next = element.next_uid, "element reached");
             // The next way begins where this one should have ended.
@@ -222,7 +318,7 @@ impl Cockpit {
             }
             let next = self.elements.get(element.next_uid);
             match next.filter(|_| element.next_uid != 0) {
-                Some(next) => self.begin(&next, self.travel.speed),
+                Some(next) => self.begin(&next, self.travel.speed, true),
                 None => {
                     self.travel.active = None;
                     self.finish(true, context);
@@ -258,4 +354,14 @@ pub(super) fn changed(context: &mut Context<'_>) {
     context.changed::<QueryLocalPathSegmentExt>();
     context.changed::<QueryGlobalPathSegment>();
     context.changed::<QueryGlobalPathSegmentExt>();
+}
+
+impl From<Trouble> for StopCause {
+    fn from(trouble: Trouble) -> Self {
+        match trouble {
+            Trouble::Fault(what) => Self::Fault(what),
+            Trouble::PoseStale(age) => Self::PoseStale(age),
+            Trouble::PoseUnknown => Self::PoseUnknown,
+        }
+    }
 }

@@ -4,10 +4,19 @@ use std::time::{Duration, Instant};
 
 use super::clock;
 use super::cockpit::Cockpit;
+use crate::address::JausId;
 use crate::codec::{Message, OutOfRange};
 use crate::endpoint::Received;
 use crate::messages::mobility::report_local_pose::TimeStamp;
-use crate::service::{Context, Standing, read};
+use crate::service::{Context, Standing, State, Validity, read};
+use crate::vehicle::{Goal, Ticket};
+
+/// A command of the client in control.
+pub(super) struct Command<M> {
+    pub(super) message: M,
+    /// Whether the vehicle acts on it, or only keeps it.
+    pub(super) acts: bool,
+}
 
 /// One message, with the vehicle and the context in which it came.
 pub(super) struct Exchange<'a, 'c> {
@@ -28,13 +37,32 @@ impl Exchange<'_, '_> {
         self.read_if(Standing::obeys)
     }
 
-    /// Reads what makes the vehicle act; only the client in control may, while the component is
-    /// ready.
-    pub(super) fn command<M: Message>(&self) -> Option<M> {
-        self.read_if(Standing::acts_for)
+    /// Reads a command of the client in control. In standby it is to be kept and reported, and
+    /// nothing moves by it, also not later; the public contests' judges look for that.
+    pub(super) fn command<M: Message>(&self) -> Option<Command<M>> {
+        let may = |standing: &Standing, client| match standing.state {
+            State::Ready | State::Standby => standing.obeys(client),
+            _ => false,
+        };
+        let message = self.read_if(may)?;
+        let is_ready = self.context.standing().acts_for(self.message.source);
+        let acts = is_ready && !self.cockpit.is_in_trouble();
+        Some(Command { message, acts })
     }
 
-    fn read_if<M: Message>(&self, may: fn(&Standing, crate::address::JausId) -> bool) -> Option<M> {
+    /// Pursues a goal on behalf of the sender for as long as its command is valid.
+    pub(super) fn pursue(&mut self, goal: Goal, validity: Validity) -> Ticket {
+        self.accept(validity);
+        self.cockpit.pilot.pursue(goal)
+    }
+
+    /// The sender's command is in force from now on.
+    pub(super) fn accept(&mut self, validity: Validity) {
+        let guard = &mut self.cockpit.guard;
+        guard.accept(self.now, self.message.source, validity);
+    }
+
+    fn read_if<M: Message>(&self, may: impl Fn(&Standing, JausId) -> bool) -> Option<M> {
         let (standing, source) = (self.context.standing(), self.message.source);
         if may(standing, source) {
             return read(self.message);

@@ -66,6 +66,10 @@ impl Behaviour for GlobalPoseSensor {
         Handled::Yes
     }
 
+    fn set_up_by(&self) -> Option<&'static str> {
+        Some(SetGlobalPose::NAME)
+    }
+
     fn handle_motion(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
         changed(context);
     }

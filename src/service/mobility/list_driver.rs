@@ -9,7 +9,8 @@ use super::cockpit::Cockpit;
 use super::exchange::Exchange;
 use super::kind::Kind;
 use super::travel;
-use crate::codec::ServiceId;
+use crate::codec::{Message, ServiceId};
+use crate::messages::mobility::ExecuteList;
 use crate::service::{Context, Elements, Handled};
 
 /// A driver to the places of one kind in a list, one after the other.
@@ -33,6 +34,10 @@ impl<K: Kind> Behaviour for ListDriver<K> {
             Handled::Yes => Handled::Yes,
             Handled::No => travel::handle_list(code, exchange),
         }
+    }
+
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(ExecuteList::NAME)
     }
 
     fn tells_end_of(&self, command: u16) -> bool {

@@ -52,6 +52,10 @@ impl Behaviour for LocalPoseSensor {
         Handled::Yes
     }
 
+    fn set_up_by(&self) -> Option<&'static str> {
+        Some(SetLocalPose::NAME)
+    }
+
     fn handle_motion(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
         changed(context);
     }

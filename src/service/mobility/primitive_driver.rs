@@ -3,14 +3,14 @@
 use super::behaviour::Behaviour;
 use super::both_versions;
 use super::cockpit::Cockpit;
-use super::exchange::Exchange;
+use super::exchange::{Command, Exchange};
 use super::wanted::Wanted;
 use crate::codec::{Message, ServiceId};
 use crate::messages::mobility::report_wrench_effort as fields;
 use crate::messages::mobility::{
     QueryWrenchEffort, ReportWrenchEffort, SetWrenchEffort, primitive_driver,
 };
-use crate::service::{Context, Handled};
+use crate::service::{Context, Handled, Validity};
 use crate::vehicle::{Effort, Goal, Ticket};
 
 /// Of the twelve efforts of the message a ground vehicle has four: along X, about Z, and their
@@ -29,8 +29,8 @@ impl Behaviour for PrimitiveDriver {
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
             SetWrenchEffort::CODE => {
-                if let Some(effort) = exchange.command() {
-                    self.set(effort, exchange);
+                if let Some(command) = exchange.command() {
+                    self.set(command, exchange);
                 }
             }
             QueryWrenchEffort::CODE => {
@@ -44,6 +44,10 @@ impl Behaviour for PrimitiveDriver {
         Handled::Yes
     }
 
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(SetWrenchEffort::NAME)
+    }
+
     fn handle_stop(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
         *self = Self::default();
         context.changed::<QueryWrenchEffort>();
@@ -51,7 +55,8 @@ impl Behaviour for PrimitiveDriver {
 }
 
 impl PrimitiveDriver {
-    fn set(&mut self, message: SetWrenchEffort, exchange: &mut Exchange<'_, '_>) {
+    fn set(&mut self, command: Command<SetWrenchEffort>, exchange: &mut Exchange<'_, '_>) {
+        let Command { message, acts } = command;
         let share = |percent: Option<f64>| percent.unwrap_or_default() / 100.0;
         let effort = Effort {
             forward: share(message.propulsive_linear_effort_x_percent()),
@@ -59,8 +64,8 @@ impl PrimitiveDriver {
             brake: share(message.resistive_linear_effort_x_percent()),
             turn_brake: share(message.resistive_rotational_effort_z_percent()),
         };
-        tracing::info!(source = %exchange.message.source, ?effort, "wrench effort set");
-        self.ticket = Some(exchange.cockpit.pilot.pursue(Goal::Effort(effort)));
+        tracing::debug!(source = %exchange.message.source, ?effort, acts, "wrench effort set");
+        self.ticket = acts.then(|| exchange.pursue(Goal::Effort(effort), Validity::Brief));
         self.effort = message;
         exchange.context.changed::<QueryWrenchEffort>();
     }

@@ -16,7 +16,7 @@ use crate::messages::core::set_element::{ElementDataFormat, ElementRec, RequestI
 use crate::messages::core::{ConfirmElementRequest, RejectElementRequest, SetElement};
 use crate::messages::mobility::{ExecuteList, SetLocalWaypoint};
 use crate::service::rig::{CLIENT, Rig, STRANGER};
-use crate::service::{Service, State, Time, TimeOfDay};
+use crate::service::{MotionPolicy, Service, State, Time, TimeOfDay};
 use crate::vehicle::{Frame, Motion, Observed, Pilot, SkidSteer, SkidSteerConfig};
 
 /// Berlin, where the vehicle of the tests stands.
@@ -24,7 +24,8 @@ const FRAME: (f64, f64) = (52.5, 13.4);
 
 fn vehicle() -> Vehicle {
     let rover = SkidSteer::new(SkidSteerConfig::default());
-    Vehicle::new(Pilot::new(rover, Frame::at(FRAME.0, FRAME.1)))
+    // One command is enough for as long as its client lives.
+    Vehicle::new(Pilot::new(rover, Frame::at(FRAME.0, FRAME.1))).motion_policy(MotionPolicy::Hold)
 }
 
 /// All services on one vehicle, Ready and controlled by [`CLIENT`].

@@ -2,7 +2,7 @@
 //! and the execution of a list.
 
 use super::cockpit::changed;
-use super::exchange::Exchange;
+use super::exchange::{Command, Exchange};
 use crate::codec::Message;
 use crate::messages::mobility::set_travel_speed_ext::{Speed, SpeedSpeedOverGround};
 use crate::messages::mobility::{
@@ -10,20 +10,21 @@ use crate::messages::mobility::{
     ReportActiveElement, ReportTravelSpeed, ReportTravelSpeedExt, SetTravelSpeed,
     SetTravelSpeedExt,
 };
-use crate::service::Handled;
+use crate::service::{Handled, Validity};
 
 /// What drivers to a single place do with messages about the travel speed.
 pub(super) fn handle_speed(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
     match code {
         SetTravelSpeed::CODE => {
-            if let Some(message) = exchange.command::<SetTravelSpeed>() {
-                set_speed(message.speed_m_per_s(), exchange);
+            if let Some(Command { message, acts }) = exchange.command::<SetTravelSpeed>() {
+                set_speed(message.speed_m_per_s(), acts, exchange);
             }
         }
         SetTravelSpeedExt::CODE => {
-            let message = exchange.command::<SetTravelSpeedExt>();
-            if let Some(speed) = message.and_then(|message| metres_per_second(message.speed)) {
-                set_speed(speed, exchange);
+            if let Some(Command { message, acts }) = exchange.command::<SetTravelSpeedExt>()
+                && let Some(speed) = metres_per_second(message.speed)
+            {
+                set_speed(speed, acts, exchange);
             }
         }
         _ => return handle_query(code, exchange),
@@ -40,16 +41,16 @@ pub(super) const fn tells_end_of(command: u16) -> bool {
 pub(super) fn handle_list(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
     match code {
         ExecuteList::CODE => {
-            if let Some(message) = exchange.command::<ExecuteList>() {
+            if let Some(Command { message, acts }) = exchange.command::<ExecuteList>() {
                 let speed = message.speed_m_per_s();
-                execute(code, message.element_uid, speed, exchange);
+                execute(code, message.element_uid, speed, acts, exchange);
             }
         }
         ExecuteListExt::CODE => {
-            if let Some(message) = exchange.command::<ExecuteListExt>()
+            if let Some(Command { message, acts }) = exchange.command::<ExecuteListExt>()
                 && let Some(speed) = metres_per_second(message.speed)
             {
-                execute(code, message.element_uid, speed, exchange);
+                execute(code, message.element_uid, speed, acts, exchange);
             }
         }
         QueryActiveElement::CODE => {
@@ -79,11 +80,12 @@ fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
 }
 
 /// A speed for a place; without a place there is nothing to drive to.
-fn set_speed(speed: f64, exchange: &mut Exchange<'_, '_>) {
+fn set_speed(speed: f64, acts: bool, exchange: &mut Exchange<'_, '_>) {
     let source = exchange.message.source;
     if exchange.cockpit.travel.has_place() {
-        tracing::info!(%source, speed, "travel speed set");
-        exchange.cockpit.set_speed(speed);
+        tracing::info!(%source, speed, acts, "travel speed set");
+        exchange.cockpit.set_speed(speed, acts);
+        accept(exchange);
         changed(exchange.context);
     } else {
         tracing::info!(%source, "travel speed ignored: there is no waypoint yet");
@@ -92,24 +94,32 @@ fn set_speed(speed: f64, exchange: &mut Exchange<'_, '_>) {
 
 /// Begins with an element of the list; without one, the speed of a list that is being worked off
 /// is changed.
-fn execute(code: u16, uid: Option<u16>, speed: f64, exchange: &mut Exchange<'_, '_>) {
+fn execute(code: u16, uid: Option<u16>, speed: f64, acts: bool, exchange: &mut Exchange<'_, '_>) {
     let source = exchange.message.source;
     match uid {
-        Some(uid) if !exchange.cockpit.execute(uid, speed) => {
+        Some(uid) if !exchange.cockpit.execute(uid, speed, acts) => {
             tracing::info!(%source, uid, "list not executed: there is no such element");
             return;
         }
         Some(uid) => {
-            tracing::info!(%source, uid, speed, "list executed");
+            tracing::info!(%source, uid, speed, acts, "list executed");
             exchange.cockpit.take_up(code, exchange.context);
         }
         None if exchange.cockpit.travel.active().is_some() => {
             tracing::info!(%source, speed, "travel speed of the list set");
-            exchange.cockpit.set_speed(speed);
+            exchange.cockpit.set_speed(speed, acts);
         }
         None => tracing::info!(%source, "travel speed ignored: no list is executed"),
     }
+    accept(exchange);
     changed(exchange.context);
+}
+
+/// A journey that has been set out on is in force until it is done.
+pub(super) fn accept(exchange: &mut Exchange<'_, '_>) {
+    if exchange.cockpit.is_travelling() {
+        exchange.accept(Validity::UntilDone);
+    }
 }
 
 /// A speed over ground. Through still air that is also the one relative to the medium; rotations

@@ -2,7 +2,7 @@
 
 use super::behaviour::Behaviour;
 use super::cockpit::Cockpit;
-use super::exchange::Exchange;
+use super::exchange::{Command, Exchange};
 use super::wanted::Wanted;
 use crate::codec::{Message, OutOfRange, ServiceId};
 use crate::messages::mobility::{
@@ -13,8 +13,8 @@ use crate::messages::mobility::{
     report_local_vector_ext,
 };
 use crate::service::mobility::travel::metres_per_second;
-use crate::service::{Context, Handled};
-use crate::vehicle::{Goal, Ticket};
+use crate::service::{Context, Handled, Validity};
+use crate::vehicle::{Goal, Heading, Ticket};
 
 /// The speed and heading that a client wants.
 #[derive(Debug, Default, Clone, Copy)]
@@ -35,32 +35,34 @@ pub(super) struct LocalVectorDriver(Vector);
 pub(super) struct GlobalVectorDriver(Vector);
 
 impl Vector {
-    /// Sets out; the headings of this driver are measured from one that lies `origin` radians
-    /// clockwise from the local X axis.
+    /// Keeps a vector, and sets out if the vehicle is to act; `origin` says what the headings of this
+    /// driver are measured from.
     fn set(
         &mut self,
-        speed: f64,
-        heading: Option<f64>,
-        origin: f64,
+        (speed, heading): (f64, Option<f64>),
+        origin: fn(f64) -> Heading,
+        acts: bool,
         exchange: &mut Exchange<'_, '_>,
     ) {
-        tracing::info!(source = %exchange.message.source, speed, heading, "vector set");
+        tracing::debug!(source = %exchange.message.source, speed, heading, acts, "vector set");
         let goal = Goal::Vector {
             speed,
-            heading: heading.map(|heading| heading + origin),
+            heading: heading.map(origin),
         };
         *self = Self {
             speed,
             heading,
-            ticket: Some(exchange.cockpit.pilot.pursue(goal)),
+            ticket: acts.then(|| exchange.pursue(goal, Validity::WhileAlive)),
         };
         changed(exchange.context);
     }
 
-    /// What is in force: nothing if another driver has taken over.
+    /// What is in force, or is kept in standby: nothing if another driver has replaced it.
     fn current(&self, cockpit: &Cockpit) -> Self {
-        let ticket = self.ticket.filter(|&ticket| cockpit.pilot.pursues(ticket));
-        ticket.map_or_else(Self::default, |_| *self)
+        match self.ticket {
+            Some(ticket) if !cockpit.pilot.pursues(ticket) => Self::default(),
+            _ => *self,
+        }
     }
 }
 
@@ -79,16 +81,17 @@ impl Behaviour for LocalVectorDriver {
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         match code {
             SetLocalVector::CODE => {
-                if let Some(message) = exchange.command::<SetLocalVector>() {
-                    let heading = message.heading_rad();
-                    self.0.set(message.speed_m_per_s(), heading, 0.0, exchange);
+                if let Some(Command { message, acts }) = exchange.command::<SetLocalVector>() {
+                    let vector = (message.speed_m_per_s(), message.heading_rad());
+                    self.0.set(vector, Heading::Local, acts, exchange);
                 }
             }
             SetLocalVectorExt::CODE => {
-                if let Some(message) = exchange.command::<SetLocalVectorExt>()
+                if let Some(Command { message, acts }) = exchange.command::<SetLocalVectorExt>()
                     && let Some(speed) = metres_per_second(message.speed)
                 {
-                    self.0.set(speed, message.heading_rad(), 0.0, exchange);
+                    let vector = (speed, message.heading_rad());
+                    self.0.set(vector, Heading::Local, acts, exchange);
                 }
             }
             QueryLocalVector::CODE => {
@@ -110,6 +113,10 @@ impl Behaviour for LocalVectorDriver {
         Handled::Yes
     }
 
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(SetLocalVector::NAME)
+    }
+
     fn handle_stop(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
         *self = Self::default();
         changed(context);
@@ -122,19 +129,21 @@ impl Behaviour for GlobalVectorDriver {
     }
 
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
-        let north = -exchange.cockpit.pilot.frame().heading;
         match code {
             SetGlobalVector::CODE => {
-                if let Some(message) = exchange.command::<SetGlobalVector>() {
-                    let speed = message.speed_m_per_s().unwrap_or(self.0.speed);
-                    self.0.set(speed, message.heading_rad(), north, exchange);
+                if let Some(Command { message, acts }) = exchange.command::<SetGlobalVector>() {
+                    let speed = message.speed_m_per_s();
+                    let speed = speed.unwrap_or(self.0.current(exchange.cockpit).speed);
+                    let vector = (speed, message.heading_rad());
+                    self.0.set(vector, Heading::North, acts, exchange);
                 }
             }
             SetGlobalVectorExt::CODE => {
-                if let Some(message) = exchange.command::<SetGlobalVectorExt>()
+                if let Some(Command { message, acts }) = exchange.command::<SetGlobalVectorExt>()
                     && let Some(speed) = metres_per_second(message.speed)
                 {
-                    self.0.set(speed, message.heading_rad(), north, exchange);
+                    let vector = (speed, message.heading_rad());
+                    self.0.set(vector, Heading::North, acts, exchange);
                 }
             }
             QueryGlobalVector::CODE => {
@@ -153,6 +162,10 @@ impl Behaviour for GlobalVectorDriver {
             _ => return Handled::No,
         }
         Handled::Yes
+    }
+
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(SetGlobalVector::NAME)
     }
 
     fn handle_stop(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {

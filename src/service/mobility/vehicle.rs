@@ -19,10 +19,12 @@ use super::velocity_state_driver::VelocityStateDriver;
 use super::velocity_state_sensor::VelocityStateSensor;
 use super::waypoint_driver::WaypointDriver;
 use super::waypoint_kinds::{Global, Local};
+use crate::address::JausId;
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 use crate::service::{
-    Context, Elements, Handled, ListManager, Service, Standing, TimeOfDay, code_of,
+    Context, Elements, Handled, Hazards, ListManager, MotionPolicy, Service, Standing, StopCause,
+    TimeOfDay, code_of,
 };
 use crate::vehicle::{GlobalPose, Motion, Pilot};
 
@@ -50,14 +52,22 @@ impl Vehicle {
         self
     }
 
-    /// Has it move on to `now`, for who reads it without a message.
-    pub fn handle_time(&self, now: Instant) {
-        drop(self.at(now));
+    /// What becomes of efforts and velocities that their client does not repeat.
+    #[must_use]
+    pub fn motion_policy(self, policy: MotionPolicy) -> Self {
+        self.lock().guard.set_policy(policy);
+        self
     }
 
-    /// Gives up whatever it is driven to, and stops.
+    /// Moves on to `now`, for readers outside of the component; not beyond the end of the command in
+    /// force, which the component alone can see to.
+    pub fn handle_time(&self, now: Instant) {
+        self.lock().advance_within(now);
+    }
+
+    /// Stops, whatever it was commanded to do.
     pub fn stop(&self) {
-        self.lock().pilot.stop();
+        self.lock().halt(&StopCause::Standby);
     }
 
     /// Whether it has something to do that is not done.
@@ -79,10 +89,10 @@ impl Vehicle {
         self.lock().progress()
     }
 
-    /// Whether it has stopped because its [pilot](Pilot::give_up_after) was left alone.
+    /// Why it was stopped last, unless it was commanded again since.
     #[must_use]
-    pub fn was_left_alone(&self) -> bool {
-        self.lock().pilot.was_left_alone()
+    pub fn last_stop(&self) -> Option<StopCause> {
+        self.lock().guard.last_stop().cloned()
     }
 
     /// Where it was last and how it moved.
@@ -204,18 +214,12 @@ impl Vehicle {
             behaviour: Box::new(behaviour),
             only_newest: false,
             steps: 0,
+            stops: 0,
         }
     }
 
     fn lock(&self) -> MutexGuard<'_, Cockpit> {
         self.cockpit.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The cockpit, its vehicle having moved on to `now`.
-    fn at(&self, now: Instant) -> MutexGuard<'_, Cockpit> {
-        let mut cockpit = self.lock();
-        cockpit.pilot.handle_time(now);
-        cockpit
     }
 }
 
@@ -232,8 +236,10 @@ pub struct OnVehicle {
     vehicle: Vehicle,
     behaviour: Box<dyn Behaviour>,
     only_newest: bool,
-    /// The step of the vehicle that was told last.
+    /// The step of the vehicle that was looked at last.
     steps: u64,
+    /// The stop of the vehicle that was followed last.
+    stops: u64,
 }
 
 impl OnVehicle {
@@ -275,9 +281,17 @@ impl Service for OnVehicle {
         let Some(code) = code_of(&message.payload) else {
             return Handled::No;
         };
+        let mut cockpit = self.vehicle.lock();
+        follow(
+            now,
+            &mut cockpit,
+            &mut self.stops,
+            self.behaviour.as_mut(),
+            context,
+        );
         let mut exchange = Exchange {
             now,
-            cockpit: &mut self.vehicle.at(now),
+            cockpit: &mut cockpit,
             message,
             context,
         };
@@ -285,7 +299,14 @@ impl Service for OnVehicle {
     }
 
     fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {
-        let mut cockpit = self.vehicle.at(now);
+        let mut cockpit = self.vehicle.lock();
+        follow(
+            now,
+            &mut cockpit,
+            &mut self.stops,
+            self.behaviour.as_mut(),
+            context,
+        );
         let steps = cockpit.pilot.steps();
         if self.steps != steps {
             self.steps = steps;
@@ -293,11 +314,30 @@ impl Service for OnVehicle {
         }
     }
 
-    fn handle_standing(&mut self, now: Instant, before: &Standing, context: &mut Context<'_>) {
-        if context.standing().stops(before) {
-            let mut cockpit = self.vehicle.at(now);
-            cockpit.pilot.stop();
+    fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
+        let mut cockpit = self.vehicle.lock();
+        cockpit.halt(cause);
+        self.stops = cockpit.stops;
+        self.behaviour.handle_stop(&mut cockpit, context);
+    }
+
+    /// What was kept in standby does not come into force when the component is made ready.
+    fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {
+        if context.standing().may_act() && !before.may_act() {
+            let mut cockpit = self.vehicle.lock();
             self.behaviour.handle_stop(&mut cockpit, context);
+        }
+    }
+
+    fn depends_on(&self) -> Option<JausId> {
+        self.vehicle.lock().guard.depends_on()
+    }
+
+    fn hazards(&self) -> Hazards {
+        Hazards {
+            acts_on: self.behaviour.acts_on(),
+            set_up_by: self.behaviour.set_up_by(),
+            stops: true,
         }
     }
 
@@ -306,6 +346,22 @@ impl Service for OnVehicle {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        self.vehicle.lock().pilot.poll_timeout()
+        let cockpit = self.vehicle.lock();
+        let ends = [cockpit.pilot.poll_timeout(), cockpit.guard.expires_at()];
+        ends.into_iter().flatten().min().or(cockpit.next_look())
+    }
+}
+
+/// Moves the vehicle on to `now`, and has a service follow if that stopped it.
+fn follow(
+    now: Instant,
+    cockpit: &mut Cockpit,
+    stops: &mut u64,
+    behaviour: &mut dyn Behaviour,
+    context: &mut Context<'_>,
+) {
+    cockpit.advance(now, context);
+    if std::mem::replace(stops, cockpit.stops) != cockpit.stops {
+        behaviour.handle_stop(cockpit, context);
     }
 }

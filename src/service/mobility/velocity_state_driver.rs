@@ -14,7 +14,7 @@ use crate::messages::mobility::{
     ReportVelocityCommand, ReportVelocityCommandExt, SetAccelerationLimit, SetVelocityCommand,
     SetVelocityCommandExt, velocity_state_driver,
 };
-use crate::service::{Context, Handled, State};
+use crate::service::{Context, Handled, State, Validity};
 use crate::vehicle::{Acceleration, Goal, Limits, Ticket, Velocity};
 
 /// The velocity that a client wants, and the one to fall back to.
@@ -104,6 +104,10 @@ impl Behaviour for VelocityStateDriver {
         Handled::Yes
     }
 
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(SetVelocityCommand::NAME)
+    }
+
     fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
         self.current = Velocity::default();
         self.ticket = None;
@@ -139,14 +143,13 @@ impl VelocityStateDriver {
         let pilot = &mut exchange.cockpit.pilot;
         let limits = *pilot.limits();
         match which {
-            Which::Current if !exchange.context.standing().acts_for(source) => {
-                tracing::debug!(%source, "velocity ignored: the component is not ready");
-                return;
-            }
             Which::Current => {
-                tracing::info!(%source, x = velocity.x, yaw = velocity.yaw, "velocity set");
+                let acts = exchange.context.standing().acts_for(source)
+                    && !exchange.cockpit.is_in_trouble();
+                tracing::debug!(%source, x = velocity.x, yaw = velocity.yaw, acts, "velocity set");
                 self.current = velocity;
-                self.ticket = Some(pilot.pursue(Goal::Velocity(velocity)));
+                let goal = Goal::Velocity(velocity);
+                self.ticket = acts.then(|| exchange.pursue(goal, Validity::Brief));
             }
             Which::Greatest => pilot.set_limits(Limits {
                 speed: velocity.x.max(0.0),
@@ -165,14 +168,10 @@ impl VelocityStateDriver {
     fn velocity(&self, which: Which, cockpit: &Cockpit) -> Velocity {
         let limits = cockpit.pilot.limits();
         match which {
-            Which::Current
-                if self
-                    .ticket
-                    .is_some_and(|ticket| cockpit.pilot.pursues(ticket)) =>
-            {
-                self.current
-            }
-            Which::Current => Velocity::default(),
+            Which::Current => match self.ticket {
+                Some(ticket) if !cockpit.pilot.pursues(ticket) => Velocity::default(),
+                _ => self.current,
+            },
             Which::Greatest => Velocity::forward(limits.speed, limits.yaw_rate),
             Which::Least => Velocity::forward(-limits.reverse, -limits.yaw_rate),
             Which::Default => self.default,

@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use super::behaviour::Behaviour;
 use super::both_versions;
 use super::cockpit::{Cockpit, changed};
-use super::exchange::Exchange;
+use super::exchange::{Command, Exchange};
 use super::kind::Waypoints;
 use super::place::Place;
 use super::travel;
@@ -28,15 +28,17 @@ impl<K: Waypoints> Behaviour for WaypointDriver<K> {
 
     fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
         if code == K::Set::CODE {
-            let place = exchange.configure::<K::Set>().map(Into::into);
-            set(place, code, exchange);
+            set(exchange.command::<K::Set>(), exchange);
         } else if code == K::SetExt::CODE {
-            let place = exchange.configure::<K::SetExt>().map(Into::into);
-            set(place, code, exchange);
+            set(exchange.command::<K::SetExt>(), exchange);
         } else if K::handle_query(code, exchange) == Handled::No {
             return travel::handle_speed(code, exchange);
         }
         Handled::Yes
+    }
+
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(K::Set::NAME)
     }
 
     fn tells_end_of(&self, command: u16) -> bool {
@@ -53,16 +55,19 @@ impl<K: Waypoints> Behaviour for WaypointDriver<K> {
 }
 
 /// Takes a waypoint; with a travel speed, the vehicle sets out at once.
-fn set(place: Option<Place>, command: u16, exchange: &mut Exchange<'_, '_>) {
-    let Some(place) = place else {
+fn set<M: Message + Into<Place>>(command: Option<Command<M>>, exchange: &mut Exchange<'_, '_>) {
+    let Some(Command { message, acts }) = command else {
         return;
     };
+    let place = message.into();
     let source = exchange.message.source;
     if !exchange.cockpit.can_reach(&place) {
         tracing::warn!(%source, ?place, "waypoint ignored: it is out of reach");
         return;
     }
     tracing::info!(%source, ?place, "waypoint set");
-    exchange.cockpit.set_place(place, command, exchange.context);
+    let cockpit = &mut exchange.cockpit;
+    cockpit.set_place(place, M::CODE, acts, exchange.context);
+    travel::accept(exchange);
     changed(exchange.context);
 }

@@ -5,8 +5,8 @@ use std::time::Duration;
 use super::{Bench, CLIENT, OTHER, PEER};
 use crate::address::JausId;
 use crate::messages::core::{
-    ConfirmControl, QueryControl, QueryTimeout, RejectControl, ReleaseControl, ReportControl,
-    ReportTimeout, RequestControl,
+    ConfirmControl, QueryControl, QueryStatus, QueryTimeout, RejectControl, ReleaseControl,
+    ReportControl, ReportStatus, ReportTimeout, RequestControl,
 };
 use crate::service::{ControlId, ControlLost, ControlNews, ControlRefused, Event, Patience};
 
@@ -243,7 +243,7 @@ fn control_that_is_refused_and_not_ours_any_more_is_lost() {
 #[test]
 fn a_lost_reject_is_noticed_with_the_next_renewal() {
     let (mut bench, _) = held(5);
-    bench.run_ms(1250);
+    bench.run_ms(1000);
     assert_eq!(bench.sent::<RequestControl>().len(), 1);
     bench.hear(PEER, &confirm(2));
     assert_eq!(
@@ -278,11 +278,15 @@ fn a_release_is_repeated_until_it_is_confirmed() {
 }
 
 #[test]
-fn a_release_that_nobody_confirms_is_done_with_too() {
+fn a_release_is_repeated_for_as_long_as_control_can_last() {
     let (mut bench, id) = held(5);
     bench.stack.release_control(bench.now, id);
     bench.run_ms(60_000);
-    assert_eq!(bench.sent::<ReleaseControl>().len(), 3);
+    assert_eq!(
+        bench.sent::<ReleaseControl>().len(),
+        10,
+        "every 0.5 s for 5 s"
+    );
     assert_eq!(news(&mut bench), [ControlNews::Released]);
 }
 
@@ -298,7 +302,56 @@ fn a_peer_is_controlled_once_at_a_time() {
     bench.stack.release_control(bench.now, id);
     assert!(again(&mut bench).is_ok());
     bench.hear(PEER, &reject(0));
-    assert_eq!(news(&mut bench), [], "the end of the control before");
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Released],
+        "the end of the control before, without which its release would wait for ever"
+    );
     bench.hear(PEER, &confirm(0));
     assert_eq!(news(&mut bench), [ControlNews::Granted]);
+}
+
+fn status(code: u8) -> ReportStatus {
+    ReportStatus {
+        status: code.into(),
+        reserved: 0,
+    }
+}
+
+#[test]
+fn a_peer_under_control_is_asked_for_its_status_and_every_change_is_news() {
+    let (mut bench, _) = held(5);
+    bench.run_ms(900);
+    assert_eq!(
+        bench.sent::<QueryStatus>().len(),
+        5,
+        "at once, then every 0.2 s"
+    );
+    for code in [2, 2, 1, 5] {
+        bench.hear(PEER, &status(code));
+    }
+    let expected = [2, 1, 5].map(ControlNews::Status);
+    assert_eq!(news(&mut bench), expected);
+}
+
+#[test]
+fn a_peer_that_has_no_status_is_asked_for_it_ten_times_at_most() {
+    let (mut bench, _) = held(5);
+    bench.run_ms(4900);
+    assert_eq!(bench.sent::<QueryStatus>().len(), 10);
+}
+
+#[test]
+fn a_peer_that_was_started_again_is_lost_and_the_control_that_it_grants_anew_given_back() {
+    let (mut bench, _) = held(5);
+    bench.run_ms(1000);
+    assert_eq!(bench.sent::<QueryControl>().len(), 1, "before the renewal");
+    // It has just begun, is in control of nobody, and grants the renewal as a new request.
+    bench.hear(PEER, &ReportControl::default());
+    bench.hear(PEER, &confirm(0));
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::Restarted)]
+    );
+    assert_eq!(bench.sent::<ReleaseControl>().len(), 1);
 }

@@ -17,9 +17,10 @@ fn ready() -> Rig {
     let done = rig.number.clone();
     let job = job
         .command(move |_: DeleteElement, _, _| _ = done.fetch_add(1, Ordering::Relaxed))
+        .on_stop(|_| {})
         .tell_end_of::<DeleteElement>();
     let now = rig.now;
-    rig.stack.offer(now, Box::new(job));
+    rig.stack.offer(now, Box::new(job)).unwrap();
     let authority_code = 100;
     rig.hear(CLIENT, &RequestControl { authority_code });
     rig.hear(CLIENT, &Resume);

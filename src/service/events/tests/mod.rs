@@ -16,7 +16,7 @@ use crate::codec::{Message, ServiceId};
 use crate::messages::core::create_event::EventType;
 use crate::messages::core::*;
 use crate::service::stack_rig::StackRig;
-use crate::service::{Handlers, Liveness, Management, Transport};
+use crate::service::{AccessControl, Handlers, Liveness, Management, Transport};
 
 const CLIENT: JausId = JausId::new(42, 1, 1);
 const OTHER: JausId = JausId::new(42, 2, 1);
@@ -65,7 +65,9 @@ impl Rig {
             Box::new(counter),
         ];
         let rig = StackRig::new(services, |stack| {
-            stack.event_settings(settings).management(Management::new())
+            let lasting = AccessControl::new().timeout(0);
+            let management = Management::new().access_control(lasting);
+            stack.event_settings(settings).management(management)
         });
         Self { rig, number }
     }

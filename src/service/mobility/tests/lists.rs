@@ -90,10 +90,18 @@ fn a_list_is_executed_only_for_the_client_in_control_and_only_when_ready() {
     let (mut rig, vehicle) = rig();
     assert!(set_elements(&mut rig, square()));
     rig.send(STRANGER, &execute(Some(1), 2.0));
+    assert_eq!(active(&mut rig), 0);
     rig.stand(State::Standby, Some(CLIENT));
     rig.send(CLIENT, &execute(Some(1), 2.0));
     rig.run(seconds(5.0));
-    assert_eq!(active(&mut rig), 0);
+    assert_eq!(active(&mut rig), 1, "it is kept and reported in standby");
+    rig.stand(State::Ready, Some(CLIENT));
+    rig.run(seconds(5.0));
+    assert_eq!(
+        active(&mut rig),
+        0,
+        "and does not come into force afterwards"
+    );
     assert!(vehicle.motion().pose.distance(0.0, 0.0) < 1e-9);
 }
 

@@ -78,7 +78,16 @@ fn a_speed_counts_only_when_ready_and_with_a_waypoint() {
     rig.stand(State::Standby, Some(CLIENT));
     rig.send(CLIENT, &speed(1.0));
     rig.run(seconds(5.0));
-    assert!(travel_speed(&mut rig).abs() < 0.01, "in standby");
+    assert!(
+        (travel_speed(&mut rig) - 1.0).abs() < 0.01,
+        "it is kept in standby"
+    );
+    rig.stand(State::Ready, Some(CLIENT));
+    rig.run(seconds(5.0));
+    assert!(
+        travel_speed(&mut rig).abs() < 0.01,
+        "and does not come into force afterwards"
+    );
     assert!(vehicle.motion().pose.distance(0.0, 0.0) < 1e-9);
 }
 

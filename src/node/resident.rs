@@ -1,0 +1,78 @@
+//! The orderly end of a node: components of its own process stop and release what they hold before
+//! it closes its links.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::watch;
+
+use super::core::Shared;
+
+/// How long a stopping node waits for its residents.
+pub(super) const LIMIT: Duration = Duration::from_secs(1);
+
+/// Who lives on a node, and whether it is about to stop.
+#[derive(Debug)]
+pub(super) struct Residents {
+    closing: watch::Sender<bool>,
+    count: watch::Sender<usize>,
+}
+
+impl Default for Residents {
+    fn default() -> Self {
+        Self {
+            closing: watch::Sender::new(false),
+            count: watch::Sender::new(0),
+        }
+    }
+}
+
+impl Residents {
+    /// Asks the residents to leave, and waits until all have, or for [`LIMIT`].
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "a node that stops waits in real time"
+    )]
+    pub(super) async fn close(&self) {
+        self.closing.send_replace(true);
+        let mut count = self.count.subscribe();
+        // An elapsed limit is logged by nobody but the peers: their own timeouts end what was held.
+        let _ = tokio::time::timeout(LIMIT, count.wait_for(|count| *count == 0)).await;
+    }
+}
+
+/// Keeps a stopping node running for a moment, until this is dropped.
+#[derive(Debug)]
+pub struct Resident(Option<Arc<Shared>>);
+
+impl Resident {
+    pub(super) fn of(shared: &Arc<Shared>) -> Self {
+        shared.residents.count.send_modify(|count| *count += 1);
+        Self(Some(Arc::clone(shared)))
+    }
+
+    /// On the node of another process, which does not wait.
+    pub(super) const fn elsewhere() -> Self {
+        Self(None)
+    }
+
+    /// Waits until the node is about to stop.
+    pub async fn closing(&self) {
+        match &self.0 {
+            Some(shared) => {
+                let mut closing = shared.residents.closing.subscribe();
+                // An error cannot be: the sender is in what we hold.
+                let _ = closing.wait_for(|closing| *closing).await;
+            }
+            None => std::future::pending().await,
+        }
+    }
+}
+
+impl Drop for Resident {
+    fn drop(&mut self) {
+        if let Some(shared) = &self.0 {
+            shared.residents.count.send_modify(|count| *count -= 1);
+        }
+    }
+}

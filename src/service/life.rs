@@ -1,0 +1,209 @@
+//! Signs of life of the peers that matter: the client in control, clients that have set an
+//! emergency, and holders of subscriptions.
+//!
+//! Discovery also notices that a peer has died, but it looks at everything it has ever heard of, so
+//! its bound grows with the number of peers. Here the bound depends on nothing but the peer itself.
+//!
+//! | silent for | what happens |
+//! |---|---|
+//! | [`Life::MOVING`] | while something moves on its word: Query Heartbeat Pulse, four times a second |
+//! | [`Life::SILENCE`] | Query Heartbeat Pulse, once a second, acknowledgement wanted |
+//! | [`Life::DEATH`] | dead, if it ever answered a probe; a peer that never did is left to the timeout of control |
+//!
+//! Any message is a sign of life. A transport acknowledgement counts only for peers that have never
+//! answered a probe by a message: a node acknowledges on behalf of a component that hangs.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::{Duration, Instant};
+
+use super::Outbox;
+use super::discovery::Budget;
+use crate::address::JausId;
+use crate::codec::Message;
+use crate::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse};
+use crate::wire::Priority;
+
+/// Why a peer is watched. The lesser ranks are probed within a budget, the first ones always.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Rank {
+    /// It holds subscriptions.
+    Subscriber,
+    /// It has set an emergency and not cleared it.
+    EmergencySetter,
+    /// It is in control.
+    Controller,
+    /// It is in control, and something moves only as long as it is alive.
+    MovingController,
+}
+
+/// The peers whose life matters to one component.
+#[derive(Debug)]
+pub(crate) struct Life {
+    peers: BTreeMap<JausId, Peer>,
+    /// One entry for each peer: when to look at it again.
+    due: BTreeSet<(Instant, JausId)>,
+    subscriber_probes: Budget,
+    dead: VecDeque<JausId>,
+}
+
+#[derive(Debug)]
+struct Peer {
+    /// When the last sign of life came.
+    alive: Instant,
+    /// Whether it has ever answered a probe by a message, and whether it acknowledges.
+    answers: bool,
+    acknowledges: bool,
+    /// Probes since the last sign of life.
+    probes: u32,
+    look: Instant,
+}
+
+impl Life {
+    /// A peer that has been silent for so long is probed, and again in such intervals.
+    pub(crate) const SILENCE: Duration = Duration::from_secs(1);
+    /// The same while something moves on its word.
+    pub(crate) const MOVING: Duration = Duration::from_millis(250);
+    /// A peer that answers probes and has been silent for so long is dead.
+    pub(crate) const DEATH: Duration = Duration::from_secs(4);
+    /// Probes to mere subscribers: a burst of so many, then one in this time.
+    const SUBSCRIBER_BURST: u32 = 32;
+    const SUBSCRIBER_REFILL: Duration = Duration::from_millis(50);
+
+    pub(crate) const fn new() -> Self {
+        Self {
+            peers: BTreeMap::new(),
+            due: BTreeSet::new(),
+            subscriber_probes: Budget::new(Self::SUBSCRIBER_BURST, Self::SUBSCRIBER_REFILL),
+            dead: VecDeque::new(),
+        }
+    }
+
+    /// Watches a peer that has just been heard. One that is watched already is looked at no later
+    /// than its rank demands.
+    pub(crate) fn watch(&mut self, now: Instant, id: JausId, rank: Rank) {
+        let peer = self.peers.entry(id).or_insert_with(|| {
+            self.due.insert((now + rank.patience(), id));
+            Peer {
+                alive: now,
+                answers: false,
+                acknowledges: false,
+                probes: 0,
+                look: now + rank.patience(),
+            }
+        });
+        let soon = peer.alive + rank.patience();
+        if soon < peer.look && peer.probes == 0 {
+            self.due.remove(&(peer.look, id));
+            peer.look = soon;
+            self.due.insert((soon, id));
+        }
+    }
+
+    /// A message with this code has come from a peer.
+    pub(crate) fn hear(&mut self, now: Instant, id: JausId, code: Option<u16>) {
+        if let Some(peer) = self.peers.get_mut(&id) {
+            peer.alive = now;
+            peer.probes = 0;
+            peer.answers |= code == Some(ReportHeartbeatPulse::CODE);
+        }
+    }
+
+    /// A peer's transport has acknowledged a probe.
+    pub(crate) fn acknowledged(&mut self, now: Instant, id: JausId) {
+        if let Some(peer) = self.peers.get_mut(&id).filter(|peer| !peer.answers) {
+            peer.acknowledges = true;
+            peer.alive = now;
+            peer.probes = 0;
+        }
+    }
+
+    /// When the last sign of life of a watched peer came.
+    pub(crate) fn last_sign(&self, id: JausId) -> Option<Instant> {
+        self.peers.get(&id).map(|peer| peer.alive)
+    }
+
+    /// Whether a peer has shown life within [`DEATH`](Self::DEATH).
+    pub(crate) fn is_alive(&self, now: Instant, id: JausId) -> bool {
+        self.last_sign(id)
+            .is_some_and(|alive| now.saturating_duration_since(alive) < Self::DEATH)
+    }
+
+    /// Whether a peer was probed until [`DEATH`](Self::DEATH) and has never answered a probe, so
+    /// that its death would go unnoticed.
+    pub(crate) fn is_mute(&self, now: Instant, id: JausId) -> bool {
+        let peer = self.peers.get(&id);
+        peer.is_some_and(|peer| !peer.answers && !peer.acknowledges) && !self.is_alive(now, id)
+    }
+
+    /// Probes the silent. `rank` says why a peer is still watched; `None` ends that.
+    pub(crate) fn handle_timeout(
+        &mut self,
+        now: Instant,
+        rank: impl Fn(JausId) -> Option<Rank>,
+        out: &mut Outbox,
+    ) {
+        while let Some(&(look, id)) = self.due.first().filter(|(look, _)| *look <= now) {
+            self.due.remove(&(look, id));
+            match (self.peers.get_mut(&id), rank(id)) {
+                (Some(peer), Some(rank)) => {
+                    let silence = now.saturating_duration_since(peer.alive);
+                    if silence >= Self::DEATH && peer.is_probed() {
+                        self.peers.remove(&id);
+                        self.dead.push_back(id);
+                        continue;
+                    }
+                    if silence >= rank.patience()
+                        && (rank > Rank::Subscriber || self.subscriber_probes.take(now))
+                    {
+                        peer.probes = peer.probes.saturating_add(1);
+                        out.send_acknowledged(id, Priority::High, &QueryHeartbeatPulse {});
+                    }
+                    peer.look = peer.next_look(now, rank);
+                    self.due.insert((peer.look, id));
+                }
+                _ => _ = self.peers.remove(&id),
+            }
+        }
+    }
+
+    /// When to call [`handle_timeout`](Self::handle_timeout).
+    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+        self.due.first().map(|&(look, _)| look)
+    }
+
+    /// The next peer that has died. It is watched no more.
+    pub(crate) fn poll_dead(&mut self) -> Option<JausId> {
+        self.dead.pop_front()
+    }
+}
+
+impl Rank {
+    /// How long a peer may be silent before it is probed.
+    const fn patience(self) -> Duration {
+        match self {
+            Self::MovingController => Life::MOVING,
+            Self::Controller | Self::EmergencySetter | Self::Subscriber => Life::SILENCE,
+        }
+    }
+}
+
+impl Peer {
+    /// Whether its silence says something: it can answer, and has been asked to. A component that was
+    /// itself held up has not asked.
+    const fn is_probed(&self) -> bool {
+        (self.answers || self.acknowledges) && self.probes >= 2
+    }
+
+    /// The next probe, or the moment of death if that comes first.
+    fn next_look(&self, now: Instant, rank: Rank) -> Instant {
+        let probe = if self.probes == 0 {
+            (self.alive + rank.patience()).max(now + Duration::from_millis(1))
+        } else {
+            now + rank.patience()
+        };
+        match self.alive + Life::DEATH {
+            death if death > now => probe.min(death),
+            _ => probe,
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! The cells of the table: each kind of driver, crossed with each fault.
+
+use std::fmt;
+use std::time::Duration;
+
+/// What the controller drives the vehicle with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Driver {
+    /// Primitive Driver, with a setpoint ten times a second.
+    Effort,
+    /// Velocity State Driver, with a setpoint ten times a second.
+    Velocity,
+    /// Primitive Driver with the policy `hold`: one setpoint.
+    HeldEffort,
+    /// Velocity State Driver with the policy `hold`: one setpoint.
+    HeldVelocity,
+    /// Local Vector Driver: one vector.
+    Vector,
+    /// Local Waypoint Driver: one waypoint.
+    Waypoint,
+    /// Local Waypoint List Driver: a list, executed once.
+    List,
+    /// Local Path Segment Driver: a list, executed once.
+    Path,
+    /// A service of the application's own, with a setpoint ten times a second.
+    Own,
+}
+
+/// What goes wrong while the vehicle moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Fault {
+    /// The controller's process is killed.
+    Killed,
+    /// The controller's process is suspended.
+    Suspended,
+    /// Nothing passes between controller and vehicle.
+    CutOff,
+    /// Nothing passes from the controller to the vehicle.
+    CutToVehicle,
+    /// Nothing passes from the vehicle to the controller.
+    CutToController,
+    /// The controller's process is killed, and another one with the same id sends its setpoints.
+    Restarted,
+    /// A client with a greater authority takes control.
+    TakenOver,
+    /// The controller releases control, but nothing of that arrives; then it is killed.
+    ReleaseLost,
+    /// The gateway behind which the controller lives is killed and started again.
+    Gateway,
+    /// The controller is killed, when 1000 ids are known that are dead.
+    DeadIdsBefore,
+    /// The controller is killed, and 1000 ids turn up and die.
+    DeadIdsDuring,
+    /// The component ends in an orderly way.
+    Stopped,
+    /// The component's process is suspended.
+    Hung,
+    /// The component is dropped.
+    Dropped,
+    /// A motor reports a fault.
+    MotorFailed,
+    /// The pose is not a number any more.
+    NanPose,
+    /// The pose is not measured any more.
+    FrozenPose,
+    /// The pose is not measured for five seconds.
+    DiskStall,
+    /// The wall clock of the vehicle's host is stepped by an hour, and the controller is killed.
+    VehicleClock,
+    /// The wall clock of the controller's host is stepped by an hour, and it is killed.
+    ControllerClock,
+}
+
+/// A kind of driver and a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Cell {
+    pub(crate) driver: Driver,
+    pub(crate) fault: Fault,
+}
+
+impl Driver {
+    pub(crate) const ALL: [Self; 9] = [
+        Self::Effort,
+        Self::Velocity,
+        Self::HeldEffort,
+        Self::HeldVelocity,
+        Self::Vector,
+        Self::Waypoint,
+        Self::List,
+        Self::Path,
+        Self::Own,
+    ];
+
+    /// Whether the controller repeats the setpoint.
+    pub(crate) const fn is_streamed(self) -> bool {
+        matches!(self, Self::Effort | Self::Velocity | Self::Own)
+    }
+
+    /// Whether effort and velocity stay in force without being repeated.
+    pub(crate) const fn is_held(self) -> bool {
+        matches!(self, Self::HeldEffort | Self::HeldVelocity)
+    }
+
+    /// Whether the vehicle needs to know where it is.
+    pub(crate) const fn needs_pose(self) -> bool {
+        matches!(
+            self,
+            Self::Vector | Self::Waypoint | Self::List | Self::Path
+        )
+    }
+
+    /// For how long the vehicle may move on: of what is repeated, after the last setpoint, otherwise
+    /// after the controller's last message.
+    pub(crate) const fn limit(self) -> Duration {
+        Duration::from_secs(match self {
+            Self::Effort | Self::Velocity | Self::Own => 1,
+            Self::HeldEffort | Self::HeldVelocity | Self::Vector => 2,
+            Self::Waypoint | Self::List | Self::Path => 5,
+        })
+    }
+}
+
+impl Fault {
+    pub(crate) const ALL: [Self; 20] = [
+        Self::Killed,
+        Self::Suspended,
+        Self::CutOff,
+        Self::CutToVehicle,
+        Self::CutToController,
+        Self::Restarted,
+        Self::TakenOver,
+        Self::ReleaseLost,
+        Self::Gateway,
+        Self::DeadIdsBefore,
+        Self::DeadIdsDuring,
+        Self::Stopped,
+        Self::Hung,
+        Self::Dropped,
+        Self::MotorFailed,
+        Self::NanPose,
+        Self::FrozenPose,
+        Self::DiskStall,
+        Self::VehicleClock,
+        Self::ControllerClock,
+    ];
+
+    /// Where a fault is tested if not here.
+    pub(crate) const fn elsewhere(self) -> Option<&'static str> {
+        match self {
+            Self::Gateway => Some("tested with the gateway itself"),
+            _ => None,
+        }
+    }
+
+    /// Whether the component ends or hangs.
+    pub(crate) const fn ends_component(self) -> bool {
+        matches!(self, Self::Stopped | Self::Hung | Self::Dropped)
+    }
+}
+
+impl Cell {
+    /// All cells that are run here.
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
+        let faults = Fault::ALL.iter().filter(|it| it.elsewhere().is_none());
+        faults.flat_map(|&fault| {
+            let cell = move |driver| Self { driver, fault };
+            Driver::ALL.into_iter().map(cell)
+        })
+    }
+
+    /// Whether the fault by itself has to stop this driver; otherwise the controller is killed a
+    /// moment later.
+    pub(crate) const fn stops_by_itself(self) -> bool {
+        match self.fault {
+            Fault::NanPose | Fault::FrozenPose | Fault::DiskStall => self.driver.needs_pose(),
+            Fault::VehicleClock | Fault::ControllerClock => false,
+            _ => true,
+        }
+    }
+}
+
+impl fmt::Display for Driver {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Effort => "effort",
+            Self::Velocity => "velocity",
+            Self::HeldEffort => "effort, hold",
+            Self::HeldVelocity => "velocity, hold",
+            Self::Vector => "vector",
+            Self::Waypoint => "waypoint",
+            Self::List => "list",
+            Self::Path => "path segment",
+            Self::Own => "own service",
+        })
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Killed => "controller killed",
+            Self::Suspended => "controller suspended",
+            Self::CutOff => "cut off",
+            Self::CutToVehicle => "cut off to the vehicle",
+            Self::CutToController => "cut off to the controller",
+            Self::Restarted => "controller restarted",
+            Self::TakenOver => "taken over",
+            Self::ReleaseLost => "release lost",
+            Self::Gateway => "gateway restarted",
+            Self::DeadIdsBefore => "1000 dead ids before",
+            Self::DeadIdsDuring => "1000 dead ids during",
+            Self::Stopped => "component stopped",
+            Self::Hung => "component hung",
+            Self::Dropped => "component dropped",
+            Self::MotorFailed => "motor fault",
+            Self::NanPose => "NaN pose",
+            Self::FrozenPose => "frozen pose",
+            Self::DiskStall => "5 s disk stall",
+            Self::VehicleClock => "vehicle's clock stepped",
+            Self::ControllerClock => "controller's clock stepped",
+        })
+    }
+}
+
+impl fmt::Display for Cell {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} × {}", self.driver, self.fault)
+    }
+}

@@ -1,0 +1,209 @@
+//! A scripted controller: it takes control, makes the vehicle ready, and drives. It can also be one
+//! that goes on sending when it has lost control.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::endpoint::{Endpoint, Event as EndpointEvent, MessageHandle, Outgoing};
+use jaus::messages::core::Resume;
+use jaus::service::{
+    ControlId, ControlNews, Discovery, Event, Kind, Liveness, Patience, Profile, Scope, Stack,
+    Timing,
+};
+
+use crate::cell::Driver;
+use crate::commands;
+use crate::sim::WallClock;
+use crate::vehicle::VEHICLE;
+
+/// A controller, or a program that wants to become one.
+pub(crate) struct Client {
+    stack: Stack,
+    driver: Driver,
+    authority: u8,
+    control: Option<ControlId>,
+    holds: bool,
+    /// Whether it wants control, and asks again when it is refused.
+    wants: bool,
+    /// Whether it sends its setpoints again and again, in control or not.
+    insists: bool,
+    /// What is to be sent in this order, each after the one before was acknowledged.
+    queue: VecDeque<Bytes>,
+    unacknowledged: Option<MessageHandle>,
+    is_driving: bool,
+    next: Instant,
+}
+
+impl Client {
+    /// The interval of setpoints that are repeated.
+    const PERIOD: Duration = Duration::from_millis(100);
+
+    pub(crate) fn new(
+        now: Instant,
+        id: JausId,
+        driver: Driver,
+        authority: u8,
+        scope: Scope,
+    ) -> Self {
+        let profile = Profile::new(Kind::OperatorControlUnit, "Operator");
+        let seed = u64::from(id.subsystem());
+        let discovery = Discovery::new(id, profile, scope, Timing::default(), seed);
+        let mut stack = Stack::new(discovery, vec![Box::new(Liveness::new())]);
+        stack.start(now);
+        Self {
+            stack,
+            driver,
+            authority,
+            control: None,
+            holds: false,
+            wants: false,
+            insists: false,
+            queue: VecDeque::new(),
+            unacknowledged: None,
+            is_driving: false,
+            next: now,
+        }
+    }
+
+    /// Takes control and drives.
+    pub(crate) fn begin(&mut self, now: Instant) {
+        self.take_control(now);
+        self.queue.push_back(commands::encode(&Resume {}));
+        self.queue.extend(commands::motion(self.driver));
+    }
+
+    /// Takes control and does nothing with it.
+    pub(crate) fn take_control(&mut self, now: Instant) {
+        self.wants = true;
+        self.next = now;
+    }
+
+    /// Asks for control anew, if it has lost it.
+    pub(crate) fn take_control_again(&mut self, now: Instant) {
+        if !self.holds {
+            self.let_go(now);
+            self.take_control(now);
+        }
+    }
+
+    /// Makes the vehicle ready and drives; it is in control already.
+    pub(crate) fn drive(&mut self) {
+        self.queue.push_back(commands::encode(&Resume {}));
+        self.queue.extend(commands::motion(self.driver));
+    }
+
+    /// Sends its setpoints again and again from now on, in control or not.
+    pub(crate) fn insist(&mut self) {
+        self.insists = true;
+    }
+
+    /// Releases control and says no more.
+    pub(crate) fn let_go(&mut self, now: Instant) {
+        self.wants = false;
+        self.is_driving = false;
+        self.holds = false;
+        if let Some(control) = self.control.take() {
+            self.stack.release_control(now, control);
+        }
+    }
+
+    /// Sets the vehicle's time by its own wall clock.
+    pub(crate) fn set_time(&mut self, clock: &WallClock) {
+        let set_time = commands::set_time(clock.since_1970());
+        self.stack.send_octets(VEHICLE, set_time);
+    }
+
+    pub(crate) fn handle_event(
+        &mut self,
+        now: Instant,
+        endpoint: &mut Endpoint,
+        event: EndpointEvent,
+    ) {
+        match event {
+            EndpointEvent::Received(message) => self.stack.handle_message(now, &message),
+            EndpointEvent::Acknowledged { message, .. } if self.unacknowledged == Some(message) => {
+                self.unacknowledged = None;
+                self.queue.pop_front();
+                self.is_driving = self.queue.is_empty();
+                self.next = now;
+            }
+            EndpointEvent::NotAcknowledged { message, .. }
+                if self.unacknowledged == Some(message) =>
+            {
+                self.unacknowledged = None;
+            }
+            _ => {}
+        }
+        self.settle(now, endpoint);
+    }
+
+    pub(crate) fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        self.stack.handle_timeout(now);
+        self.settle(now, endpoint);
+    }
+
+    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+        let is_active = self.wants || self.insists;
+        let next = is_active.then_some(self.next);
+        self.stack.poll_timeout().into_iter().chain(next).min()
+    }
+
+    /// Does what is due, and sends what there is.
+    pub(crate) fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        self.note_news(now);
+        if self.next <= now {
+            self.next = now + Self::PERIOD;
+            self.act(now, endpoint);
+        }
+        while let Some(message) = self.stack.poll_transmit() {
+            // There may be no way to the vehicle yet.
+            let _ = endpoint.send(now, message);
+        }
+    }
+
+    fn note_news(&mut self, now: Instant) {
+        while let Some(event) = self.stack.poll_event() {
+            let Event::Control(id, news) = event else {
+                continue;
+            };
+            if self.control != Some(id) {
+                continue;
+            }
+            match news {
+                ControlNews::Status(_) => continue,
+                ControlNews::Granted => self.next = now,
+                ControlNews::Refused(_) | ControlNews::Released => self.control = None,
+                ControlNews::Lost(_) => {}
+            }
+            self.holds = news == ControlNews::Granted;
+        }
+    }
+
+    fn act(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        if self.wants && self.control.is_none() {
+            let patience = Patience::default();
+            let request = self
+                .stack
+                .request_control(now, VEHICLE, self.authority, patience);
+            self.control = request.ok();
+        }
+        if self.holds
+            && self.unacknowledged.is_none()
+            && let Some(payload) = self.queue.front()
+        {
+            let message = Outgoing {
+                acknowledge: true,
+                ..Outgoing::new(self.stack.id(), VEHICLE, payload.clone())
+            };
+            self.unacknowledged = endpoint.send(now, message).ok();
+        }
+        let repeats = self.is_driving && self.holds && self.driver.is_streamed();
+        if repeats || self.insists {
+            for payload in commands::motion(self.driver) {
+                self.stack.send_octets(VEHICLE, payload);
+            }
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! The messages with which a controller drives.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::codec::{FormattedBlob, Message};
+use jaus::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
+use jaus::messages::core::set_time::TimeStamp;
+use jaus::messages::core::{SetElement, SetTime};
+use jaus::messages::mobility::set_velocity_command::CommandType;
+use jaus::messages::mobility::{
+    ExecuteList, ReportLocalPathSegment, SetLocalVector, SetLocalWaypoint, SetTravelSpeed,
+    SetVelocityCommand, SetWrenchEffort,
+};
+
+use crate::cell::Driver;
+
+/// Set Local Path Segment has the layout of the report.
+const SET_LOCAL_PATH_SEGMENT: u16 = 0x0410;
+/// Metres to the goal: more than the vehicle covers in any run.
+const FAR: f64 = 400.0;
+
+/// What is to be sent, in this order, to set the vehicle in motion.
+pub(crate) fn motion(driver: Driver) -> Vec<Bytes> {
+    match driver {
+        Driver::Effort | Driver::HeldEffort | Driver::Own => vec![encode(&effort())],
+        Driver::Velocity | Driver::HeldVelocity => vec![encode(&velocity())],
+        Driver::Vector => vec![encode(&vector())],
+        Driver::Waypoint => vec![encode(&waypoint(FAR)), encode(&travel_speed())],
+        Driver::List => {
+            let elements = [waypoint(FAR / 2.0), waypoint(FAR)].map(|it| encode(&it));
+            vec![encode(&list(elements)), encode(&execute())]
+        }
+        Driver::Path => {
+            let elements = [0.0, FAR / 2.0].map(segment);
+            vec![encode(&list(elements)), encode(&execute())]
+        }
+    }
+}
+
+/// Set Time, by the sender's wall clock.
+pub(crate) fn set_time(since_1970: Duration) -> Bytes {
+    let of_day = since_1970.as_secs() % 86_400;
+    let stamp = TimeStamp::default()
+        .with_seconds((of_day % 60) as u8)
+        .and_then(|it| it.with_minutes((of_day / 60 % 60) as u8))
+        .and_then(|it| it.with_hour((of_day / 3600) as u8));
+    encode(&SetTime {
+        time_stamp: Some(stamp.expect("within a day")),
+        date_stamp: None,
+    })
+}
+
+pub(crate) fn encode<M: Message>(message: &M) -> Bytes {
+    message.encode().expect("small numbers")
+}
+
+fn effort() -> SetWrenchEffort {
+    let mut effort = SetWrenchEffort::default();
+    let set = effort.set_propulsive_linear_effort_x_percent(60.0);
+    set.expect("a percentage");
+    effort
+}
+
+fn velocity() -> SetVelocityCommand {
+    let mut velocity = SetVelocityCommand {
+        command_type: CommandType::SET_CURRENT_COMMAND,
+        ..SetVelocityCommand::default()
+    };
+    velocity.set_velocity_x_m_per_s(1.0).expect("in range");
+    velocity.set_yaw_rate_rad_per_s(0.1).expect("in range");
+    velocity
+}
+
+fn vector() -> SetLocalVector {
+    let mut vector = SetLocalVector::default();
+    vector.set_speed_m_per_s(1.0).expect("in range");
+    vector.set_heading_rad(0.5).expect("in range");
+    vector
+}
+
+fn waypoint(x: f64) -> SetLocalWaypoint {
+    let mut waypoint = SetLocalWaypoint::default();
+    waypoint.set_x_m(x).expect("in range");
+    waypoint.set_y_m(1.0).expect("in range");
+    waypoint
+}
+
+fn travel_speed() -> SetTravelSpeed {
+    let mut speed = SetTravelSpeed::default();
+    speed.set_speed_m_per_s(1.0).expect("in range");
+    speed
+}
+
+fn execute() -> ExecuteList {
+    let mut execute = ExecuteList {
+        element_uid: Some(1),
+        ..ExecuteList::default()
+    };
+    execute.set_speed_m_per_s(1.0).expect("in range");
+    execute
+}
+
+/// A path segment along the X axis, from `x` on.
+fn segment(x: f64) -> Bytes {
+    let mut path = ReportLocalPathSegment::default();
+    path.set_p1_x_m(x + FAR / 4.0).expect("in range");
+    path.set_p1_y_m(0.0).expect("in range");
+    path.set_p2_x_m(x + FAR / 2.0).expect("in range");
+    path.set_p2_y_m(0.0).expect("in range");
+    path.set_weighting_factor_value(1.0).expect("in range");
+    let body = encode(&path).slice(2..);
+    [&SET_LOCAL_PATH_SEGMENT.to_le_bytes(), &body[..]]
+        .concat()
+        .into()
+}
+
+/// A list of two elements.
+fn list([first, second]: [Bytes; 2]) -> SetElement {
+    let element = |element_uid, previous_uid, next_uid, data| ElementRec {
+        element_uid,
+        previous_uid,
+        next_uid,
+        element_data: FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, data),
+    };
+    SetElement {
+        request_id_rec: RequestIdRec { request_id: 1 },
+        element_list: vec![element(1, 0, 2, first), element(2, 1, 0, second)],
+    }
+}

@@ -1,0 +1,474 @@
+//! One trial: the vehicle drives, something goes wrong, and everything is watched for half a minute
+//! and more.
+
+use std::time::{Duration, Instant};
+
+use crate::cell::{Cell, Fault};
+use crate::plant::{Plant, Sensor};
+use crate::sim::{Conditions, Random};
+use crate::world::{CROWD, World};
+
+/// What came out of a trial.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Outcome {
+    /// Whether the vehicle moved before the fault.
+    pub(crate) moved: bool,
+    /// For how long after the fault it was ordered to move.
+    pub(crate) stop: Duration,
+    /// Metres that it covered after the fault.
+    pub(crate) distance: f64,
+    /// Whether it moved again with a new lease; `None` if that was not tried.
+    pub(crate) revived: Option<bool>,
+    /// What did not hold.
+    pub(crate) broken: Vec<String>,
+}
+
+/// The cell of a seed. The first seeds are each cell once.
+pub(crate) fn cell_of(seed: u64) -> Cell {
+    let cells: Vec<_> = Cell::all().collect();
+    cells[(seed % cells.len() as u64) as usize]
+}
+
+/// Runs the trial of a seed.
+pub(crate) fn run(seed: u64) -> Outcome {
+    let mut trial = Trial::new(cell_of(seed), seed);
+    if trial.drive_off() {
+        trial.begin_fault();
+        trial.run_fault();
+        trial.watch();
+        trial.judge();
+        trial.revive();
+    }
+    trial.outcome
+}
+
+struct Trial {
+    cell: Cell,
+    random: Random,
+    world: World,
+    /// When the fault happened.
+    fault: Instant,
+    odometer: f64,
+    /// Until when the fault itself has to have stopped the vehicle, and ended control.
+    sudden: Option<Instant>,
+    /// Whether the controller sends its setpoints again and again after the fault.
+    insists: bool,
+    /// Whether the component is there and sound at the end.
+    is_sound: bool,
+    outcome: Outcome,
+}
+
+fn conditions(random: &mut Random) -> Conditions {
+    let millis = Duration::from_millis;
+    let slowest = random.choose(&[2, 10, 30]);
+    Conditions {
+        latency: Duration::from_micros(200)..millis(slowest),
+        lost: random.choose(&[0, 5, 20]),
+        repeated: random.choose(&[0, 20]),
+        detoured: random.choose(&[0, 20]),
+        detour: millis(60),
+        ..Conditions::good()
+    }
+}
+
+impl Trial {
+    /// How long the vehicle may take to set out, with everything before it.
+    const START: Duration = Duration::from_secs(12);
+    /// How long it is watched when the fault is over.
+    const WATCH: Duration = Duration::from_secs(30);
+    /// How long control may outlast the last Request Control.
+    const CONTROL: Duration = Duration::from_secs(5);
+    /// The brakes' time from any speed, with some room.
+    const BRAKES: Duration = Duration::from_millis(1500);
+    /// Control is over as soon as the vehicle has noticed.
+    const AT_ONCE: Duration = Duration::from_millis(100);
+
+    fn new(cell: Cell, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let conditions = conditions(&mut random);
+        let world = World::new(&mut random, cell.driver, conditions);
+        Self {
+            cell,
+            fault: world.network.now(),
+            insists: random.happens(800),
+            random,
+            world,
+            odometer: 0.0,
+            sudden: None,
+            is_sound: true,
+            outcome: Outcome::default(),
+        }
+    }
+
+    fn break_promise(&mut self, what: String) {
+        self.outcome.broken.push(what);
+    }
+
+    /// A time between two numbers of milliseconds.
+    fn between(&mut self, least: u64, most: u64) -> Duration {
+        let millis = Duration::from_millis;
+        self.random.between(&(millis(least)..millis(most)))
+    }
+
+    fn run_between(&mut self, least: u64, most: u64) {
+        let time = self.between(least, most);
+        self.world.run_for(time);
+    }
+
+    /// Has the vehicle driven until it moves properly; false if it does not.
+    fn drive_off(&mut self) -> bool {
+        self.run_between(100, 1000);
+        if self.cell.fault == Fault::DeadIdsBefore {
+            self.world.let_crowd_come(&mut self.random, CROWD);
+            self.world.network.kill(self.world.crowd);
+            self.run_between(0, 4000);
+        }
+        let controller = self.world.controller;
+        self.world
+            .with_client(controller, |now, client| client.begin(now));
+        let end = self.world.network.now() + Self::START;
+        while !self.has_moved(0.4, 0.4) {
+            if self.world.network.now() > end {
+                self.break_promise("it did not set out".into());
+                return false;
+            }
+            self.world.run_for(Duration::from_millis(100));
+        }
+        self.run_between(0, 2000);
+        self.outcome.moved = self.has_moved(0.2, 0.1);
+        if !self.outcome.moved {
+            self.break_promise("it stopped before anything had gone wrong".into());
+        }
+        self.outcome.moved
+    }
+
+    /// Whether it has covered more than so many metres and is faster than this.
+    fn has_moved(&self, metres: f64, speed: f64) -> bool {
+        let plant = self.world.plant.lock();
+        plant.odometer > metres && plant.speed() > speed
+    }
+
+    fn begin_fault(&mut self) {
+        self.fault = self.world.network.now();
+        self.odometer = self.world.plant.lock().odometer;
+        let wait = match self.cell.fault {
+            Fault::Hung => Some(Plant::DEADLINE + Duration::from_millis(1)),
+            Fault::Stopped | Fault::Dropped => Some(Duration::ZERO),
+            Fault::MotorFailed => Some(Duration::from_millis(200)),
+            Fault::NanPose => Some(Duration::from_millis(200)),
+            Fault::FrozenPose | Fault::DiskStall => Some(Duration::from_secs(1)),
+            _ => None,
+        };
+        self.sudden = wait
+            .filter(|_| self.cell.stops_by_itself())
+            .map(|wait| self.fault + wait);
+    }
+
+    fn run_fault(&mut self) {
+        let (vehicle, controller) = (self.world.vehicle, self.world.controller);
+        match self.cell.fault {
+            Fault::Killed | Fault::DeadIdsBefore | Fault::Gateway => {
+                self.world.network.kill(controller);
+            }
+            Fault::DeadIdsDuring => self.flood(),
+            Fault::Suspended => {
+                self.world.network.suspend(controller);
+                self.run_between(6000, 15_000);
+                if self.random.happens(800) {
+                    self.world.witness().stop_counting();
+                    self.world.network.resume(controller);
+                    self.persist();
+                }
+            }
+            Fault::CutOff => self.cut(&[(controller, vehicle), (vehicle, controller)]),
+            Fault::CutToVehicle => self.cut(&[(controller, vehicle)]),
+            Fault::CutToController => self.cut(&[(vehicle, controller)]),
+            Fault::Restarted => {
+                self.world.network.kill(controller);
+                self.run_between(100, 3000);
+                self.world.restart_controller(self.insists);
+            }
+            Fault::TakenOver => self.take_over(),
+            Fault::ReleaseLost => {
+                self.world.network.set_cut(vehicle, controller, true);
+                self.world
+                    .with_client(controller, |now, client| client.let_go(now));
+                self.run_between(0, 3000);
+                self.world.network.kill(controller);
+            }
+            Fault::Stopped | Fault::Dropped => self.end_component(),
+            Fault::Hung => self.hang(),
+            Fault::MotorFailed => {
+                self.world.plant.lock().fault = Some("left motor: overcurrent");
+                self.outlast(|plant| plant.fault = None);
+            }
+            Fault::NanPose => self.spoil_pose(Sensor::Unknown),
+            Fault::FrozenPose | Fault::DiskStall => self.spoil_pose(Sensor::Stalled),
+            Fault::VehicleClock | Fault::ControllerClock => self.step_clock(),
+        }
+    }
+
+    /// The controller lives on after the fault: it may insist on its setpoints, and ask for control
+    /// again. It does not send Resume.
+    fn persist(&mut self) {
+        let (controller, insists) = (self.world.controller, self.insists);
+        let asks = self.random.happens(300);
+        self.world.with_client(controller, |now, client| {
+            if insists {
+                client.insist();
+            }
+            if asks {
+                client.take_control_again(now);
+            }
+        });
+    }
+
+    fn cut(&mut self, directions: &[(crate::sim::Host, crate::sim::Host)]) {
+        for &(from, to) in directions {
+            self.world.network.set_cut_one_way(from, to, true);
+        }
+        // A client that goes on although it has lost control.
+        if self.insists && self.random.happens(500) {
+            let controller = self.world.controller;
+            self.world
+                .with_client(controller, |_, client| client.insist());
+        }
+        self.run_between(6500, 15_000);
+        if self.random.happens(800) {
+            self.world.witness().stop_counting();
+            for &(from, to) in directions {
+                self.world.network.set_cut_one_way(from, to, false);
+            }
+            self.persist();
+        }
+    }
+
+    /// The crowd comes, and in the midst of it the controller is killed.
+    fn flood(&mut self) {
+        let part = self.random.below(CROWD);
+        self.world.let_crowd_come(&mut self.random, part);
+        self.begin_fault();
+        self.world.network.kill(self.world.controller);
+        self.world.let_crowd_come(&mut self.random, CROWD - part);
+        self.world.network.kill(self.world.crowd);
+    }
+
+    fn take_over(&mut self) {
+        let (controller, supervisor) = (self.world.controller, self.world.supervisor);
+        self.world
+            .with_client(supervisor, |now, client| client.take_control(now));
+        if self.insists {
+            self.world
+                .with_client(controller, |_, client| client.insist());
+        }
+        self.run_between(3000, 8000);
+        let taken_over = self.world.witness().taken_over;
+        self.sudden = taken_over.map(|it| it + Self::AT_ONCE);
+        if taken_over.is_none() {
+            self.break_promise("the stronger client did not get control".into());
+        }
+        self.persist();
+    }
+
+    /// The component ends, and is perhaps started again.
+    fn end_component(&mut self) {
+        let orderly = self.cell.fault == Fault::Stopped;
+        self.world.with_vehicle(|now, vehicle| {
+            let Some(program) = vehicle.take_program() else {
+                return Vec::new();
+            };
+            if orderly {
+                return program.stop(now);
+            }
+            drop(program);
+            Vec::new()
+        });
+        if self.insists {
+            let controller = self.world.controller;
+            self.world
+                .with_client(controller, |_, client| client.insist());
+        }
+        self.is_sound = self.random.happens(700);
+        if self.is_sound {
+            self.run_between(500, 8000);
+            self.world.restart_vehicle();
+        }
+    }
+
+    /// The component's process is suspended. With a controller that lives on it is suspended until
+    /// control is over.
+    fn hang(&mut self) {
+        let (vehicle, controller) = (self.world.vehicle, self.world.controller);
+        self.world.network.suspend(vehicle);
+        let dies = self.random.happens(500);
+        if dies {
+            self.run_between(0, 900);
+            self.world.network.kill(controller);
+            // Whatever is shorter than half a second counts as late, and not as hung.
+            self.run_between(600, 10_000);
+        } else {
+            self.run_between(6000, 12_000);
+        }
+        self.is_sound = self.random.happens(800);
+        if self.is_sound {
+            self.world.witness().stop_counting();
+            self.world.network.resume(vehicle);
+            if !dies {
+                self.persist();
+            }
+        }
+    }
+
+    /// The controller goes on while something is broken, which is mended after a while, or never.
+    fn outlast(&mut self, mend: impl FnOnce(&mut Plant)) {
+        let time = match self.cell.fault {
+            Fault::DiskStall => Duration::from_secs(5),
+            _ => self.between(6000, 15_000),
+        };
+        self.persist();
+        self.world.run_for(time);
+        self.is_sound = self.cell.fault == Fault::DiskStall || self.random.happens(800);
+        if self.is_sound {
+            mend(&mut self.world.plant.lock());
+            self.run_between(0, 2000);
+            self.persist();
+        }
+    }
+
+    fn spoil_pose(&mut self, sensor: Sensor) {
+        self.world.plant.lock().sensor = sensor;
+        if self.cell.stops_by_itself() {
+            self.outlast(|plant| plant.sensor = Sensor::Measures);
+            return;
+        }
+        self.kill_later();
+        self.run_between(5000, 8000);
+        self.world.plant.lock().sensor = Sensor::Measures;
+    }
+
+    fn step_clock(&mut self) {
+        let hour = 3_600_000_000_000;
+        let step = self.random.choose(&[hour, -hour]);
+        let controller = self.world.controller;
+        let host = match self.cell.fault {
+            Fault::VehicleClock => self.world.vehicle,
+            _ => controller,
+        };
+        self.world.network.step_clock(host, step);
+        let clock = self.world.network.clock(controller);
+        self.world
+            .with_client(controller, |_, client| client.set_time(&clock));
+        self.kill_later();
+    }
+
+    /// What has gone wrong must not stop this driver; the death of its controller must.
+    fn kill_later(&mut self) {
+        self.run_between(500, 3000);
+        if !self.has_moved(0.2, 0.1) {
+            self.break_promise("it stopped though it need not".into());
+        }
+        self.begin_fault();
+        self.world.network.kill(self.world.controller);
+    }
+
+    fn watch(&mut self) {
+        self.world.run_for(Self::WATCH);
+    }
+
+    /// Until when the vehicle may be ordered to move.
+    fn limit(&mut self) -> Instant {
+        let cell = self.cell;
+        let witness = self.world.witness();
+        let last = match cell.driver.is_streamed() {
+            true => witness.last_setpoint,
+            false => witness.last_message,
+        };
+        let last = last.expect("it has moved") + cell.driver.limit();
+        let control = witness.last_request.expect("it has moved") + Self::CONTROL;
+        let limit = last.min(control);
+        self.sudden.map_or(limit, |sudden| sudden.min(limit))
+    }
+
+    fn judge(&mut self) {
+        let limit = self.limit();
+        let (movement, wheels, odometer) = {
+            let plant = self.world.plant.lock();
+            // A hung program cannot order anything else: its actuator stops by itself.
+            let movement = match self.cell.fault {
+                Fault::Hung => plant.actuator,
+                _ => plant.order,
+            };
+            (movement.last(), plant.wheels.last(), plant.odometer)
+        };
+        let after = |time: Option<Instant>| {
+            time.map_or(Duration::ZERO, |time| {
+                time.saturating_duration_since(self.fault)
+            })
+        };
+        let allowed = after(Some(limit));
+        let (moved, rolled) = (after(movement), after(wheels));
+        self.outcome.stop = moved;
+        self.outcome.distance = odometer - self.odometer;
+        if moved > allowed {
+            self.break_promise(format!(
+                "it was ordered to move {moved:.3?} after the fault, and no longer than \
+                 {allowed:.3?} were allowed"
+            ));
+        } else if rolled > allowed + Self::BRAKES {
+            self.break_promise(format!(
+                "its wheels turned {rolled:.3?} after the fault, and orders to move were allowed \
+                 for {allowed:.3?}"
+            ));
+        }
+        if self.world.plant.lock().got_rubbish {
+            self.break_promise("it ordered something that is no number".into());
+        }
+        self.judge_control();
+    }
+
+    /// Control is free again, or another client's.
+    fn judge_control(&mut self) {
+        if self.cell.fault.ends_component() {
+            return;
+        }
+        let sudden = self.sudden.map(|sudden| sudden + Self::AT_ONCE);
+        let witness = self.world.witness();
+        let request = witness.last_request.expect("it has moved");
+        let limit = request + Self::CONTROL;
+        let limit = sudden.map_or(limit, |sudden| sudden.min(limit));
+        let Some(freed) = witness.freed else {
+            self.break_promise("control never became free".into());
+            return;
+        };
+        if freed > limit {
+            let late = freed.saturating_duration_since(limit);
+            self.break_promise(format!("control became free {late:.3?} too late"));
+        }
+    }
+
+    /// A supervisor takes control, sends Resume and drives: then the vehicle moves again.
+    fn revive(&mut self) {
+        if !self.is_sound || !self.outcome.broken.is_empty() {
+            return;
+        }
+        let supervisor = self.world.supervisor;
+        let is_in_control = self.cell.fault == Fault::TakenOver;
+        self.world.with_client(supervisor, |now, client| {
+            if is_in_control {
+                client.drive();
+            } else {
+                client.begin(now);
+            }
+        });
+        let end = self.world.network.now() + Self::START;
+        let before = self.world.plant.lock().odometer;
+        while !self.has_moved(before + 0.2, 0.1) && self.world.network.now() < end {
+            self.world.run_for(Duration::from_millis(100));
+        }
+        let revived = self.has_moved(before + 0.2, 0.1);
+        self.outcome.revived = Some(revived);
+        if !revived {
+            self.break_promise("a new lease does not set it in motion".into());
+        }
+    }
+}

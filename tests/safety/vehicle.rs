@@ -1,0 +1,178 @@
+//! The vehicle's program: how a component and its services are made. What depends on the library's
+//! API is here and nowhere else in this test.
+
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::endpoint::{Outgoing, Received};
+use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
+use jaus::service::{
+    Condition, Discovery, Handlers, Kind, Liveness, Management, MotionPolicy, Profile, Scope,
+    Service, Stack, Standing, State, StopCause, Time, Timing, mobility,
+};
+use jaus::vehicle::{Drive, Effort, Frame, Limits, Motion, Pilot, Platform, Pose};
+
+use crate::cell::Driver;
+use crate::plant::{SharedPlant, Wheels};
+use crate::sim::WallClock;
+
+pub(crate) const VEHICLE: JausId = JausId::new(101, 1, 1);
+
+/// A component that drives the plant.
+pub(crate) struct Program {
+    stack: Stack,
+    plant: SharedPlant,
+    /// When the loop of an own service runs again.
+    next: Option<Instant>,
+}
+
+impl Program {
+    /// The interval of the own service's loop.
+    const LOOP: Duration = Duration::from_millis(20);
+
+    pub(crate) fn new(
+        now: Instant,
+        driver: Driver,
+        plant: &SharedPlant,
+        clock: WallClock,
+        seed: u64,
+    ) -> Self {
+        let is_own = driver == Driver::Own;
+        let mut services: Vec<Box<dyn Service>> = vec![Box::new(Liveness::new())];
+        if is_own {
+            services.push(Box::new(own_service(plant)));
+        } else {
+            services.extend(drivers(now, plant, &clock, driver.is_held()));
+        }
+        services.push(Box::new(Time::new(move || clock.since_1970())));
+        let profile = Profile::new(Kind::Vehicle, "Rover");
+        let discovery = Discovery::new(VEHICLE, profile, Scope::System, Timing::default(), seed);
+        let mut stack = Stack::new(discovery, services).management(Management::new());
+        stack.start(now);
+        Self {
+            stack,
+            plant: plant.clone(),
+            next: is_own.then_some(now),
+        }
+    }
+
+    pub(crate) fn handle_message(&mut self, now: Instant, message: &Received) {
+        self.stack.handle_message(now, message);
+    }
+
+    pub(crate) fn handle_timeout(&mut self, now: Instant) {
+        if self.next.is_some_and(|next| next <= now) {
+            self.next = Some(now + Self::LOOP);
+            self.run_own_loop(now);
+        }
+        self.stack.handle_timeout(now);
+    }
+
+    /// What an application does for a motor beside its service: it repeats the order within the
+    /// actuator's deadline, and reports a fault.
+    fn run_own_loop(&mut self, now: Instant) {
+        self.plant.repeat_order();
+        let state = self.stack.standing().state;
+        match self.plant.fault() {
+            Some(_) if state != State::Failure => {
+                self.stack.set_condition(now, Condition::Failed);
+            }
+            None if state == State::Failure => {
+                self.stack.set_condition(now, Condition::Initialized);
+            }
+            _ => {}
+        }
+    }
+
+    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+        self.stack.poll_timeout().into_iter().chain(self.next).min()
+    }
+
+    pub(crate) fn poll_transmit(&mut self) -> Option<Outgoing> {
+        while self.stack.poll_event().is_some() {}
+        self.stack.poll_transmit()
+    }
+
+    pub(crate) const fn standing(&self) -> &Standing {
+        self.stack.standing()
+    }
+
+    /// Ends in an orderly way; returns what is still to be sent.
+    pub(crate) fn stop(mut self, now: Instant) -> Vec<Outgoing> {
+        self.stack.stop(&StopCause::Ended);
+        self.stack.take_leave(now);
+        std::iter::from_fn(|| self.poll_transmit()).collect()
+    }
+}
+
+/// All drivers on one vehicle.
+fn drivers(
+    now: Instant,
+    plant: &SharedPlant,
+    clock: &WallClock,
+    holds: bool,
+) -> Vec<Box<dyn Service>> {
+    let pilot = Pilot::new(Wheels(plant.clone()), Frame::at(52.5, 13.4));
+    let policy = match holds {
+        true => MotionPolicy::Hold,
+        false => MotionPolicy::default(),
+    };
+    let vehicle = mobility::Vehicle::new(pilot)
+        .motion_policy(policy)
+        .with_time(now, clock.since_1970());
+    vec![
+        Box::new(vehicle.velocity_state_sensor()),
+        Box::new(vehicle.local_pose_sensor()),
+        Box::new(vehicle.primitive_driver()),
+        Box::new(vehicle.velocity_state_driver()),
+        Box::new(vehicle.local_vector_driver()),
+        Box::new(vehicle.local_waypoint_driver()),
+        Box::new(vehicle.list_manager()),
+        Box::new(vehicle.local_waypoint_list_driver()),
+        Box::new(vehicle.local_path_segment_driver()),
+    ]
+}
+
+/// A driver made of functions, as an application writes it.
+fn own_service(plant: &SharedPlant) -> Handlers {
+    let (motor, brake) = (plant.clone(), plant.clone());
+    Handlers::new(primitive_driver::LATEST)
+        .command(move |effort: SetWrenchEffort, _, _| {
+            let percent = effort.propulsive_linear_effort_x_percent();
+            motor.drive(Drive::Effort(Effort {
+                forward: percent.unwrap_or_default() / 100.0,
+                ..Effort::default()
+            }));
+        })
+        .on_stop(move |_| brake.drive(Drive::Stop))
+}
+
+impl Platform for Wheels {
+    fn handle_time(&mut self, now: Instant) {
+        self.read_sensor(now);
+    }
+
+    fn motion(&self) -> Motion {
+        self.sample()
+    }
+
+    fn set_pose(&mut self, pose: Pose) {
+        Self::set_pose(self, pose);
+    }
+
+    fn drive(&mut self, command: Drive) {
+        self.0.drive(command);
+    }
+
+    fn limits(&self) -> Limits {
+        Self::limits(self)
+    }
+
+    fn set_limits(&mut self, limits: Limits) {
+        Self::set_limits(self, limits);
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.0.fault().map(str::to_owned)
+    }
+}

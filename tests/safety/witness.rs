@@ -1,0 +1,79 @@
+//! What arrived from the controller, and until when it was in control.
+
+use std::time::Instant;
+
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::endpoint::Received;
+use jaus::messages::core::RequestControl;
+
+use crate::cell::Driver;
+use crate::commands;
+use crate::world::{CONTROLLER, SUPERVISOR};
+
+/// Looks at the vehicle's messages and its controller.
+#[derive(Clone, Debug)]
+pub(crate) struct Witness {
+    /// The first two octets of a setpoint.
+    setpoint: [u8; 2],
+    /// Whether the controller's messages still count: not those that it sends after a fault is over.
+    counts: bool,
+    /// When the vehicle got the controller's last message,
+    pub(crate) last_message: Option<Instant>,
+    /// its last setpoint,
+    pub(crate) last_setpoint: Option<Instant>,
+    /// and its last Request Control.
+    pub(crate) last_request: Option<Instant>,
+    /// Whether the controller was in control when last seen.
+    pub(crate) is_held: bool,
+    /// Since when it has been out of control for the first time.
+    pub(crate) freed: Option<Instant>,
+    /// When the supervisor got control.
+    pub(crate) taken_over: Option<Instant>,
+}
+
+impl Witness {
+    pub(crate) fn new(driver: Driver) -> Self {
+        let last = commands::motion(driver).pop().expect("at least one");
+        Self {
+            setpoint: [last[0], last[1]],
+            counts: true,
+            last_message: None,
+            last_setpoint: None,
+            last_request: None,
+            is_held: false,
+            freed: None,
+            taken_over: None,
+        }
+    }
+
+    /// What the controller sends from now on changes no deadline.
+    pub(crate) fn stop_counting(&mut self) {
+        self.counts = false;
+    }
+
+    pub(crate) fn note_message(&mut self, now: Instant, message: &Received) {
+        if !self.counts || message.source != CONTROLLER {
+            return;
+        }
+        self.last_message = Some(now);
+        let code = message.payload.get(..2);
+        if code == Some(&self.setpoint) {
+            self.last_setpoint = Some(now);
+        }
+        if code == Some(&RequestControl::CODE.to_le_bytes()) {
+            self.last_request = Some(now);
+        }
+    }
+
+    pub(crate) fn note_controller(&mut self, now: Instant, controller: Option<JausId>) {
+        let holds = controller == Some(CONTROLLER);
+        if self.is_held && !holds {
+            self.freed.get_or_insert(now);
+        }
+        self.is_held = holds;
+        if controller == Some(SUPERVISOR) {
+            self.taken_over.get_or_insert(now);
+        }
+    }
+}

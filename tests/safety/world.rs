@@ -1,0 +1,298 @@
+//! The network of a trial: the vehicle with its hardware, the controller, a supervisor, other peers,
+//! and a crowd of ids that die.
+
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::endpoint::{Config, Endpoint, Event as EndpointEvent, Outgoing};
+use jaus::messages::core::{
+    QueryHeartbeatPulse, ReportIdentification, report_identification::QueryType,
+};
+use jaus::service::{Discovery, Kind, Liveness, Profile, Scope, Stack, Timing};
+
+use crate::cell::Driver;
+use crate::client::Client;
+use crate::commands::encode;
+use crate::plant::SharedPlant;
+use crate::sim::{Conditions, Host, Network, Owner, Random, WallClock, seeds};
+use crate::vehicle::{Program, VEHICLE};
+use crate::witness::Witness;
+
+pub(crate) const CONTROLLER: JausId = JausId::new(42, 1, 1);
+pub(crate) const SUPERVISOR: JausId = JausId::new(43, 1, 1);
+/// Ids in the crowd.
+pub(crate) const CROWD: usize = 1000;
+
+/// One node of the network.
+pub(crate) enum Party {
+    Vehicle(Box<Vehicle>),
+    Client(Box<Client>),
+    Peer(Box<Stack>),
+    Crowd,
+}
+
+/// The vehicle's program, while it lives, and what is seen of it.
+pub(crate) struct Vehicle {
+    program: Option<Program>,
+    plant: SharedPlant,
+    pub(crate) witness: Witness,
+}
+
+pub(crate) struct World {
+    pub(crate) network: Network<Party>,
+    pub(crate) plant: SharedPlant,
+    pub(crate) driver: Driver,
+    pub(crate) vehicle: Host,
+    pub(crate) controller: Host,
+    pub(crate) supervisor: Host,
+    pub(crate) crowd: Host,
+    crowd_size: usize,
+    seed: u64,
+}
+
+impl Vehicle {
+    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        let Some(program) = &mut self.program else {
+            return;
+        };
+        while let Some(message) = program.poll_transmit() {
+            // There may be no way to the client any more.
+            let _ = endpoint.send(now, message);
+        }
+        let controller = program.standing().controller;
+        self.witness
+            .note_controller(now, controller.map(|it| it.id));
+    }
+
+    /// Takes the program away.
+    pub(crate) fn take_program(&mut self) -> Option<Program> {
+        self.program.take()
+    }
+}
+
+impl Owner for Party {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+        match (self, event) {
+            (Self::Client(client), event) => client.handle_event(now, endpoint, event),
+            (Self::Vehicle(vehicle), EndpointEvent::Received(message)) => {
+                vehicle.plant.lock().advance(now);
+                vehicle.witness.note_message(now, &message);
+                if let Some(program) = &mut vehicle.program {
+                    program.handle_message(now, &message);
+                }
+                vehicle.settle(now, endpoint);
+            }
+            (Self::Peer(stack), EndpointEvent::Received(message)) => {
+                stack.handle_message(now, &message);
+                settle_peer(stack, now, endpoint);
+            }
+            _ => {}
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        match self {
+            Self::Client(client) => client.handle_timeout(now, endpoint),
+            Self::Vehicle(vehicle) => {
+                vehicle.plant.lock().advance(now);
+                if let Some(program) = &mut vehicle.program {
+                    program.handle_timeout(now);
+                }
+                vehicle.settle(now, endpoint);
+            }
+            Self::Peer(stack) => {
+                stack.handle_timeout(now);
+                settle_peer(stack, now, endpoint);
+            }
+            Self::Crowd => {}
+        }
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        match self {
+            Self::Client(client) => client.poll_timeout(),
+            Self::Vehicle(vehicle) => vehicle.program.as_ref()?.poll_timeout(),
+            Self::Peer(stack) => stack.poll_timeout(),
+            Self::Crowd => None,
+        }
+    }
+}
+
+fn settle_peer(stack: &mut Stack, now: Instant, endpoint: &mut Endpoint) {
+    while let Some(message) = stack.poll_transmit() {
+        // There may be no way to the peer yet.
+        let _ = endpoint.send(now, message);
+    }
+    while stack.poll_event().is_some() {}
+}
+
+fn endpoint(id: JausId) -> Endpoint {
+    let mut endpoint = Endpoint::new(Config::default());
+    endpoint.attach(id).expect("a component");
+    endpoint
+}
+
+fn crowd_ids() -> impl Iterator<Item = JausId> {
+    (0..CROWD).map(|number| JausId::new(200, (number / 250 + 1) as u8, (number % 250 + 1) as u8))
+}
+
+fn crowd() -> Endpoint {
+    let config = Config {
+        max_components: CROWD,
+        ..Config::default()
+    };
+    let mut endpoint = Endpoint::new(config);
+    for id in crowd_ids() {
+        endpoint.attach(id).expect("a component");
+    }
+    endpoint
+}
+
+fn peer(now: Instant, id: JausId) -> Party {
+    let profile = Profile::new(Kind::Vehicle, "Another");
+    let seed = u64::from(id.subsystem());
+    let discovery = Discovery::new(id, profile, Scope::System, Timing::default(), seed);
+    let mut stack = Stack::new(discovery, vec![Box::new(Liveness::new())]);
+    stack.start(now);
+    Party::Peer(Box::new(stack))
+}
+
+impl World {
+    const SLICE: Duration = Duration::from_millis(20);
+
+    pub(crate) fn new(random: &mut Random, driver: Driver, conditions: Conditions) -> Self {
+        let seed = random.number();
+        let mut network = Network::new(seed, conditions);
+        if seeds::is_traced() {
+            network.trace().print();
+        }
+        let now = network.now();
+        let plant = SharedPlant::new(now);
+        let vehicle = network.join_with(endpoint(VEHICLE), |clock| {
+            vehicle(now, driver, &plant, clock, seed)
+        });
+        let scope = random.choose(&[Scope::System, Scope::Nobody]);
+        let client =
+            |id, authority| Party::Client(Box::new(Client::new(now, id, driver, authority, scope)));
+        let controller = network.join(endpoint(CONTROLLER), client(CONTROLLER, 100));
+        let supervisor = network.join(endpoint(SUPERVISOR), client(SUPERVISOR, 200));
+        let crowd = network.join(crowd(), Party::Crowd);
+        for place in 0..random.below(4) {
+            let id = JausId::new(110 + place as u16, 1, 1);
+            network.join(endpoint(id), peer(now, id));
+        }
+        Self {
+            network,
+            plant,
+            driver,
+            vehicle,
+            controller,
+            supervisor,
+            crowd,
+            crowd_size: 0,
+            seed,
+        }
+    }
+
+    pub(crate) fn run_for(&mut self, time: Duration) {
+        let end = self.network.now() + time;
+        while self.network.now() < end {
+            let left = end.saturating_duration_since(self.network.now());
+            self.network.run_for(left.min(Self::SLICE));
+            self.plant.lock().advance(self.network.now());
+        }
+    }
+
+    /// Lets a client do something.
+    pub(crate) fn with_client(&mut self, host: Host, act: impl FnOnce(Instant, &mut Client)) {
+        self.network.act(host, |now, party, endpoint| {
+            let Party::Client(client) = party else {
+                panic!("a client is meant");
+            };
+            act(now, client);
+            client.settle(now, endpoint);
+        });
+    }
+
+    /// Lets something be done with the vehicle; what it returns is sent.
+    pub(crate) fn with_vehicle(
+        &mut self,
+        act: impl FnOnce(Instant, &mut Vehicle) -> Vec<Outgoing>,
+    ) {
+        self.network.act(self.vehicle, |now, party, endpoint| {
+            let Party::Vehicle(vehicle) = party else {
+                panic!("the vehicle is meant");
+            };
+            vehicle.plant.lock().advance(now);
+            for message in act(now, vehicle) {
+                // There may be no way to the client any more.
+                let _ = endpoint.send(now, message);
+            }
+        });
+    }
+
+    pub(crate) fn witness(&mut self) -> &mut Witness {
+        match self.network.owner(self.vehicle) {
+            Party::Vehicle(vehicle) => &mut vehicle.witness,
+            _ => panic!("the vehicle is meant"),
+        }
+    }
+
+    /// Starts the vehicle's program again, on the same hardware.
+    pub(crate) fn restart_vehicle(&mut self) {
+        let (now, clock) = (self.network.now(), self.network.clock(self.vehicle));
+        let witness = self.witness().clone();
+        let mut party = vehicle(now, self.driver, &self.plant, clock, self.seed);
+        if let Party::Vehicle(vehicle) = &mut party {
+            vehicle.witness = witness;
+        }
+        self.network.restart(self.vehicle, endpoint(VEHICLE), party);
+    }
+
+    /// Starts another controller with the same id.
+    pub(crate) fn restart_controller(&mut self, insists: bool) {
+        let now = self.network.now();
+        let mut client = Client::new(now, CONTROLLER, self.driver, 100, Scope::System);
+        if insists {
+            client.insist();
+        }
+        let party = Party::Client(Box::new(client));
+        self.network
+            .restart(self.controller, endpoint(CONTROLLER), party);
+    }
+
+    /// So many more ids of the crowd say one thing each.
+    pub(crate) fn let_crowd_come(&mut self, random: &mut Random, count: usize) {
+        let ids: Vec<_> = crowd_ids().skip(self.crowd_size).take(count).collect();
+        self.crowd_size += ids.len();
+        let report = ReportIdentification {
+            query_type: QueryType(4),
+            ..ReportIdentification::default()
+        };
+        let payloads = [encode(&QueryHeartbeatPulse {}), encode(&report)];
+        for some in ids.chunks(20) {
+            self.network.act(self.crowd, |now, _, endpoint| {
+                for &id in some {
+                    let payload = payloads[random.below(2)].clone();
+                    // What a full queue refuses is not in the crowd.
+                    let _ = endpoint.send(now, Outgoing::new(id, VEHICLE, payload));
+                }
+            });
+            self.run_for(Self::SLICE);
+        }
+    }
+}
+
+fn vehicle(
+    now: Instant,
+    driver: Driver,
+    plant: &SharedPlant,
+    clock: WallClock,
+    seed: u64,
+) -> Party {
+    Party::Vehicle(Box::new(Vehicle {
+        program: Some(Program::new(now, driver, plant, clock, seed)),
+        plant: plant.clone(),
+        witness: Witness::new(driver),
+    }))
+}
