@@ -16,7 +16,7 @@ use super::{output, runtime, settings};
 use crate::address::JausId;
 use crate::component::Kind;
 use crate::node::{Config, Node};
-use crate::parts::{Part, Seat};
+use crate::parts::{Part, PartError, Seat};
 
 /// The flags of a program that is one [`Part`].
 pub trait Ready: Args {
@@ -73,7 +73,7 @@ const USUAL: &str = "warn,jaus::parts=info,jaus::ocu=info,jaus::gateway=info,jau
 /// Runs a program to its end: reads flags and settings, takes a place on a node, lets the part run
 /// until Ctrl-C or SIGTERM, and takes leave.
 ///
-/// Exit status: 0 it was told to end; 1 it could not go on; 2 it could not begin.
+/// Exit status: 0 it was told to end, by a signal or by Management's Shutdown; 1 it could not go on; 2 it could not begin.
 #[must_use]
 pub fn launch<F: Ready>() -> ExitCode {
     let program = match read::<F>() {
@@ -124,8 +124,12 @@ impl<F: Ready> Program<F> {
             let outcome = tokio::select! {
                 result = part.run(seat) => {
                     let Err(error): Result<Infallible, _> = result;
+                    let outcome = match error {
+                        PartError::ShutDown => Outcome::Done,
+                        _ => Outcome::Incomplete,
+                    };
                     output::say_as(F::PROGRAM, error);
-                    Outcome::Incomplete
+                    outcome
                 }
                 () = systemd.watch() => Outcome::Done,
                 () = &mut until => Outcome::Done,

@@ -73,6 +73,9 @@ pub enum PartError {
     /// It can not be attached.
     #[error(transparent)]
     Attach(#[from] component::AttachError),
+    /// The client in control has shut it down (Management's Shutdown).
+    #[error("shut down by the client in control")]
+    ShutDown,
     /// The node below it has stopped.
     #[error("the node has stopped")]
     NodeStopped,

@@ -17,7 +17,7 @@ use std::time::Duration;
 
 use tokio::sync::{Notify, mpsc};
 
-use super::drivers::Sense;
+use super::drivers::{Sense, shut_down};
 use super::{Part, PartError, Seat};
 use crate::address::JausId;
 use crate::component::{AccessControl, Component, Management};
@@ -78,6 +78,7 @@ impl Part for Planner {
             () = watch(Link::Vector) => {}
             () = watch(Link::Primitive) => {}
             end = chain::follow(poses, &tell) => end?,
+            end = shut_down(&component) => return end,
         }
         Err(PartError::NodeStopped)
     }

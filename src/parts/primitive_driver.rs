@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::drivers::{FaultMonitor, Watchman, guard};
+use super::drivers::{FaultMonitor, Watchman, guard, shut_down};
 use super::stop_line::StopLine;
 use super::{Part, PartError, Seat};
 use crate::actuator::{
@@ -205,7 +205,11 @@ impl PrimitiveDriver {
             stop,
             stopped: false,
         };
-        driver.watch().await
+        let component = driver.component.clone();
+        tokio::select! {
+            end = driver.watch() => end,
+            end = shut_down(&component) => end,
+        }
     }
 }
 

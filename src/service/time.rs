@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 
 use super::calendar::Date;
-use super::{Context, Handled, Service, code_of, read};
+use super::{Context, Handled, Hazards, Service, code_of, read};
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::messages::core::report_time::{DateStamp, TimeStamp};
@@ -134,6 +134,13 @@ impl Time {
 impl Service for Time {
     fn offers(&self) -> Vec<ServiceId> {
         vec![core::time::V1_1, core::time::V1_0]
+    }
+
+    fn hazards(&self) -> Hazards {
+        Hazards {
+            set_up_by: Some(SetTime::NAME),
+            ..Hazards::default()
+        }
     }
 
     fn handle_message(

@@ -199,7 +199,9 @@ mod emergency {
     use crate::component::{Component, DeliverError, SendError};
     use crate::messages::core::set_emergency::EmergencyCode;
     use crate::messages::core::{ClearEmergency, SetEmergency};
+    use crate::wire::Priority;
 
+    const PRIORITY: Priority = Priority::SafetyCritical;
     const SET: SetEmergency = SetEmergency {
         emergency_code: EmergencyCode(1),
     };
@@ -209,7 +211,7 @@ mod emergency {
 
     /// Sets an emergency at once, without an acknowledgement.
     pub(super) fn send(component: &Component, peer: JausId) -> Result<(), SendError> {
-        component.send(peer, &SET)
+        component.send_with(PRIORITY, peer, &SET)
     }
 
     /// Sets an emergency or clears it, acknowledged.
@@ -219,9 +221,9 @@ mod emergency {
         on: bool,
     ) -> Result<(), DeliverError> {
         if on {
-            component.deliver(peer, &SET).await
+            component.deliver_with(PRIORITY, peer, &SET).await
         } else {
-            component.deliver(peer, &CLEAR).await
+            component.deliver_with(PRIORITY, peer, &CLEAR).await
         }
     }
 }

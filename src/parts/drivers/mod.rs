@@ -14,4 +14,4 @@ pub(super) use freshness::Freshness;
 pub(super) use helm::{Helm, HelmSettings, Order};
 pub(super) use next::{Language, Next};
 pub(super) use senses::Sense;
-pub(super) use standing::{Watchman, guard};
+pub(super) use standing::{Watchman, guard, shut_down};
