@@ -175,7 +175,8 @@ async fn a_service_can_be_offered_and_withdrawn_while_the_component_runs() {
     let id = jaus::messages::core::management::LATEST;
     rover
         .offer(Handlers::new(id).answer(|_: QueryStatus| ReportStatus::default()))
-        .await;
+        .await
+        .unwrap();
     assert!(within_limit(ask()).await.is_ok());
     rover.withdraw(id.urn).await;
     assert!(within_limit(ask()).await.is_err());

@@ -21,3 +21,5 @@ mod drive;
 mod hostile;
 #[path = "ocu/looking.rs"]
 mod looking;
+#[path = "ocu/missing.rs"]
+mod missing;

@@ -1,12 +1,12 @@
-//! The lines of a stepper motor's driver on a GPIO chip of Linux.
+//! Lines on a GPIO chip of Linux: those of a stepper motor's driver, and that of a stop input.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use gpiocdev::Request;
-use gpiocdev::line::{Offset, Value};
+use gpiocdev::line::{Bias, Offset, Value};
 
-use super::Lines;
+use super::{Lines, StopInput};
 
 /// Two lines of a chip: pulses and direction.
 #[derive(Debug)]
@@ -18,20 +18,18 @@ pub struct GpioLines {
     reversed: bool,
 }
 
-/// Why lines can not be had.
+/// Why lines cannot be opened.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "lines {step} and {direction} of {} can not be had: {why}; see `gpioinfo` for what there is and who \
-     uses it, and mind that the user may write to the chip",
+    "{lines} of {} cannot be opened: {why}; `gpioinfo` lists the lines and who uses them, and the user \
+     must be allowed to write to the chip",
     chip.display()
 )]
 pub struct GpioError {
     /// The chip.
     chip: PathBuf,
-    /// The line of the pulses.
-    step: Offset,
-    /// The line of the direction.
-    direction: Offset,
+    /// The lines, such as `line 5`.
+    lines: String,
     /// What the kernel says.
     why: gpiocdev::Error,
 }
@@ -62,8 +60,7 @@ impl GpioLines {
             }),
             Err(why) => Err(GpioError {
                 chip: chip.to_owned(),
-                step,
-                direction,
+                lines: format!("lines {step} and {direction}"),
                 why,
             }),
         }
@@ -82,5 +79,45 @@ impl Lines for GpioLines {
 
     fn set_step(&mut self, high: bool) -> io::Result<()> {
         self.set(self.step, high)
+    }
+}
+
+/// A stop input on a line of a chip, with the chip's pull-up: the contact connects the line to
+/// ground while it is closed, so that a cut wire reads as open.
+#[derive(Debug)]
+pub struct GpioStop {
+    request: Request,
+    line: Offset,
+}
+
+impl GpioStop {
+    /// Takes a line of a chip such as `/dev/gpiochip0` as an input.
+    ///
+    /// # Errors
+    /// If there is no such chip or line, or it is in use.
+    pub fn open(chip: &Path, line: Offset) -> Result<Self, GpioError> {
+        let request = Request::builder()
+            .on_chip(chip)
+            .with_consumer("jaus stop")
+            .with_line(line)
+            .as_input()
+            .as_active_low()
+            .with_bias(Bias::PullUp)
+            .request();
+        match request {
+            Ok(request) => Ok(Self { request, line }),
+            Err(why) => Err(GpioError {
+                chip: chip.to_owned(),
+                lines: format!("line {line}"),
+                why,
+            }),
+        }
+    }
+}
+
+impl StopInput for GpioStop {
+    fn is_closed(&mut self) -> io::Result<bool> {
+        let value = self.request.value(self.line).map_err(io::Error::other)?;
+        Ok(value == Value::Active)
     }
 }

@@ -24,30 +24,40 @@ mod motor;
 #[cfg(feature = "parts")]
 mod pulses;
 mod stepper;
+mod stop;
 mod wheels;
 
 use std::time::Instant;
 
 #[cfg(all(feature = "gpio", target_os = "linux"))]
-pub use gpio::{GpioError, GpioLines};
-pub use motor::{MotorConfig, SimulatedMotor};
+pub use gpio::{GpioError, GpioLines, GpioStop};
+pub use motor::{FaultSwitch, MotorConfig, SimulatedMotor};
 #[cfg(feature = "parts")]
 pub use pulses::{Lines, PulseMotor};
 pub use stepper::{Stepper, StepperConfig, StepperPoll};
+pub use stop::{Interlock, SimulatedStop, StopFile, StopInput};
 pub use wheels::{Odometer, Wheels, WheelsConfig};
 
-/// One drive: a wheel, or the wheels of one side, with whatever turns them and counts how far.
+/// One drive: a wheel, or the wheels of one side, with the motor that turns them and counts how far.
+///
+/// A drive MUST have its own deadline: without a [`command`](Self::command) for 200 ms
+/// ([`CommandDeadline::DEFAULT`](crate::vehicle::CommandDeadline::DEFAULT), a setting of ours) it
+/// brakes to [`Command::STOP`] by itself. Commands are repeated every 20 ms while it moves, so that
+/// silence means that the program which drives it hangs. The deadline must not depend on that
+/// program: keep it in the motor controller, or on a thread that only writes to the motor, as
+/// `PulseMotor` does.
 pub trait Actuator: Send {
     /// It is `now`: moves on, or reads back what has been done.
     fn handle_time(&mut self, now: Instant);
 
-    /// What it is to do until it is told something else.
+    /// What it is to do until the next command, and for at most the deadline.
     fn command(&mut self, command: Command);
 
     /// Metres that it has travelled since it was made, backwards negative.
     fn travel(&self) -> f64;
 
-    /// What is broken, if it can not do what it is told: for people.
+    /// Why it cannot do what it is commanded, as text for the operator; `None` while it can. It
+    /// reports a fault until it is gone.
     fn fault(&self) -> Option<String> {
         None
     }
@@ -68,6 +78,16 @@ impl Command {
         drive: 0.0,
         brake: 1.0,
     };
+
+    /// The command, or [`STOP`](Self::STOP) in place of one that is not finite.
+    #[must_use]
+    pub const fn or_stop(self) -> Self {
+        if self.drive.is_finite() && self.brake.is_finite() {
+            self
+        } else {
+            Self::STOP
+        }
+    }
 }
 
 impl Default for Command {

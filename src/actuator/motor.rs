@@ -1,9 +1,10 @@
 //! A simulated drive: a motor whose speed follows its voltage after a moment, and a brake.
 
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::{Actuator, Command};
-use crate::vehicle::Random;
+use crate::vehicle::{CommandDeadline, Random};
 
 /// How a simulated motor behaves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,10 +19,12 @@ pub struct MotorConfig {
     pub noise: f64,
     /// Where the unevenness comes from: the same seed and the same commands give the same travel.
     pub seed: u64,
+    /// It brakes by itself when its last command is older than this.
+    pub deadline: Duration,
 }
 
 impl Default for MotorConfig {
-    /// The motor of a small rover: 2 m/s, a quarter of a second, 4 m/s², even.
+    /// The motor of a small rover: 2 m/s, a quarter of a second, 4 m/s², even, 200 ms.
     fn default() -> Self {
         Self {
             top: 2.0,
@@ -29,7 +32,29 @@ impl Default for MotorConfig {
             braking: 4.0,
             noise: 0.0,
             seed: 1,
+            deadline: CommandDeadline::DEFAULT,
         }
+    }
+}
+
+/// Breaks and mends a [`SimulatedMotor`]. Cheap to clone; the clones are one switch.
+#[derive(Debug, Clone, Default)]
+pub struct FaultSwitch(Arc<Mutex<Option<String>>>);
+
+impl FaultSwitch {
+    /// From now on the motor has this fault: it turns the wheel no more, and can still brake.
+    pub fn fail(&self, reason: impl Into<String>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(reason.into());
+    }
+
+    /// The motor works again.
+    pub fn mend(&self) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    fn fault(&self) -> Option<String> {
+        let fault = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        fault.clone()
     }
 }
 
@@ -38,6 +63,8 @@ impl Default for MotorConfig {
 pub struct SimulatedMotor {
     config: MotorConfig,
     command: Command,
+    deadline: CommandDeadline,
+    switch: FaultSwitch,
     speed: f64,
     travel: f64,
     unevenness: f64,
@@ -55,16 +82,24 @@ impl SimulatedMotor {
 
     /// A motor at rest.
     #[must_use]
-    pub const fn new(config: MotorConfig) -> Self {
+    pub fn new(config: MotorConfig) -> Self {
         Self {
             config,
             command: Command::STOP,
+            deadline: CommandDeadline::new(config.deadline),
+            switch: FaultSwitch::default(),
             speed: 0.0,
             travel: 0.0,
             unevenness: 0.0,
             random: Random::new(config.seed),
             time: None,
         }
+    }
+
+    /// A switch that breaks and mends this motor.
+    #[must_use]
+    pub fn fault_switch(&self) -> FaultSwitch {
+        self.switch.clone()
     }
 
     fn step(&mut self, seconds: f64) {
@@ -94,6 +129,12 @@ impl Actuator for SimulatedMotor {
     fn handle_time(&mut self, now: Instant) {
         let since = now.saturating_duration_since(self.time.unwrap_or(now));
         self.time = Some(self.time.map_or(now, |time| time.max(now)));
+        if self.deadline.has_passed(now) {
+            self.command = Command::STOP;
+        }
+        if self.fault().is_some() {
+            self.command.drive = 0.0;
+        }
         let mut left = since.min(Self::LONGEST_GAP);
         while !left.is_zero() {
             let step = left.min(Self::STEP);
@@ -103,11 +144,16 @@ impl Actuator for SimulatedMotor {
     }
 
     fn command(&mut self, command: Command) {
-        self.command = command;
+        self.command = command.or_stop();
+        self.deadline.restart(self.time);
     }
 
     fn travel(&self) -> f64 {
         self.travel
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.switch.fault()
     }
 }
 
@@ -124,6 +170,7 @@ mod tests {
         motor.command(command);
         let start = motor.time.unwrap_or_else(Instant::now);
         for step in 0..=(seconds * 50.0) as u32 {
+            motor.command(command);
             motor.handle_time(start + Duration::from_millis(20) * step);
         }
         (motor.travel, motor.speed)
@@ -141,6 +188,52 @@ mod tests {
         assert!((speed - 2.0).abs() < 0.01, "{speed}");
         let (_, speed) = driven(&mut motor, Command::STOP, 1.0);
         assert!(speed.abs() < 1e-6, "{speed}");
+    }
+
+    #[test]
+    fn it_stops_by_itself_when_commands_are_not_repeated() {
+        let mut motor = SimulatedMotor::new(MotorConfig::default());
+        driven(&mut motor, AHEAD, 2.0);
+        let last = motor.time.unwrap();
+        let mut now = last;
+        let step = Duration::from_millis(10);
+        // The last command came one step of the clock before.
+        while now < last + CommandDeadline::DEFAULT - 2 * step {
+            now += step;
+            motor.handle_time(now);
+        }
+        assert!(motor.speed > 1.9, "still within the deadline");
+        // It brakes with 4 m/s².
+        for _ in 0..53 {
+            now += step;
+            motor.handle_time(now);
+        }
+        assert!(motor.speed.abs() < 1e-6, "{}", motor.speed);
+        let travel = motor.travel;
+        motor.handle_time(now + step);
+        assert_eq!(motor.travel.to_bits(), travel.to_bits());
+    }
+
+    #[test]
+    fn a_broken_motor_turns_no_wheel_and_brakes() {
+        let mut motor = SimulatedMotor::new(MotorConfig::default());
+        let switch = motor.fault_switch();
+        switch.fail("no current");
+        assert_eq!(driven(&mut motor, AHEAD, 1.0), (0.0, 0.0));
+        assert_eq!(motor.fault().as_deref(), Some("no current"));
+        switch.mend();
+        assert!(driven(&mut motor, AHEAD, 1.0).1 > 1.9);
+    }
+
+    #[test]
+    fn a_command_that_is_no_number_stops_it() {
+        let mut motor = SimulatedMotor::new(MotorConfig::default());
+        let unknown = Command {
+            drive: f64::NAN,
+            brake: 0.0,
+        };
+        driven(&mut motor, AHEAD, 1.0);
+        assert!(driven(&mut motor, unknown, 1.0).1.abs() < 1e-6);
     }
 
     #[test]

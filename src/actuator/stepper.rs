@@ -4,6 +4,7 @@
 use std::time::{Duration, Instant};
 
 use super::Command;
+use crate::vehicle::CommandDeadline;
 
 /// How a stepper motor drives its wheel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,16 +17,20 @@ pub struct StepperConfig {
     pub acceleration: f64,
     /// The same when getting slower.
     pub deceleration: f64,
+    /// It slows down to a stop by itself when its last command is older than this.
+    pub deadline: Duration,
 }
 
 impl Default for StepperConfig {
-    /// 1600 pulses a turn and a wheel of 0.2 m: 2546 pulses a metre, up to 1 m/s, 1 and 2 m/s².
+    /// 1600 pulses a turn and a wheel of 0.2 m: 2546 pulses a metre, up to 1 m/s, 1 and 2 m/s²,
+    /// 200 ms.
     fn default() -> Self {
         Self {
             steps_per_metre: 2546.0,
             top: 1.0,
             acceleration: 1.0,
             deceleration: 2.0,
+            deadline: CommandDeadline::DEFAULT,
         }
     }
 }
@@ -74,10 +79,20 @@ impl Stepper {
 
     /// What it is to do until it is told something else.
     pub fn command(&mut self, command: Command) {
+        let command = command.or_stop();
         let share = command.drive.clamp(-1.0, 1.0) * (1.0 - command.brake.clamp(0.0, 1.0));
         let wanted = share * self.config.top * self.config.steps_per_metre;
         // Slower than a pulse in ten seconds is as good as standing still.
         self.wanted = if wanted.abs() < 0.1 { 0.0 } else { wanted };
+    }
+
+    /// The same motor at rest, after so many pulses.
+    #[cfg(feature = "parts")]
+    pub(super) const fn at_rest(&self, steps: i64) -> Self {
+        Self {
+            steps,
+            ..Self::new(self.config)
+        }
     }
 
     /// Pulses so far, backwards negative.

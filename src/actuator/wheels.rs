@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use super::{Actuator, Command};
+use super::{Actuator, Command, Interlock};
 use crate::vehicle::{Acceleration, Drive, Effort, Limits, Motion, Platform, Pose, Velocity};
 use crate::vehicle::{DeadReckoning, WheelCount};
 
@@ -14,8 +14,8 @@ pub struct WheelsConfig {
     pub track: f64,
     /// The speed of either side at full propulsion, in metres per second.
     pub top: f64,
-    /// What the platform can do at most. Full effort forward is its speed, full effort in a turn its
-    /// yaw rate.
+    /// What the platform can do at most. Full effort forward is its speed, full effort backward its
+    /// reverse speed, full effort in a turn its yaw rate.
     pub limits: Limits,
 }
 
@@ -81,6 +81,7 @@ pub struct Wheels<A> {
     motion: Motion,
     /// When the counter began, and when it was read last.
     times: Option<(Instant, Instant)>,
+    interlock: Interlock,
 }
 
 impl<A: Actuator> Wheels<A> {
@@ -97,7 +98,20 @@ impl<A: Actuator> Wheels<A> {
             reckoning: DeadReckoning::at(Pose::default()),
             motion: Motion::default(),
             times: None,
+            interlock: Interlock::default(),
         }
+    }
+
+    /// Stands still while an interlock is open.
+    #[must_use]
+    pub fn with_interlock(mut self, interlock: Interlock) -> Self {
+        self.interlock = interlock;
+        self
+    }
+
+    /// Whether both sides have to stand still, whatever is commanded.
+    fn is_locked(&self) -> bool {
+        self.interlock.is_open() || self.fault().is_some()
     }
 
     /// Drives both sides at speeds in metres per second; what is too fast for one side slows both,
@@ -110,16 +124,27 @@ impl<A: Actuator> Wheels<A> {
             drive: share / most,
             brake,
         });
+        self.command(left, right);
+    }
+
+    /// Commands both sides. With a fault on either, both stop: one side alone would turn the vehicle.
+    fn command(&mut self, left: Command, right: Command) {
+        let locked = self.is_locked();
+        let [left, right] = [left, right].map(|it| if locked { Command::STOP } else { it });
         self.left.command(left);
         self.right.command(right);
     }
 
     fn push(&mut self, effort: Effort) {
         let Limits {
-            speed, yaw_rate, ..
+            speed,
+            reverse,
+            yaw_rate,
+            ..
         } = self.limits;
+        let along = if effort.forward < 0.0 { reverse } else { speed };
         let velocity = Velocity::forward(
-            effort.forward.clamp(-1.0, 1.0) * speed,
+            effort.forward.clamp(-1.0, 1.0) * along,
             effort.turn.clamp(-1.0, 1.0) * yaw_rate,
         );
         self.drive_at(velocity, effort.brake.max(effort.turn_brake));
@@ -128,7 +153,7 @@ impl<A: Actuator> Wheels<A> {
     fn read(&mut self, now: Instant) {
         let (began, last) = self.times.unwrap_or((now, now));
         self.times = Some((began, now));
-        let fault = self.left.fault().or_else(|| self.right.fault());
+        let fault = self.fault();
         let milliseconds = now.saturating_duration_since(began).as_millis();
         let count = {
             let mut reading = self.odometer.lock();
@@ -161,6 +186,9 @@ impl<A: Actuator> Platform for Wheels<A> {
     fn handle_time(&mut self, now: Instant) {
         self.left.handle_time(now);
         self.right.handle_time(now);
+        if self.is_locked() {
+            self.command(Command::STOP, Command::STOP);
+        }
         self.read(now);
     }
 
@@ -174,11 +202,8 @@ impl<A: Actuator> Platform for Wheels<A> {
     }
 
     fn drive(&mut self, command: Drive) {
-        match command {
-            Drive::Stop => {
-                self.left.command(Command::STOP);
-                self.right.command(Command::STOP);
-            }
+        match command.or_stop() {
+            Drive::Stop => self.command(Command::STOP, Command::STOP),
             Drive::Velocity(velocity) => self.drive_at(self.limits.clamp(velocity), 0.0),
             Drive::Effort(effort) => self.push(effort),
         }
@@ -260,5 +285,73 @@ mod tests {
         pilot.stop();
         run(&mut pilot, now, 2.0);
         assert!(pilot.is_at_rest());
+    }
+
+    #[test]
+    fn full_effort_backwards_keeps_the_reverse_limit() {
+        let (mut pilot, _) = rover();
+        let start = Instant::now();
+        pilot.handle_time(start);
+        pilot.pursue(effort(-1.0, 0.0));
+        run(&mut pilot, start, 3.0);
+        let speed = pilot.motion().velocity.x;
+        assert!((speed + Limits::default().reverse).abs() < 0.01, "{speed}");
+    }
+
+    #[test]
+    fn a_fault_on_one_side_stops_both_until_it_is_gone() {
+        let [left, right] = [1, 2].map(|seed| {
+            SimulatedMotor::new(MotorConfig {
+                seed,
+                ..MotorConfig::default()
+            })
+        });
+        for switch in [left.fault_switch(), right.fault_switch()] {
+            let wheels = [left.clone(), right.clone()];
+            let [left, right] = wheels;
+            let odometer = Odometer::new(7);
+            let mut wheels = Wheels::new(left, right, WheelsConfig::default(), odometer.clone());
+            let forward = Drive::Velocity(Velocity::forward(1.0, 0.0));
+            let mut now = Instant::now();
+            let mut drive = |wheels: &mut Wheels<SimulatedMotor>, seconds: f64| {
+                let end = now + Duration::from_secs_f64(seconds);
+                while now < end {
+                    now += Pilot::STEP;
+                    wheels.drive(forward);
+                    wheels.handle_time(now);
+                }
+                wheels.motion().velocity
+            };
+            assert!(drive(&mut wheels, 2.0).x > 0.9);
+            switch.fail("no current");
+            drive(&mut wheels, 0.6);
+            assert_eq!(wheels.fault().as_deref(), Some("no current"));
+            assert_eq!(odometer.fault().as_deref(), Some("no current"));
+            let before = odometer.count();
+            drive(&mut wheels, 1.0);
+            let after = odometer.count();
+            assert!(
+                (after.left - before.left).abs() < 1e-6,
+                "the left side stands"
+            );
+            assert!(
+                (after.right - before.right).abs() < 1e-6,
+                "the right side stands"
+            );
+            switch.mend();
+            assert!(drive(&mut wheels, 2.0).x > 0.9, "it works again");
+        }
+    }
+
+    #[test]
+    fn a_drive_command_that_is_no_number_stops_both_sides() {
+        let (mut pilot, _) = rover();
+        let start = Instant::now();
+        pilot.handle_time(start);
+        pilot.pursue(effort(1.0, 0.0));
+        let now = run(&mut pilot, start, 2.0);
+        pilot.pursue(effort(f64::NAN, 0.0));
+        run(&mut pilot, now, 2.0);
+        assert!(pilot.motion().velocity.is_rest());
     }
 }

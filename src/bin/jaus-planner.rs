@@ -7,7 +7,7 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::cli::failure::Failure;
 use jaus::cli::{Ready, launch, runtime};
-use jaus::mission::{Settings, Vehicle};
+use jaus::mission::{LostLink, Settings, Vehicle};
 use jaus::parts::{Part, Planner};
 
 #[derive(Args)]
@@ -48,6 +48,11 @@ struct Flags {
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = runtime::seconds)]
     stall: Duration,
 
+    /// What the vehicle does when the operator's link is lost: stop; hold its position, and keep the
+    /// mission for a new operator's approval; or return along the driven path
+    #[arg(long, value_name = "POLICY", default_value = "stop", value_parser = lost_link)]
+    lost_link: LostLink,
+
     /// With which authority the path segment driver is controlled; an operator with a greater one
     /// can take over
     #[arg(long, value_name = "CODE", default_value = "100")]
@@ -83,6 +88,7 @@ impl Ready for Flags {
                 patience: self.patience,
                 stall: self.stall,
                 speed: self.speed,
+                lost_link: self.lost_link,
                 ..Settings::default()
             },
             map: self.map,
@@ -102,5 +108,14 @@ fn between(text: &str, least: f64, most: f64) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if (least..=most).contains(&number) => Ok(number),
         _ => Err(format!("write a number from {least} to {most}")),
+    }
+}
+
+fn lost_link(text: &str) -> Result<LostLink, String> {
+    match text {
+        "stop" => Ok(LostLink::Stop),
+        "hold" => Ok(LostLink::Hold),
+        "return" => Ok(LostLink::Return),
+        _ => Err("write stop, hold or return".to_owned()),
     }
 }

@@ -1,5 +1,6 @@
 //! `jaus-primitive-driver`: the wheels of a vehicle, simulated or on stepper motors.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -9,7 +10,7 @@ use jaus::address::JausId;
 use jaus::cli::failure::Failure;
 use jaus::cli::runtime::{between, seconds};
 use jaus::cli::{Ready, launch};
-use jaus::parts::{Motors, Part, PrimitiveDriver};
+use jaus::parts::{Motors, Part, PrimitiveDriver, Stop};
 use jaus::vehicle::Limits;
 
 #[derive(Args)]
@@ -30,9 +31,18 @@ struct Flags {
     #[arg(long, value_name = "SECONDS", default_value = "0.5", value_parser = seconds)]
     silence: Duration,
 
+    /// The motors brake by themselves when the program has not repeated its command for so many
+    /// seconds, because it hangs
+    #[arg(long, value_name = "SECONDS", default_value = "0.2", value_parser = seconds)]
+    deadline: Duration,
+
     /// After how many seconds control ends unless its client asks for it again; 0 for never
     #[arg(long, value_name = "SECONDS", default_value = "3")]
     control_timeout: u8,
+
+    /// Stop while this file exists: a simulated stop input
+    #[arg(long, value_name = "FILE")]
+    stop_file: Option<PathBuf>,
 
     #[command(flatten)]
     simulation: Simulation,
@@ -70,6 +80,7 @@ impl Ready for Flags {
     fn part(self) -> Result<impl Part, Failure> {
         Ok(PrimitiveDriver {
             motors: self.motors(),
+            stop: self.stop(),
             wheels: WheelsConfig {
                 track: self.track,
                 top: self.speed,
@@ -87,9 +98,17 @@ impl Ready for Flags {
 }
 
 impl Flags {
+    fn stop(&self) -> Option<Stop> {
+        #[cfg(all(feature = "gpio", target_os = "linux"))]
+        if let Some((chip, line)) = self.gpio.stop_line.clone() {
+            return Some(Stop::Gpio { chip, line });
+        }
+        self.stop_file.clone().map(Stop::File)
+    }
+
     fn motors(&self) -> Motors {
         #[cfg(all(feature = "gpio", target_os = "linux"))]
-        if let Some(motors) = self.gpio.motors(self.speed) {
+        if let Some(motors) = self.gpio.motors(self.speed, self.deadline) {
             return Motors::Gpio(motors);
         }
         Motors::Simulated(MotorConfig {
@@ -97,6 +116,7 @@ impl Flags {
             response: self.simulation.response,
             noise: self.simulation.noise,
             seed: self.simulation.seed,
+            deadline: self.deadline,
             ..MotorConfig::default()
         })
     }
@@ -105,6 +125,7 @@ impl Flags {
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 mod gpio {
     use std::path::PathBuf;
+    use std::time::Duration;
 
     use clap::Args;
     use jaus::actuator::StepperConfig;
@@ -126,6 +147,12 @@ mod gpio {
         #[arg(long, value_name = "STEP,DIRECTION", value_parser = lines, requires = "gpio")]
         right: Option<(u32, u32)>,
 
+        /// A stop input: a normally closed contact between this line and ground, such as
+        /// /dev/gpiochip0:5. An open contact or a cut wire stops the motors; closed again, it ends all
+        /// emergencies
+        #[arg(long, value_name = "CHIP:LINE", value_parser = chip_and_line, conflicts_with = "stop_file")]
+        pub(super) stop_line: Option<(PathBuf, u32)>,
+
         /// Pulses for a metre of travel, from 1 to 1000000
         #[arg(long, value_name = "PULSES", default_value = "2546", value_parser = |text: &str| between(text, 1.0, 1e6))]
         steps_per_metre: f64,
@@ -137,7 +164,7 @@ mod gpio {
     }
 
     impl Gpio {
-        pub(super) fn motors(&self, top: f64) -> Option<GpioMotors> {
+        pub(super) fn motors(&self, top: f64, deadline: Duration) -> Option<GpioMotors> {
             Some(GpioMotors {
                 chip: self.gpio.clone()?,
                 stepper: StepperConfig {
@@ -145,11 +172,20 @@ mod gpio {
                     top,
                     acceleration: self.ramp,
                     deceleration: 2.0 * self.ramp,
+                    deadline,
                 },
                 left: self.left?,
                 right: self.right?,
             })
         }
+    }
+
+    fn chip_and_line(text: &str) -> Result<(PathBuf, u32), String> {
+        let pair = text.rsplit_once(':').filter(|(chip, _)| !chip.is_empty());
+        pair.and_then(|(chip, line)| Some((PathBuf::from(chip), line.parse().ok()?)))
+            .ok_or_else(|| {
+                "write a chip and the number of a line such as /dev/gpiochip0:5".to_owned()
+            })
     }
 
     fn lines(text: &str) -> Result<(u32, u32), String> {

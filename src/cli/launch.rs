@@ -11,11 +11,12 @@ use clap::{ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser};
 use super::failure::{Failure, Outcome};
 use super::logging::Logging;
 use super::network::Network;
+use super::systemd::Systemd;
 use super::{output, runtime, settings};
 use crate::address::JausId;
 use crate::component::Kind;
 use crate::node::{Config, Node};
-use crate::parts::{Part, Seat};
+use crate::parts::{Part, PartError, Seat};
 
 /// The flags of a program that is one [`Part`].
 pub trait Ready: Args {
@@ -65,13 +66,14 @@ struct Program<F: Args> {
     logging: Logging,
 }
 
-/// What is told without `-v`: what parts have to say, and what goes wrong.
-const USUAL: &str = "error,jaus::parts=info,jaus::ocu=info,jaus::gateway=info,jaus::cli=info";
+/// What is logged without `-v`: warnings of every module, such as an emergency or a log that cannot be
+/// written, and what parts report of themselves.
+const USUAL: &str = "warn,jaus::parts=info,jaus::ocu=info,jaus::gateway=info,jaus::cli=info";
 
 /// Runs a program to its end: reads flags and settings, takes a place on a node, lets the part run
 /// until Ctrl-C or SIGTERM, and takes leave.
 ///
-/// Exit status: 0 it was told to end; 1 it could not go on; 2 it could not begin.
+/// Exit status: 0 it was told to end, by a signal or by Management's Shutdown; 1 it could not go on; 2 it could not begin.
 #[must_use]
 pub fn launch<F: Ready>() -> ExitCode {
     let program = match read::<F>() {
@@ -118,14 +120,21 @@ impl<F: Ready> Program<F> {
                 kind,
                 name,
             };
+            let systemd = Systemd::from_environment();
             let outcome = tokio::select! {
                 result = part.run(seat) => {
                     let Err(error): Result<Infallible, _> = result;
+                    let outcome = match error {
+                        PartError::ShutDown => Outcome::Done,
+                        _ => Outcome::Incomplete,
+                    };
                     output::say_as(F::PROGRAM, error);
-                    Outcome::Incomplete
+                    outcome
                 }
+                () = systemd.watch() => Outcome::Done,
                 () = &mut until => Outcome::Done,
             };
+            systemd.stopping();
             place.stay.end().await;
             Ok(outcome)
         })
@@ -227,4 +236,31 @@ fn in_file(file: &Path, error: &clap::Error) -> Failure {
         file.display(),
         told.join("; ")
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use tracing_subscriber::filter::Targets;
+
+    use super::*;
+
+    #[test]
+    fn warnings_of_every_module_are_logged_without_a_flag() {
+        let usual: Targets = USUAL.parse().unwrap();
+        for target in [
+            "jaus::service::control",
+            "jaus::view::log",
+            "jaus::endpoint",
+        ] {
+            assert!(
+                usual.would_enable(target, &tracing::Level::WARN),
+                "{target}"
+            );
+            assert!(
+                !usual.would_enable(target, &tracing::Level::INFO),
+                "{target}"
+            );
+        }
+        assert!(usual.would_enable("jaus::parts::planner", &tracing::Level::INFO));
+    }
 }

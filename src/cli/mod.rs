@@ -17,6 +17,7 @@ pub mod output;
 pub mod runtime;
 pub mod settings;
 pub mod statistics;
+mod systemd;
 
 pub use failure::{Failure, Outcome};
 pub use launch::{Ready, launch};

@@ -167,8 +167,25 @@ impl Component {
         destination: JausId,
         message: &M,
     ) -> Result<(), DeliverError> {
+        self.deliver_with(Priority::Standard, destination, message)
+            .await
+    }
+
+    /// The same as [`deliver`](Self::deliver), with a priority.
+    ///
+    /// # Errors
+    /// Those of [`deliver`](Self::deliver).
+    pub async fn deliver_with<M: Message>(
+        &self,
+        priority: Priority,
+        destination: JausId,
+        message: &M,
+    ) -> Result<(), DeliverError> {
         let payload = message.encode()?;
-        let outgoing = Outgoing::new(self.id(), destination, payload);
+        let outgoing = Outgoing {
+            priority,
+            ..Outgoing::new(self.id(), destination, payload)
+        };
         Ok(self.shared.sender.deliver(outgoing).await?)
     }
 

@@ -76,8 +76,8 @@ mod watch;
 pub use crate::service::{
     AccessControl, CannotSubscribe, Change, Condition, ControlLost, ControlRefused, Directory,
     EventSettings, Handlers, Identification, Kind, Level, Liveness, Loss, Management, Offer,
-    Outage, Patience, Rejection, Scope, Service, Standing, State, SubscriptionEnd, Time, Timing,
-    When,
+    Outage, Patience, Rejection, Scope, Service, Standing, State, SubscriptionEnd, Time, TimeOfDay,
+    Timing, When,
 };
 pub use builder::{AttachError, Builder};
 pub use control::Control;

@@ -7,6 +7,7 @@
 
 mod blocks;
 mod ground;
+mod lost_link;
 mod path;
 mod search;
 mod sight;
@@ -15,6 +16,7 @@ mod terrain;
 mod tests;
 mod waterfall;
 
+pub use lost_link::LostLink;
 pub use path::{NoPath, Path, Point, Vehicle, plan};
 pub use terrain::{Terrain, TerrainError};
 pub use waterfall::{

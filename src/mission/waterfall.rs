@@ -7,10 +7,13 @@ mod watch;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use crate::address::JausId;
+
 pub use stage::{Link, LinkState, Stage};
 use watch::Links;
 
-use super::Path;
+use super::lost_link::Trail;
+use super::{LostLink, Path, Point};
 
 /// How patient a mission is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +30,8 @@ pub struct Settings {
     pub stall: Duration,
     /// The greatest speed, in metres per second, for whoever does not choose one.
     pub speed: f64,
+    /// What becomes of it when the operator's link is lost.
+    pub lost_link: LostLink,
 }
 
 impl Default for Settings {
@@ -38,6 +43,7 @@ impl Default for Settings {
             settling: Duration::from_secs(1),
             stall: Duration::from_secs(60),
             speed: 1.0,
+            lost_link: LostLink::Stop,
         }
     }
 }
@@ -94,6 +100,9 @@ pub enum Action {
     /// Take the path segment driver under control, hand the path over, have it driven at this
     /// speed in metres per second, and [say how it went](Mission::handle_handed_over).
     HandOver(Run, Arc<Path>, f64),
+    /// Find out whether the client that has lost control is still alive, and
+    /// [say so](Mission::handle_lost_client).
+    CheckClient(Run, JausId),
 }
 
 /// How far a mission is.
@@ -143,6 +152,10 @@ pub struct Mission {
     settings: Settings,
     report: Report,
     approved: bool,
+    /// Whether it waits for a new lease after the link was lost.
+    held: bool,
+    /// The way from where it began.
+    trail: Trail,
     path: Arc<Path>,
     links: Links,
     /// When the next attempt begins.
@@ -168,6 +181,8 @@ impl Mission {
                 ..Report::default()
             },
             approved: false,
+            held: false,
+            trail: Trail::default(),
             path: Arc::default(),
             links: Links::default(),
             again: None,
@@ -205,6 +220,7 @@ impl Mission {
             ..Report::default()
         };
         self.approved = approved;
+        self.trail = Trail::default();
         self.path = Arc::default();
         match destination.mistake() {
             Some(mistake) => self.end(Stage::Failed, &mistake),
@@ -230,7 +246,11 @@ impl Mission {
             return Err(Refusal::Over { mission, stage });
         }
         self.approved = true;
-        if stage == Stage::AwaitingApproval {
+        if self.held {
+            // The vehicle is no longer where the path began.
+            self.held = false;
+            self.begin(now);
+        } else if stage == Stage::AwaitingApproval {
             self.hand_over(now);
         }
         Ok(())
@@ -241,6 +261,73 @@ impl Mission {
     pub fn stop(&mut self, reason: &str) {
         if self.report.stage.is_under_way() {
             self.end(Stage::Stopped, reason);
+        }
+    }
+
+    /// Another client has taken control: ends the mission, unless it is held for that.
+    pub fn handle_new_client(&mut self, reason: &str) {
+        if !self.held || self.settings.lost_link != LostLink::Hold {
+            self.stop(reason);
+        }
+    }
+
+    /// Control of `client` has ended without another client's taking it: stops the vehicle, and goes
+    /// on as [`Settings::lost_link`] says.
+    pub fn lose_client(&mut self, client: JausId, reason: &str) {
+        if !self.report.stage.is_under_way() {
+            return;
+        }
+        let drives = self.report.stage.is_handed_over();
+        match self.settings.lost_link {
+            LostLink::Hold => self.hold(&format!("held until it is approved again: {reason}")),
+            LostLink::Return if drives && self.trail.back().is_some() => {
+                self.hold(reason);
+                self.action = Some(Action::CheckClient(self.report.run, client));
+            }
+            LostLink::Stop | LostLink::Return => self.end(Stage::Stopped, reason),
+        }
+    }
+
+    /// Stops the vehicle and keeps the mission.
+    fn hold(&mut self, reason: &str) {
+        self.halt();
+        self.held = true;
+        self.approved = false;
+        self.report.stage = Stage::AwaitingApproval;
+        reason.clone_into(&mut self.report.reason);
+    }
+
+    /// Whether the client that has lost control is alive. If it is, it has released control, and the
+    /// mission is over; if it is not, the vehicle drives back.
+    pub fn handle_lost_client(&mut self, now: Instant, run: Run, is_alive: bool) {
+        if self.report.run != run || !self.held || self.settings.lost_link != LostLink::Return {
+            return;
+        }
+        let reason = std::mem::take(&mut self.report.reason);
+        let Some(back) = self.trail.back().filter(|_| !is_alive) else {
+            return self.end(Stage::Stopped, &reason);
+        };
+        self.held = false;
+        // One attempt: a new one would drive to the destination.
+        self.report.run.attempt = self.report.attempts;
+        self.report.progress = 0;
+        self.report.remaining = back.length();
+        if let Some(&(x, y)) = back.points().last() {
+            self.report.destination = Destination {
+                x,
+                y,
+                ..self.report.destination
+            };
+        }
+        self.report.reason = format!("returns: {reason}");
+        self.path = Arc::new(back);
+        self.hand_over(now);
+    }
+
+    /// The vehicle is at a point of the local frame.
+    pub fn handle_pose(&mut self, point: Point) {
+        if self.report.stage.is_handed_over() {
+            self.trail.note(point);
         }
     }
 
@@ -422,6 +509,7 @@ impl Mission {
     /// Nothing goes on any more.
     fn halt(&mut self) {
         self.halts |= self.report.stage.is_under_way();
+        self.held = false;
         self.action = None;
         self.again = None;
         self.deadline = None;

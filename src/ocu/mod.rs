@@ -11,10 +11,12 @@ mod answer;
     reason = "the desk's clock, tasks and pauses"
 )]
 mod desk;
+mod missing;
 pub(crate) mod page;
 mod picture;
 mod report;
 mod role;
+mod sample_clock;
 #[expect(
     clippy::disallowed_methods,
     reason = "the server's clock, tasks and pauses"

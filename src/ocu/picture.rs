@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::missing::{Absence, GonePart, GoneParts};
 use super::report::{Mission, Report};
 use super::role::{self, Role};
+use super::sample_clock::{SampleClock, Stamp};
 use super::state;
 use crate::address::JausId;
-use crate::service::{Directory, Kind, State};
+use crate::service::{Component, Directory, Kind, State};
 
 /// The vehicle as it is known.
 #[derive(Debug)]
@@ -17,7 +19,10 @@ pub(super) struct Picture {
     own: JausId,
     directory: Arc<Directory>,
     vehicle: Option<u16>,
+    /// What the vehicle is called, also when Discovery has lost it.
+    name: String,
     parts: BTreeMap<JausId, Part>,
+    gone: GoneParts,
     pose: Option<Told<state::Pose>>,
     velocity: Option<Told<state::Velocity>>,
     mission: Option<Told<Mission>>,
@@ -36,10 +41,20 @@ pub(super) struct Part {
     /// Who controls it, with which authority.
     controller: Option<Told<Option<(JausId, u8)>>>,
     stage: Option<state::Stage>,
+    /// What it is called.
+    name: String,
+    reports_pose: bool,
+    reports_velocity: bool,
+    pose_clock: Option<SampleClock>,
+    velocity_clock: Option<SampleClock>,
+    /// Its last report.
     heard: Option<Instant>,
+    /// Whether the last news of a subscription was that reports have stopped.
+    is_down: bool,
 }
 
-/// What was reported, by whom and when.
+/// What was reported, by whom, and when it was true: when the sample was taken, by its time stamp;
+/// without one, when the report arrived.
 #[derive(Debug, Clone, Copy)]
 struct Told<T> {
     what: T,
@@ -48,15 +63,54 @@ struct Told<T> {
 }
 
 impl Part {
-    fn new(role: Role, managed: bool) -> Self {
+    /// After so long without a report, a part that reports periodically is silent.
+    const SILENT: Duration = Duration::from_millis(1500);
+    /// Likewise, if its subscription is down as well.
+    const DOWN: Duration = Duration::from_secs(1);
+
+    fn new(role: Role) -> Self {
         Self {
             role,
-            managed,
+            managed: false,
             status: None,
             controller: None,
             stage: None,
+            name: String::new(),
+            reports_pose: false,
+            reports_velocity: false,
+            pose_clock: None,
+            velocity_clock: None,
             heard: None,
+            is_down: false,
         }
+    }
+
+    /// Takes what Discovery knows of it.
+    fn describe(&mut self, component: &Component, role: Role) {
+        self.role = role;
+        self.managed = role::is_managed(component);
+        self.reports_pose = role::reports_pose(component);
+        self.reports_velocity = role::reports_velocity(component);
+        let own_name = component.identification.as_ref().map(|it| it.name.clone());
+        let own_name = own_name.filter(|it| !it.is_empty());
+        self.name = role.title().map_or_else(
+            || own_name.unwrap_or_else(|| "Component".to_owned()),
+            str::to_owned,
+        );
+    }
+
+    /// Whether its reports have stopped.
+    fn is_silent(&self, now: Instant) -> bool {
+        let is_periodic = self.managed || self.reports_pose || self.reports_velocity;
+        self.heard.is_some_and(|heard| {
+            let silence = now.saturating_duration_since(heard);
+            (is_periodic && silence >= Self::SILENT) || (self.is_down && silence >= Self::DOWN)
+        })
+    }
+
+    fn was_heard_within(&self, limit: Duration, now: Instant) -> bool {
+        self.heard
+            .is_some_and(|heard| now.saturating_duration_since(heard) < limit)
     }
 
     pub(super) fn is(&self, state: State) -> bool {
@@ -89,6 +143,10 @@ impl Part {
 impl Picture {
     /// A report that is older counts for nothing when the vehicle's safety is at stake.
     const FRESH: Duration = Duration::from_secs(2);
+    /// With an older pose, velocity or status nobody may drive.
+    const DRIVABLE: Duration = Duration::from_secs(1);
+    /// A planner that is silent for so long, while other parts report, is lost.
+    const LOST: Duration = Duration::from_secs(2);
 
     /// Nothing is known yet; `vehicle` is the one to look at, the first that turns up if there is
     /// none.
@@ -97,7 +155,9 @@ impl Picture {
             own,
             directory: Arc::default(),
             vehicle,
+            name: String::new(),
             parts: BTreeMap::new(),
+            gone: GoneParts::default(),
             pose: None,
             velocity: None,
             mission: None,
@@ -143,7 +203,7 @@ impl Picture {
     ///
     /// # Errors
     /// If there is none with this number: why not, in words.
-    pub(super) fn select(&mut self, subsystem: u16) -> Result<(), String> {
+    pub(super) fn select(&mut self, now: Instant, subsystem: u16) -> Result<(), String> {
         if !role::is_vehicle(&self.directory, subsystem) || subsystem == self.own.subsystem() {
             return Err(format!(
                 "subsystem {subsystem} is not known as a vehicle; choose one of the tree"
@@ -152,34 +212,52 @@ impl Picture {
         if self.vehicle != Some(subsystem) {
             let directory = self.directory.clone();
             *self = Self::new(self.own, Some(subsystem));
-            self.handle_directory(directory);
+            self.handle_directory(now, directory);
         }
         Ok(())
     }
 
-    /// Somebody came, changed or went.
-    pub(super) fn handle_directory(&mut self, directory: Arc<Directory>) {
+    /// Components came, changed or went.
+    pub(super) fn handle_directory(&mut self, now: Instant, directory: Arc<Directory>) {
         self.directory = directory;
         self.vehicle = self.vehicle.or_else(|| self.first_vehicle());
-        let known = self.vehicle.and_then(|it| self.directory.subsystem(it));
+        let directory = Arc::clone(&self.directory);
+        let known = self.vehicle.and_then(|it| directory.subsystem(it));
+        if let Some(identification) = known.and_then(|it| it.identification()) {
+            self.name.clone_from(&identification.name);
+        }
+        self.set_parts(now, known.iter().flat_map(|it| it.components()));
+    }
+
+    /// The vehicle has these components, and no others.
+    fn set_parts<'c>(&mut self, now: Instant, components: impl Iterator<Item = &'c Component>) {
         let mut parts = BTreeMap::new();
-        for component in known.iter().flat_map(|it| it.components()) {
+        for component in components {
+            let before = self.parts.remove(&component.id);
             let Some(role) = Role::of(component).filter(|_| component.id != self.own) else {
                 continue;
             };
-            let managed = role::is_managed(component);
-            let before = self.parts.remove(&component.id);
-            let part = before.map_or_else(
-                || Part::new(role, managed),
-                |part| Part {
-                    role,
-                    managed,
-                    ..part
-                },
-            );
+            let mut part = before.unwrap_or_else(|| Part::new(role));
+            part.describe(component, role);
             parts.insert(component.id, part);
         }
-        self.parts = parts;
+        for (id, part) in std::mem::replace(&mut self.parts, parts) {
+            let (role, name, heard) = (part.role, part.name, part.heard);
+            let at = now;
+            let part = GonePart {
+                role,
+                name,
+                heard,
+                at,
+            };
+            self.gone.insert(id, part);
+        }
+        let present = self.parts.iter().map(|(id, part)| (*id, part.role));
+        self.gone.handle_present(&present.collect::<Vec<_>>());
+    }
+
+    pub(super) fn handle_time(&mut self, now: Instant) {
+        self.gone.handle_time(now);
     }
 
     fn first_vehicle(&self) -> Option<u16> {
@@ -201,20 +279,116 @@ impl Picture {
         let Some(part) = self.parts.get_mut(&by) else {
             return;
         };
-        part.heard = Some(now);
+        if let Report::Subscription { is_up } = report {
+            part.is_down = !is_up;
+            return;
+        }
+        (part.heard, part.is_down) = (Some(now), false);
         match report {
             Report::Status(what) => part.status = Some(Told { what, by, at: now }),
             Report::Control(what) => part.controller = Some(Told { what, by, at: now }),
             Report::Stage(stage) => part.stage = Some(stage),
-            Report::Pose(what) => self.pose = Some(Told { what, by, at: now }),
-            Report::Velocity(what) => self.velocity = Some(Told { what, by, at: now }),
+            Report::Pose(what, stamp) => {
+                let at = sampled_at(&mut part.pose_clock, now, stamp);
+                self.pose = Some(Told { what, by, at });
+            }
+            Report::Velocity(what, stamp) => {
+                let at = sampled_at(&mut part.velocity_clock, now, stamp);
+                self.velocity = Some(Told { what, by, at });
+            }
             Report::Mission(what) => self.mission = Some(Told { what, by, at: now }),
             Report::Path(path) => self.path = path,
             Report::Maps(maps) => {
                 self.maps = maps;
                 self.store = Some(by);
             }
+            Report::Subscription { .. } => {}
         }
+    }
+
+    /// Why the picture is too old to drive by, in words; `None` if it is not. What no part of the
+    /// vehicle offers is not expected.
+    pub(super) fn stale(&self, now: Instant) -> Option<String> {
+        let gone = self.gone.iter();
+        let gone = gone.map(|(id, part)| (id, part.role));
+        let mut gone = gone.filter(|(_, role)| *role == Role::PrimitiveDriver);
+        if let Some((id, role)) = gone.next() {
+            return Some(format!("{} {id} is gone", role.words()));
+        }
+        let driver = self.find(Role::PrimitiveDriver);
+        let driver = driver.and_then(|id| self.parts.get(&id));
+        let status = driver.and_then(|it| it.status.map(|it| it.at));
+        let has_status = driver.is_some_and(|it| it.managed);
+        let pose = self.pose.map(|it| it.at);
+        let has_pose = pose.is_some() || self.parts.values().any(|it| it.reports_pose);
+        let velocity = self.velocity.map(|it| it.at);
+        let has_velocity = velocity.is_some() || self.parts.values().any(|it| it.reports_velocity);
+        let is_old = |at: Instant| now.saturating_duration_since(at) >= Self::DRIVABLE;
+        let topics = [
+            ("status", has_status, status),
+            ("pose", has_pose, pose),
+            ("velocity", has_velocity, velocity),
+        ];
+        topics
+            .into_iter()
+            .find_map(|(what, is_expected, at)| match at {
+                Some(at) if is_old(at) => Some(format!(
+                    "no new {what} for {} s: the picture is stale",
+                    Self::DRIVABLE.as_secs()
+                )),
+                None if is_expected => Some(format!("the {what} is not known yet")),
+                _ => None,
+            })
+    }
+
+    /// Whether the vehicle reports where it is.
+    pub(super) fn is_position_known(&self) -> bool {
+        self.pose
+            .is_some_and(|it| it.what.x.is_some() && it.what.y.is_some())
+    }
+
+    /// The parts that have disappeared or fallen silent: each with its name and how.
+    pub(super) fn missing(&self, now: Instant) -> impl Iterator<Item = (JausId, &str, Absence)> {
+        let gone = self.gone.iter();
+        let gone = gone.map(|(id, part)| (id, &*part.name, Absence::Gone));
+        let silent = self
+            .parts
+            .iter()
+            .filter(move |(_, part)| part.is_silent(now));
+        let silent = silent.map(|(id, part)| (*id, &*part.name, Absence::Silent));
+        gone.chain(silent)
+    }
+
+    fn missing_state(&self, now: Instant) -> Vec<state::Missing> {
+        let describe = |(id, name, how): (JausId, &str, Absence)| {
+            let part = self.parts.get(&id).map(|it| (it.role, it.heard));
+            let gone = || self.gone.get(id).map(|it| (it.role, it.heard));
+            let (role, heard) = part.or_else(gone).unwrap_or((Role::Other, None));
+            state::Missing {
+                id: id.to_string(),
+                role: role.name(),
+                name: name.to_owned(),
+                how: how.name(),
+                age_ms: heard.map(|at| age(now, at)),
+            }
+        };
+        self.missing(now).map(describe).collect()
+    }
+
+    /// The planner, if it was lost while it drove. When everything is silent, the network is the
+    /// reason, and nothing is known of the planner.
+    pub(super) fn lost_planner(&self, now: Instant) -> Option<(JausId, Absence)> {
+        let told = self.mission.as_ref();
+        let planner = told.filter(|it| it.what.stage.is_driven())?.by;
+        if self.gone.get(planner).is_some() {
+            return Some((planner, Absence::Gone));
+        }
+        let part = self.parts.get(&planner)?;
+        let mut others = self.parts.iter().filter(|(id, _)| **id != planner);
+        let is_lost = part.heard.is_some()
+            && !part.was_heard_within(Self::LOST, now)
+            && others.any(|(_, it)| it.was_heard_within(Self::DRIVABLE, now));
+        is_lost.then_some((planner, Absence::Silent))
     }
 
     /// The parts that can be stopped by an emergency and have not said lately that they are.
@@ -251,7 +425,10 @@ impl Picture {
         obstacle: impl Fn(JausId) -> Option<String>,
     ) -> Option<state::Vehicle> {
         let subsystem = self.vehicle?;
-        let known = self.directory.subsystem(subsystem)?;
+        let is_known = self.directory.subsystem(subsystem).is_some();
+        if !is_known && self.gone.iter().next().is_none() {
+            return None;
+        }
         let mut parts: Vec<_> = self.parts.iter().collect();
         parts.sort_by_key(|(id, part)| (part.role, **id));
         let describe =
@@ -260,9 +437,7 @@ impl Picture {
         let all = any && self.not_in_emergency(now).next().is_none();
         Some(state::Vehicle {
             subsystem,
-            name: known
-                .identification()
-                .map_or_else(String::new, |it| it.name.clone()),
+            name: self.name.clone(),
             pose: self.pose.map(|told| state::Pose {
                 age_ms: age(now, told.at),
                 ..told.what
@@ -272,6 +447,8 @@ impl Picture {
                 ..told.what
             }),
             parts: parts.into_iter().map(describe).collect(),
+            missing: self.missing_state(now),
+            stale: self.stale(now),
             emergency: if emergency_wanted { all } else { any },
         })
     }
@@ -289,6 +466,7 @@ impl Picture {
             role: part.role.name(),
             managed: part.managed,
             state: part.status.map(|told| state_name(told.what)),
+            state_age_ms: part.status.map(|told| age(now, told.at)),
             controller: controller.map(|(id, _)| id.to_string()),
             authority: controller.map(|(_, authority)| authority),
             ours: controller.is_some_and(|(id, _)| id == self.own),
@@ -298,12 +476,20 @@ impl Picture {
         }
     }
 
-    /// The mission with its path.
-    pub(super) fn mission_state(&self, now: Instant) -> Option<state::Mission> {
+    /// The mission with its path; also of a planner that was lost while it drove. `told_to_stop`
+    /// says whether the drivers have been stopped for that.
+    pub(super) fn mission_state(&self, now: Instant, told_to_stop: bool) -> Option<state::Mission> {
         let told = self.mission.as_ref()?;
-        self.parts.contains_key(&told.by).then(|| state::Mission {
+        let lost = self.lost_planner(now).map(|(id, how)| state::LostPlanner {
+            id: id.to_string(),
+            how: how.name(),
+            told_to_stop,
+        });
+        let is_known = lost.is_some() || self.parts.contains_key(&told.by);
+        is_known.then(|| state::Mission {
             path: self.path.clone(),
             age_ms: age(now, told.at),
+            lost,
             ..told.what.state()
         })
     }
@@ -313,6 +499,21 @@ impl Picture {
         let traversability = |map: &&state::Map| map.name == "traversability";
         let map = self.maps.iter().find(traversability);
         map.or_else(|| self.maps.first()).cloned()
+    }
+}
+
+/// When a sample was taken that arrives now.
+fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp>) -> Instant {
+    match (stamp, clock) {
+        (None, clock) => {
+            *clock = None;
+            now
+        }
+        (Some(stamp), Some(clock)) => clock.handle_sample(now, stamp),
+        (Some(stamp), clock) => {
+            *clock = Some(SampleClock::new(now, stamp));
+            now
+        }
     }
 }
 
@@ -333,3 +534,10 @@ fn state_name(status: u8) -> &'static str {
         _ => "unknown",
     }
 }
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the tests' time begins somewhere"
+)]
+mod tests;

@@ -1,5 +1,6 @@
 //! What the parts of a vehicle tell, as the station keeps it: read from messages, in SI units.
 
+use super::sample_clock::Stamp;
 use super::state;
 use crate::address::JausId;
 use crate::messages::core::{ReportControl, ReportStatus};
@@ -14,11 +15,17 @@ pub(super) enum Report {
     /// Who controls it, with which authority.
     Control(Option<(JausId, u8)>),
     Stage(state::Stage),
-    Pose(state::Pose),
-    Velocity(state::Velocity),
+    /// The pose, and the time stamp of the sample if it has one.
+    Pose(state::Pose, Option<Stamp>),
+    /// The velocity, likewise.
+    Velocity(state::Velocity, Option<Stamp>),
     Mission(Mission),
     Path(Vec<[f64; 2]>),
     Maps(Vec<state::Map>),
+    /// A subscription has stopped bringing reports, or brings them again.
+    Subscription {
+        is_up: bool,
+    },
 }
 
 /// How the planner's mission is.
@@ -82,6 +89,7 @@ impl Mission {
             reason: self.reason.clone(),
             path: Vec::new(),
             age_ms: 0,
+            lost: None,
         }
     }
 }
@@ -119,22 +127,24 @@ impl From<ReportStage> for Report {
 
 impl From<ReportLocalPose> for Report {
     fn from(report: ReportLocalPose) -> Self {
-        Self::Pose(state::Pose {
-            x: report.x_m().unwrap_or_default(),
-            y: report.y_m().unwrap_or_default(),
+        let pose = state::Pose {
+            x: report.x_m(),
+            y: report.y_m(),
             yaw: report.yaw_rad(),
             age_ms: 0,
-        })
+        };
+        Self::Pose(pose, report.time_stamp.and_then(Stamp::read))
     }
 }
 
 impl From<ReportVelocityState> for Report {
     fn from(report: ReportVelocityState) -> Self {
-        Self::Velocity(state::Velocity {
-            x: report.velocity_x_m_per_s().unwrap_or_default(),
-            yaw_rate: report.yaw_rate_rad_per_s().unwrap_or_default(),
+        let velocity = state::Velocity {
+            x: report.velocity_x_m_per_s(),
+            yaw_rate: report.yaw_rate_rad_per_s(),
             age_ms: 0,
-        })
+        };
+        Self::Velocity(velocity, report.time_stamp.and_then(Stamp::read))
     }
 }
 
@@ -216,6 +226,29 @@ mod tests {
             let kept = path.first().copied().zip(path.last().copied());
             assert_eq!(kept, ends, "{count}");
         }
+    }
+
+    #[test]
+    fn what_a_report_does_not_say_is_unknown_and_not_zero() {
+        let pose = state::Pose {
+            x: None,
+            y: None,
+            yaw: None,
+            age_ms: 0,
+        };
+        assert_eq!(
+            Report::from(ReportLocalPose::default()),
+            Report::Pose(pose, None)
+        );
+        let velocity = state::Velocity {
+            x: None,
+            yaw_rate: None,
+            age_ms: 0,
+        };
+        assert_eq!(
+            Report::from(ReportVelocityState::default()),
+            Report::Velocity(velocity, None)
+        );
     }
 
     #[test]

@@ -68,6 +68,20 @@ impl Role {
         }
     }
 
+    /// As a title, for notices; `None` for a component whose own name says more.
+    pub(super) const fn title(self) -> Option<&'static str> {
+        match self {
+            Self::PrimitiveDriver => Some("Primitive Driver"),
+            Self::VectorDriver => Some("Vector Driver"),
+            Self::PathDriver => Some("Path Segment Driver"),
+            Self::Planner => Some("Planner"),
+            Self::VelocitySensor => Some("Velocity Sensor"),
+            Self::PoseSensor => Some("Pose Sensor"),
+            Self::Store => Some("Knowledge Store"),
+            Self::Other => None,
+        }
+    }
+
     /// Whether an operator who takes control takes it of this component, too.
     pub(super) const fn is_commanded(self) -> bool {
         matches!(
@@ -85,6 +99,16 @@ pub(super) fn is_managed(component: &Component) -> bool {
 /// Whether a component tells how far its stage is.
 pub(super) fn tells_stage(component: &Component) -> bool {
     component.offers(stage::URN)
+}
+
+/// Whether a component reports where the vehicle is.
+pub(super) fn reports_pose(component: &Component) -> bool {
+    component.offers(local_pose_sensor::URN)
+}
+
+/// Whether a component reports how the vehicle moves.
+pub(super) fn reports_velocity(component: &Component) -> bool {
+    component.offers(velocity_state_sensor::URN)
 }
 
 /// Whether a subsystem has something that an operator can work with.

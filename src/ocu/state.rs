@@ -83,6 +83,10 @@ pub struct Vehicle {
     pub velocity: Option<Velocity>,
     /// Its components that can be managed or that the operator needs.
     pub parts: Vec<Part>,
+    /// Those that have disappeared or fallen silent.
+    pub missing: Vec<Missing>,
+    /// Why the picture is too old to drive by; `null` if it is not.
+    pub stale: Option<String>,
     /// Whether it is stopped by an emergency: every part that can be, if this operator wants it.
     pub emergency: bool,
 }
@@ -90,24 +94,25 @@ pub struct Vehicle {
 /// Where a vehicle is, in the local frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Pose {
-    /// Metres to the north.
-    pub x: f64,
-    /// Metres to the east.
-    pub y: f64,
-    /// Radians clockwise from north; `null` if the vehicle does not tell.
+    /// Metres to the north; `null` if unknown.
+    pub x: Option<f64>,
+    /// Metres to the east; `null` if unknown.
+    pub y: Option<f64>,
+    /// Radians clockwise from north; `null` if unknown.
     pub yaw: Option<f64>,
-    /// Milliseconds since it was reported.
+    /// Milliseconds since the sample was taken, by its time stamp; without one, since the report
+    /// arrived.
     pub age_ms: u64,
 }
 
 /// How a vehicle moves.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Velocity {
-    /// Metres per second ahead.
-    pub x: f64,
-    /// Radians per second clockwise.
-    pub yaw_rate: f64,
-    /// Milliseconds since it was reported.
+    /// Metres per second ahead; `null` if unknown.
+    pub x: Option<f64>,
+    /// Radians per second clockwise; `null` if unknown.
+    pub yaw_rate: Option<f64>,
+    /// Milliseconds since the sample was taken, as for the pose.
     pub age_ms: u64,
 }
 
@@ -122,6 +127,8 @@ pub struct Part {
     pub managed: bool,
     /// Its state in Management, for example `ready`.
     pub state: Option<&'static str>,
+    /// Milliseconds since it reported that state.
+    pub state_age_ms: Option<u64>,
     /// Who controls it.
     pub controller: Option<String>,
     /// With which authority.
@@ -133,6 +140,21 @@ pub struct Part {
     /// How far its stage of the waterfall is.
     pub stage: Option<Stage>,
     /// Milliseconds since it last reported anything.
+    pub age_ms: Option<u64>,
+}
+
+/// A component of the vehicle that has disappeared or fallen silent.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Missing {
+    /// Its id.
+    pub id: String,
+    /// What it does in the vehicle, for example `primitive_driver`.
+    pub role: &'static str,
+    /// The same for people, for example `Primitive Driver`.
+    pub name: String,
+    /// `gone` if Discovery has lost it, `silent` if its reports have stopped.
+    pub how: &'static str,
+    /// Milliseconds since its last report.
     pub age_ms: Option<u64>,
 }
 
@@ -160,7 +182,7 @@ pub struct Control {
 }
 
 /// Manual drive.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Default)]
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Drive {
     /// Whether somebody drives.
     pub active: bool,
@@ -168,6 +190,8 @@ pub struct Drive {
     pub forward: f64,
     /// To the right, -1 to 1.
     pub turn: f64,
+    /// Why the station ended it although the stick was not let go; empty otherwise.
+    pub reason: String,
 }
 
 /// The planner's mission.
@@ -193,6 +217,19 @@ pub struct Mission {
     pub path: Vec<[f64; 2]>,
     /// Milliseconds since it was reported.
     pub age_ms: u64,
+    /// The planner, if it was lost while it drove.
+    pub lost: Option<LostPlanner>,
+}
+
+/// A planner that was lost while it drove.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct LostPlanner {
+    /// Its id.
+    pub id: String,
+    /// `gone` or `silent`, as for [`Missing`].
+    pub how: &'static str,
+    /// Whether this station has told the drivers to stop: it can if it controlled the planner.
+    pub told_to_stop: bool,
 }
 
 /// A map of the vehicle's world model; its cells are asked for separately.

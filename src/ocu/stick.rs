@@ -21,6 +21,8 @@ pub struct Busy;
 #[derive(Debug, Default)]
 pub struct Stick {
     phase: Phase,
+    /// Whether the page that drove has fallen silent, and no page has driven since.
+    fell_silent: bool,
 }
 
 #[derive(Debug, Default)]
@@ -85,6 +87,7 @@ impl Stick {
                     push,
                     heard: now,
                 };
+                self.fell_silent = false;
                 Ok(())
             }
         }
@@ -107,7 +110,10 @@ impl Stick {
     /// Time has passed: a stick that nobody seems to hold any more is let go.
     pub fn handle_time(&mut self, now: Instant) {
         match self.phase {
-            Phase::Driven { heard, .. } if now >= heard + Self::DEAD_MAN => self.stop(now),
+            Phase::Driven { heard, .. } if now >= heard + Self::DEAD_MAN => {
+                self.stop(now);
+                self.fell_silent = true;
+            }
             Phase::Stopping { since } if now >= since + Self::STOPPING => self.phase = Phase::Rest,
             _ => {}
         }
@@ -129,6 +135,12 @@ impl Stick {
             Phase::Driven { push, .. } => Some(push),
             Phase::Stopping { .. } => Some(Push::NONE),
         }
+    }
+
+    /// Whether driving ended because nothing came from the page any more.
+    #[must_use]
+    pub const fn fell_silent(&self) -> bool {
+        self.fell_silent
     }
 
     /// What is pushed, if somebody drives.
@@ -166,8 +178,13 @@ mod tests {
         let mut stick = Stick::default();
         stick.handle_push(start, ONE, ahead()).unwrap();
         assert_eq!(stick.poll_push(start + ms(299)), Some(ahead()));
+        assert!(!stick.fell_silent());
         assert_eq!(stick.poll_push(start + ms(300)), Some(Push::NONE));
         assert_eq!(stick.driven(), None);
+        assert!(stick.fell_silent());
+        stick.handle_push(start + ms(400), ONE, ahead()).unwrap();
+        stick.handle_release(start + ms(500), ONE);
+        assert!(!stick.fell_silent(), "it was let go");
     }
 
     #[test]

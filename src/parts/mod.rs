@@ -8,22 +8,25 @@
 #[cfg(feature = "web")]
 mod communicator;
 mod drivers;
+mod keeper;
 mod knowledge_store;
 mod path_driver;
 mod planner;
 mod pose_file;
 mod pose_sensor;
 mod primitive_driver;
+mod stop_line;
 pub mod tester;
 mod vector_driver;
 mod velocity_sensor;
 
 use std::convert::Infallible;
 use std::future::Future;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::component::{self, Builder, Component, Kind};
 use crate::node::{Node, Port};
+use crate::service::TimeOfDay;
 
 #[cfg(feature = "web")]
 pub use communicator::{Communicator, DEBUG_ADDRESS};
@@ -33,7 +36,7 @@ pub use planner::Planner;
 pub use pose_sensor::PoseSensor;
 #[cfg(all(feature = "gpio", target_os = "linux"))]
 pub use primitive_driver::GpioMotors;
-pub use primitive_driver::{Motors, PrimitiveDriver};
+pub use primitive_driver::{Hardware, Motors, PrimitiveDriver, Stop};
 pub use vector_driver::VectorDriver;
 pub use velocity_sensor::VelocitySensor;
 
@@ -70,6 +73,9 @@ pub enum PartError {
     /// It can not be attached.
     #[error(transparent)]
     Attach(#[from] component::AttachError),
+    /// The client in control has shut it down (Management's Shutdown).
+    #[error("shut down by the client in control")]
+    ShutDown,
     /// The node below it has stopped.
     #[error("the node has stopped")]
     NodeStopped,
@@ -78,12 +84,14 @@ pub enum PartError {
     Broken(String),
 }
 
-/// The time since the beginning of 1970; 0 on a computer whose clock is before that.
+/// The host's clock, which stamps the samples of parts; 1970 on a computer whose clock is before that.
 #[expect(
     clippy::disallowed_methods,
     reason = "parts run in real time, and their reports carry the time of day"
 )]
-fn time_of_day() -> Duration {
-    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
-    since_1970.unwrap_or_default()
+fn host_clock() -> TimeOfDay {
+    TimeOfDay::new(|| {
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+        since_1970.unwrap_or_default()
+    })
 }

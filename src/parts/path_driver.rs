@@ -3,7 +3,9 @@
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
-use super::drivers::{Helm, HelmSettings, Language, Next, Order, Sense, guard};
+use super::drivers::{
+    FaultMonitor, Helm, HelmSettings, Language, Next, Order, Sense, guard, shut_down,
+};
 use super::{Part, PartError, Seat};
 use crate::messages::mobility::{SetLocalVector, local_vector_driver, set_local_vector};
 use crate::service::ground::StageBoard;
@@ -64,6 +66,7 @@ impl Part for PathDriver {
             .offer(board.service())
             .live_on(seat.port)?;
         let poses = Sense::pose(&component, Self::HZ)?;
+        let own = component.clone();
         let next = Next {
             component,
             vehicle,
@@ -73,10 +76,12 @@ impl Part for PathDriver {
             authority: self.authority,
             // A list is executed once, and on purpose.
             settling: Duration::ZERO,
+            sensors: FaultMonitor::default(),
         };
         tokio::select! {
             end = poses.steer(&helm) => end,
             end = next.run() => end,
+            end = shut_down(&own) => end,
         }
     }
 }

@@ -17,6 +17,7 @@ use std::time::Duration;
 
 use tokio::sync::{Notify, mpsc};
 
+use super::drivers::{Sense, shut_down};
 use super::{Part, PartError, Seat};
 use crate::address::JausId;
 use crate::component::{AccessControl, Component, Management};
@@ -69,16 +70,22 @@ impl Part for Planner {
         let (tell, news) = mpsc::channel(Desk::NEWS);
         let desk = Desk::new(&self, &component, missions, &wake);
         let watch = |link| chain::watch(&component, link, &tell);
+        let poses = Sense::pose(&component, POSES)?;
         // They go on until one of them can not.
         tokio::select! {
             () = desk.work(news) => {}
             () = watch(Link::Path) => {}
             () = watch(Link::Vector) => {}
             () = watch(Link::Primitive) => {}
+            end = chain::follow(poses, &tell) => end?,
+            end = shut_down(&component) => return end,
         }
         Err(PartError::NodeStopped)
     }
 }
+
+/// How often the pose is asked for, in hertz: for the way back.
+const POSES: f64 = 2.0;
 
 /// Waits until another component of the subsystem is known that offers all of these services;
 /// `None` when the component has stopped.

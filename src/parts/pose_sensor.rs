@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 
 use tokio::time::timeout;
 
-use super::drivers::Sense;
+use super::drivers::{Freshness, Sense};
+use super::keeper::{Keeper, keeper};
 use super::pose_file::{self, Kept};
 use super::{Part, PartError, Seat};
 use crate::component::{AccessControl, Component};
@@ -50,9 +51,9 @@ impl Default for PoseSensor {
 impl Part for PoseSensor {
     async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
         let reckoning = self.begin().await?;
-        let observed = Observed::new(standing(unknown()));
+        let observed = Observed::new(standing(unknown(), None));
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
-            .with_time(Instant::now(), super::time_of_day());
+            .with_clock(super::host_clock());
         let component = seat
             .component("Local Pose Sensor")
             .access_control(AccessControl::new())
@@ -66,17 +67,31 @@ impl Part for PoseSensor {
             self.hz,
             "wheel travel",
         )?;
+        let (keeper, kept) = keeper();
         let sensor = Running {
             component,
             observed,
             reckoning,
-            file: self.file,
+            keeper: self.file.is_some().then_some(keeper),
             kept: None,
-            kept_at: None,
         };
-        sensor.reckon(counts, self.silence).await
+        let reckoning = sensor.reckon(counts, self.silence);
+        let Some(file) = &self.file else {
+            return reckoning.await;
+        };
+        // A disk that stalls must delay no pose.
+        let writing = kept.write(PAUSE, async |kept: Kept| {
+            pose_file::write(file, &kept).await
+        });
+        tokio::select! {
+            end = reckoning => end,
+            () = writing => Err(PartError::NodeStopped),
+        }
     }
 }
+
+/// The file is written at most so often: what is driven meanwhile is in the wheels' counts.
+const PAUSE: Duration = Duration::from_millis(500);
 
 impl PoseSensor {
     async fn begin(&self) -> Result<DeadReckoning, PartError> {
@@ -96,77 +111,77 @@ struct Running {
     component: Component,
     observed: Observed,
     reckoning: DeadReckoning,
-    file: Option<PathBuf>,
-    /// What the file holds, and since when.
+    keeper: Option<Keeper<Kept>>,
+    /// What was handed over to be written last.
     kept: Option<Kept>,
-    kept_at: Option<Instant>,
 }
 
 impl Running {
-    /// The file is written at most so often: what is driven meanwhile is in the wheels' counts.
-    const PAUSE: Duration = Duration::from_millis(500);
-
     async fn reckon(
         mut self,
         mut counts: Sense<ReportWheelOdometry>,
         silence: Duration,
     ) -> Result<Infallible, PartError> {
+        let mut freshness = Freshness::default();
+        let mut sampled_at = None;
         loop {
             let heard = timeout(silence, counts.next()).await;
-            let was_told = self.take_told();
+            let now = Instant::now();
+            if counts.take_loss() {
+                freshness.forget();
+            }
+            self.take_told();
             let pose = match heard {
                 Ok(report) => {
-                    self.reckoning.handle_count(WheelCount::from(&report?));
+                    let count = WheelCount::from(&report?);
+                    let read_at = Duration::from_millis(count.time_ms.into());
+                    self.reckoning.handle_count(count);
+                    if let Some(at) = freshness.handle(now, Some(read_at)) {
+                        sampled_at = Some(at);
+                    }
                     self.reckoning.pose()
                 }
-                Err(_) => unknown(),
+                Err(_) => {
+                    sampled_at = Some(now);
+                    unknown()
+                }
             };
-            self.observed.set(standing(pose));
+            self.observed.set(standing(pose, sampled_at));
             self.component.changed::<QueryLocalPose>().await;
             self.component.changed::<QueryLocalPoseExt>().await;
-            self.keep(was_told).await;
+            self.keep();
         }
     }
 
     /// Takes the pose that a client has set, if one has.
-    fn take_told(&mut self) -> bool {
-        let told = self.observed.take_told();
-        if let Some(pose) = told {
+    fn take_told(&mut self) {
+        if let Some(pose) = self.observed.take_told() {
             self.reckoning.set_pose(pose);
             let pose = self.reckoning.pose();
             tracing::info!("was told to be at x {:.2} m, y {:.2} m", pose.x, pose.y);
         }
-        told.is_some()
     }
 
-    /// Writes the file if there is something new to keep and it is time. That it can not be written
-    /// is told and tried again: a vehicle must not lose its pose for a full disk.
-    async fn keep(&mut self, at_once: bool) {
-        let (Some(file), Some(count)) = (&self.file, self.reckoning.count()) else {
+    /// Has the pose written if it is another one.
+    fn keep(&mut self) {
+        let (Some(keeper), Some(count)) = (&self.keeper, self.reckoning.count()) else {
             return;
         };
         let kept = Kept {
             pose: self.reckoning.pose(),
             count,
         };
-        let is_news = self
-            .kept
-            .as_ref()
-            .is_none_or(|before| before.differs(&kept));
-        let is_time = self.kept_at.is_none_or(|at| at.elapsed() >= Self::PAUSE);
-        if is_news && (is_time || at_once) {
-            match pose_file::write(file, &kept).await {
-                Ok(()) => self.kept = Some(kept),
-                Err(error) => tracing::warn!("{error}"),
-            }
-            self.kept_at = Some(Instant::now());
+        if self.kept.is_none_or(|before| before.differs(&kept)) {
+            self.kept = Some(kept);
+            keeper.keep(kept);
         }
     }
 }
 
-fn standing(pose: Pose) -> Motion {
+fn standing(pose: Pose, sampled_at: Option<Instant>) -> Motion {
     Motion {
         pose,
+        sampled_at,
         ..Motion::default()
     }
 }

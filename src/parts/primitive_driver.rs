@@ -1,28 +1,43 @@
 //! The primitive driver: wrench efforts to two wheel drives, and how far the wheels have travelled.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here the motors are looked after in real time"
+)]
 
 use std::convert::Infallible;
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::drivers::{Watchman, guard};
+use super::drivers::{FaultMonitor, Watchman, guard, shut_down};
+use super::stop_line::StopLine;
 use super::{Part, PartError, Seat};
-use crate::actuator::{Actuator, MotorConfig, Odometer, SimulatedMotor, Wheels, WheelsConfig};
-use crate::component::Component;
+use crate::actuator::{
+    Actuator, Interlock, MotorConfig, Odometer, SimulatedMotor, StopFile, StopInput, Wheels,
+    WheelsConfig,
+};
+use crate::component::{Component, Condition, State};
 use crate::messages::ground::QueryStage;
 use crate::service::MotionPolicy;
 use crate::service::ground::{StageBoard, StageReport, StageState, WheelOdometry};
 use crate::service::mobility::Vehicle;
 use crate::vehicle::{Frame, Pilot};
 
-/// Drives the wheels of a vehicle as it is told, and stops them when it is not told any more.
+/// Drives the wheels of a vehicle as it is told, and stops them when it is not told any more. While a
+/// motor has a fault both sides stand still and the component is in Failure.
+///
+/// With a stop input, an open line stops the motors at once and sets the component's emergency. A line
+/// that is closed again ends all emergencies: the operator on the spot has seen to it. The component is
+/// in Standby then, and nothing moves before it is resumed.
 ///
 /// It offers Primitive Driver, Wheel Odometry and Stage, behind Management and Access Control.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrimitiveDriver {
     /// What turns the wheels.
     pub motors: Motors,
+    /// The stop input, if there is one.
+    pub stop: Option<Stop>,
     /// The vehicle that the wheels carry.
     pub wheels: WheelsConfig,
     /// The motors stop when no effort has come for so long.
@@ -40,6 +55,53 @@ pub enum Motors {
     /// Stepper motors on lines of a GPIO chip.
     #[cfg(all(feature = "gpio", target_os = "linux"))]
     Gpio(GpioMotors),
+}
+
+/// What stops the vehicle on the vehicle itself.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Stop {
+    /// A simulated input, which is pressed while a file exists.
+    File(std::path::PathBuf),
+    /// A normally closed contact between a line of a GPIO chip and ground.
+    #[cfg(all(feature = "gpio", target_os = "linux"))]
+    Gpio {
+        /// The chip, such as `/dev/gpiochip0`.
+        chip: std::path::PathBuf,
+        /// The line.
+        line: u32,
+    },
+}
+
+impl Stop {
+    fn open(&self) -> Result<Box<dyn StopInput>, PartError> {
+        match self {
+            Self::File(path) => Ok(Box::new(StopFile(path.clone()))),
+            #[cfg(all(feature = "gpio", target_os = "linux"))]
+            Self::Gpio { chip, line } => match crate::actuator::GpioStop::open(chip, *line) {
+                Ok(input) => Ok(Box::new(input)),
+                Err(error) => Err(PartError::Broken(error.to_string())),
+            },
+        }
+    }
+}
+
+/// The hardware of a primitive driver.
+pub struct Hardware {
+    /// What turns the wheels of the left side.
+    pub left: Box<dyn Actuator>,
+    /// What turns the wheels of the right side.
+    pub right: Box<dyn Actuator>,
+    /// The stop input, if there is one.
+    pub stop: Option<Box<dyn StopInput>>,
+}
+
+impl std::fmt::Debug for Hardware {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Hardware")
+            .field("has_stop", &self.stop.is_some())
+            .finish_non_exhaustive()
+    }
 }
 
 /// Two stepper motors on a GPIO chip.
@@ -60,6 +122,7 @@ impl Default for PrimitiveDriver {
     fn default() -> Self {
         Self {
             motors: Motors::Simulated(MotorConfig::default()),
+            stop: None,
             wheels: WheelsConfig::default(),
             silence: Duration::from_millis(500),
             control_timeout: 3,
@@ -100,9 +163,28 @@ impl GpioMotors {
 
 impl Part for PrimitiveDriver {
     async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
-        let odometer = Odometer::new(random());
         let [left, right] = self.motors.start()?;
+        let stop = self.stop.as_ref().map(Stop::open).transpose()?;
+        self.run_on(Hardware { left, right, stop }, seat).await
+    }
+}
+
+impl PrimitiveDriver {
+    /// The same on hardware of your own, instead of [`motors`](Self::motors) and
+    /// [`stop`](Self::stop).
+    ///
+    /// # Errors
+    /// Why it cannot go on.
+    pub async fn run_on(self, hardware: Hardware, seat: Seat) -> Result<Infallible, PartError> {
+        let Hardware { left, right, stop } = hardware;
+        let interlock = Interlock::default();
+        let stop = stop.map(|input| StopLine::start(input, interlock.clone()));
+        let stop = stop
+            .transpose()
+            .map_err(|error| PartError::Broken(format!("no thread for the stop input: {error}")))?;
+        let odometer = Odometer::new(random());
         let wheels = Wheels::new(left, right, self.wheels, odometer.clone());
+        let wheels = wheels.with_interlock(interlock.clone());
         let pilot = Pilot::new(wheels, Frame::default());
         let policy = MotionPolicy::Expire(self.silence);
         let vehicle = Vehicle::new(pilot).motion_policy(policy);
@@ -119,8 +201,15 @@ impl Part for PrimitiveDriver {
             vehicle,
             odometer,
             board,
+            interlock,
+            stop,
+            stopped: false,
         };
-        driver.watch().await
+        let component = driver.component.clone();
+        tokio::select! {
+            end = driver.watch() => end,
+            end = shut_down(&component) => end,
+        }
     }
 }
 
@@ -130,31 +219,90 @@ fn random() -> u32 {
     RandomState::new().build_hasher().finish() as u32
 }
 
+/// Waits until a stop input is opened or closed, if there is one.
+async fn pressed(stop: &mut Option<StopLine>) {
+    match stop {
+        Some(stop) => stop.changed().await,
+        None => std::future::pending().await,
+    }
+}
+
 struct Running {
     component: Component,
     vehicle: Vehicle,
     odometer: Odometer,
     board: StageBoard,
+    interlock: Interlock,
+    stop: Option<StopLine>,
+    /// Whether the stop input has set an emergency that lasts.
+    stopped: bool,
 }
 
 impl Running {
     /// Between two looks at how the driver is.
     const LOOK: Duration = Duration::from_millis(100);
 
-    async fn watch(self) -> Result<Infallible, PartError> {
+    async fn watch(mut self) -> Result<Infallible, PartError> {
         let mut standings = self.component.watch_standing();
         let mut watchman = Watchman::default();
+        let mut faults = FaultMonitor::default();
         let mut looks = interval(Self::LOOK);
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
             watchman.note(*standings.borrow_and_update());
+            self.check_stop().await;
+            self.check_motors(&mut faults).await;
             if self.board.tell(self.stage(&watchman)) {
                 self.component.changed::<QueryStage>().await;
             }
             tokio::select! {
                 changed = standings.changed() => changed.map_err(|_| PartError::NodeStopped)?,
+                () = pressed(&mut self.stop) => {}
                 _ = looks.tick() => {}
             }
+        }
+    }
+
+    /// An open stop input is an emergency of the component as long as it lasts, and the end of all
+    /// emergencies when it is closed again.
+    async fn check_stop(&mut self) {
+        let Some(stop) = &mut self.stop else {
+            return;
+        };
+        let open = stop.pressed();
+        // The interlock keeps also a press that was shorter than a look.
+        if self.interlock.is_open() && !self.stopped {
+            let why = open.as_deref().unwrap_or("the stop input was pressed");
+            tracing::warn!("emergency: {why}");
+            self.stopped = true;
+        }
+        if !self.stopped {
+            return;
+        }
+        if self.component.standing().state != State::Emergency {
+            self.vehicle.stop();
+            if let Err(error) = self.component.set_emergency(self.component.id()).await {
+                tracing::warn!("the emergency is not set yet: {error}");
+            }
+        } else if open.is_none() {
+            tracing::warn!("the stop input is closed again: all emergencies end");
+            self.component.set_condition(Condition::Safe).await;
+            self.stopped = false;
+            // Nothing moves before the component is resumed.
+            self.interlock.close();
+        }
+    }
+
+    /// A motor's fault is a failure as long as it lasts.
+    async fn check_motors(&self, faults: &mut FaultMonitor) {
+        // Also at rest, when nothing else reads the motors.
+        self.vehicle.handle_time(Instant::now());
+        let condition = match self.odometer.fault() {
+            Some(fault) => faults.lacks(Instant::now(), &fault, Duration::ZERO),
+            None => faults.is_over(),
+        };
+        if let Some(condition) = condition {
+            self.component.set_condition(condition).await;
         }
     }
 

@@ -3,7 +3,9 @@
 use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
-use super::drivers::{Helm, HelmSettings, Language, Next, Order, Sense, guard};
+use super::drivers::{
+    FaultMonitor, Helm, HelmSettings, Language, Next, Order, Sense, guard, shut_down,
+};
 use super::{Part, PartError, Seat};
 use crate::messages::mobility::{SetWrenchEffort, primitive_driver};
 use crate::service::ground::StageBoard;
@@ -64,6 +66,7 @@ impl Part for VectorDriver {
             .live_on(seat.port)?;
         let poses = Sense::pose(&component, Self::HZ)?;
         let velocities = Sense::velocity(&component, Self::HZ)?;
+        let own = component.clone();
         let next = Next {
             component,
             vehicle,
@@ -72,11 +75,13 @@ impl Part for VectorDriver {
             language: Efforts(Throttle::new(self.limits)),
             authority: self.authority,
             settling: self.silence,
+            sensors: FaultMonitor::default(),
         };
         tokio::select! {
             end = poses.steer(&helm) => end,
             end = velocities.steer(&helm) => end,
             end = next.run() => end,
+            end = shut_down(&own) => end,
         }
     }
 }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use tokio::time::timeout;
 
-use super::drivers::Sense;
+use super::drivers::{Freshness, Sense};
 use super::{Part, PartError, Seat};
 use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::messages::mobility::{QueryVelocityState, QueryVelocityStateExt};
@@ -39,9 +39,9 @@ impl Default for VelocitySensor {
 
 impl Part for VelocitySensor {
     async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
-        let observed = Observed::new(moving(unknown()));
+        let observed = Observed::new(moving(unknown(), None));
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
-            .with_time(Instant::now(), super::time_of_day());
+            .with_clock(super::host_clock());
         let component = seat
             .component("Velocity State Sensor")
             .offer(vehicle.velocity_state_sensor())
@@ -55,24 +55,40 @@ impl Part for VelocitySensor {
             "wheel travel",
         )?;
         let mut speedometer = Speedometer::default();
+        let mut freshness = Freshness::default();
+        let mut sampled_at = None;
         loop {
-            let velocity = match timeout(self.silence, counts.next()).await {
-                Ok(report) => speedometer.handle_count(WheelCount::from(&report?)),
+            let heard = timeout(self.silence, counts.next()).await;
+            let now = Instant::now();
+            if counts.take_loss() {
+                freshness.forget();
+            }
+            let velocity = match heard {
+                Ok(report) => {
+                    let count = WheelCount::from(&report?);
+                    let read_at = Duration::from_millis(count.time_ms.into());
+                    if let Some(at) = freshness.handle(now, Some(read_at)) {
+                        sampled_at = Some(at);
+                    }
+                    speedometer.handle_count(count)
+                }
                 Err(_) => {
                     speedometer = Speedometer::default();
+                    sampled_at = Some(now);
                     None
                 }
             };
-            observed.set(moving(velocity.unwrap_or_else(unknown)));
+            observed.set(moving(velocity.unwrap_or_else(unknown), sampled_at));
             component.changed::<QueryVelocityState>().await;
             component.changed::<QueryVelocityStateExt>().await;
         }
     }
 }
 
-fn moving(velocity: Velocity) -> Motion {
+fn moving(velocity: Velocity, sampled_at: Option<Instant>) -> Motion {
     Motion {
         velocity,
+        sampled_at,
         ..Motion::default()
     }
 }

@@ -77,7 +77,7 @@ pub use outbox::Outbox;
 pub use safety::{Hazards, UnsafeService};
 pub use stack::{Event, Stack};
 pub use standing::{Controller, Standing, State};
-pub use time::Time;
+pub use time::{Time, TimeOfDay};
 pub use transport::Transport;
 
 /// One service of a component.

@@ -11,10 +11,12 @@
 //! * A day of the month that contradicts the date stamp, or is no day at all (some peers leave it
 //!   0), counts for nothing. Any other field out of its range makes the message void.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{Duration, Instant};
 
 use super::calendar::Date;
-use super::{Context, Handled, Service, code_of, read};
+use super::{Context, Handled, Hazards, Service, code_of, read};
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::messages::core::report_time::{DateStamp, TimeStamp};
@@ -22,19 +24,82 @@ use crate::messages::core::{self, QueryTime, ReportTime, SetTime};
 
 const DAY: i64 = 86_400_000;
 
+/// The time of day of a component: a clock, and the correction that Set Time asked for. Cheap to
+/// clone; the clones are one time, so that a vehicle's reports are stamped with the time that
+/// [`Time`] reports.
+#[derive(Clone)]
+pub struct TimeOfDay(Arc<Corrected>);
+
+struct Corrected {
+    clock: Box<dyn Fn() -> Duration + Send + Sync>,
+    /// By how many milliseconds this time is ahead of the clock.
+    ahead: AtomicI64,
+}
+
+impl TimeOfDay {
+    /// Goes by `clock`, which returns the time since the beginning of 1970 (UTC).
+    #[must_use]
+    pub fn new(clock: impl Fn() -> Duration + Send + Sync + 'static) -> Self {
+        Self(Arc::new(Corrected {
+            clock: Box::new(clock),
+            ahead: AtomicI64::new(0),
+        }))
+    }
+
+    /// The time since the beginning of 1970 (UTC); 0 if it was set to before that.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        let clock = (self.0.clock)();
+        let ahead = Duration::from_millis(self.ahead().unsigned_abs());
+        if self.ahead() < 0 {
+            clock.saturating_sub(ahead)
+        } else {
+            clock.saturating_add(ahead)
+        }
+    }
+
+    /// By how many milliseconds it is ahead of its clock.
+    pub(crate) fn ahead(&self) -> i64 {
+        self.0.ahead.load(Ordering::Relaxed)
+    }
+
+    /// Milliseconds since the beginning of 1970; the message fields end in 2127.
+    fn milliseconds(&self) -> i64 {
+        self.by_the_clock().saturating_add(self.ahead())
+    }
+
+    fn by_the_clock(&self) -> i64 {
+        i64::try_from((self.0.clock)().as_millis()).unwrap_or(i64::MAX)
+    }
+
+    /// From now on the time is this, in milliseconds since the beginning of 1970.
+    fn set(&self, wanted: i64) {
+        let ahead = wanted.saturating_sub(self.by_the_clock());
+        self.0.ahead.store(ahead, Ordering::Relaxed);
+    }
+}
+
+impl std::fmt::Debug for TimeOfDay {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TimeOfDay")
+            .field("ahead", &self.ahead())
+            .finish_non_exhaustive()
+    }
+}
+
 /// Answers Query Time (2011h), and obeys Set Time (0011h) of the client in control, in whatever
 /// state the component is.
 ///
 /// ```
 /// use std::time::{SystemTime, UNIX_EPOCH};
-/// use jaus::service::Time;
+/// use jaus::service::{Time, TimeOfDay};
 ///
-/// let time = Time::new(|| SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default());
+/// let clock = || SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+/// let time = Time::new(TimeOfDay::new(clock));
 /// ```
+#[derive(Debug)]
 pub struct Time {
-    clock: Box<dyn FnMut() -> Duration + Send>,
-    /// By how many milliseconds this time is ahead of the clock.
-    ahead: i64,
+    time: TimeOfDay,
 }
 
 impl Time {
@@ -42,53 +107,40 @@ impl Time {
     const TIME_STAMP: u8 = 1;
     const DATE_STAMP: u8 = 2;
 
-    /// Goes by `clock`, which tells the time since the beginning of 1970 (UTC).
+    /// Reports `time`, and sets it for all of its clones.
     #[must_use]
-    pub fn new(clock: impl FnMut() -> Duration + Send + 'static) -> Self {
-        Self {
-            clock: Box::new(clock),
-            ahead: 0,
-        }
+    pub const fn new(time: TimeOfDay) -> Self {
+        Self { time }
     }
 
-    /// Milliseconds since the beginning of 1970; the message fields end in 2127.
-    fn now(&mut self) -> i64 {
-        self.by_the_clock().saturating_add(self.ahead)
-    }
-
-    fn by_the_clock(&mut self) -> i64 {
-        i64::try_from((self.clock)().as_millis()).unwrap_or(i64::MAX)
-    }
-
-    fn report(&mut self, presence: u8) -> ReportTime {
-        let now = self.now();
+    fn report(&self, presence: u8) -> ReportTime {
+        let now = self.time.milliseconds();
         ReportTime {
             time_stamp: time_stamp(now).filter(|_| presence & Self::TIME_STAMP != 0),
             date_stamp: date_stamp(now).filter(|_| presence & Self::DATE_STAMP != 0),
         }
     }
 
-    /// Says whether there is such a time.
-    fn set(&mut self, set: &SetTime) -> bool {
-        let Some(wanted) = wanted(self.now(), set) else {
+    /// Returns whether there is such a time.
+    fn set(&self, set: &SetTime) -> bool {
+        let Some(wanted) = wanted(self.time.milliseconds(), set) else {
             return false;
         };
-        self.ahead = wanted.saturating_sub(self.by_the_clock());
+        self.time.set(wanted);
         true
-    }
-}
-
-impl std::fmt::Debug for Time {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Time")
-            .field("ahead", &self.ahead)
-            .finish_non_exhaustive()
     }
 }
 
 impl Service for Time {
     fn offers(&self) -> Vec<ServiceId> {
         vec![core::time::V1_1, core::time::V1_0]
+    }
+
+    fn hazards(&self) -> Hazards {
+        Hazards {
+            set_up_by: Some(SetTime::NAME),
+            ..Hazards::default()
+        }
     }
 
     fn handle_message(
@@ -207,7 +259,8 @@ mod tests {
     fn rig(milliseconds: u64) -> (Rig, Arc<AtomicU64>) {
         let clock = Arc::new(AtomicU64::new(milliseconds));
         let read = clock.clone();
-        let time = Time::new(move || Duration::from_millis(read.load(Ordering::Relaxed)));
+        let time = move || Duration::from_millis(read.load(Ordering::Relaxed));
+        let time = Time::new(TimeOfDay::new(time));
         (Rig::new(vec![Box::new(time)]), clock)
     }
 

@@ -50,6 +50,7 @@
 //! radians, yaw and heading clockwise from X, seen from above.
 
 mod curve;
+mod deadline;
 mod frame;
 mod motion;
 mod observed;
@@ -65,6 +66,7 @@ mod throttle;
 mod tests;
 
 pub use curve::Curve;
+pub use deadline::CommandDeadline;
 pub use frame::{Frame, GlobalPose};
 pub use motion::{Acceleration, Motion, Pose, Velocity, wrap};
 pub use observed::Observed;

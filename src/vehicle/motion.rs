@@ -102,13 +102,27 @@ impl Velocity {
         }
     }
 
-    /// Whether this is as good as standing still: below 1 mm/s and 1 mrad/s. So is what is not known
-    /// (NaN).
+    /// Whether this is known to be as good as standing still: below 1 mm/s and 1 mrad/s. An unknown
+    /// velocity (NaN) is not rest.
     #[must_use]
     pub fn is_rest(&self) -> bool {
-        let all = [self.x, self.y, self.z, self.roll, self.pitch, self.yaw];
-        all.iter()
-            .all(|value| value.is_nan() || value.abs() < 0.001)
+        self.components().iter().all(|value| value.abs() < 0.001)
+    }
+
+    /// Whether any component is known, and is more than rest.
+    #[must_use]
+    pub fn is_moving(&self) -> bool {
+        self.components().iter().any(|value| value.abs() >= 0.001)
+    }
+
+    /// Whether all components are known.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.components().iter().all(|value| value.is_finite())
+    }
+
+    const fn components(&self) -> [f64; 6] {
+        [self.x, self.y, self.z, self.roll, self.pitch, self.yaw]
     }
 }
 
@@ -134,6 +148,14 @@ mod tests {
         ] {
             assert!((wrap(angle) - expected).abs() < 1e-12, "{angle}");
         }
+    }
+
+    #[test]
+    fn an_unknown_velocity_is_neither_rest_nor_motion() {
+        let unknown = Velocity::forward(f64::NAN, 0.0);
+        assert!(!unknown.is_rest() && !unknown.is_moving() && !unknown.is_finite());
+        assert!(Velocity::default().is_rest() && Velocity::default().is_finite());
+        assert!(Velocity::forward(f64::NAN, 0.1).is_moving());
     }
 
     #[test]

@@ -357,7 +357,9 @@ impl Pilot {
     /// Whether it stands still and has nothing to do.
     fn is_idle(&self) -> bool {
         let course = self.course.as_ref();
-        self.is_at_rest() && course.is_none_or(|course| course.has_arrived)
+        // A platform whose velocity is not known cannot be waited for.
+        let stands = self.command == Drive::Stop && !self.motion().velocity.is_moving();
+        stands && course.is_none_or(|course| course.has_arrived)
     }
 
     /// One moment of control. In trouble it stops, and does not go on afterwards.

@@ -8,8 +8,13 @@ use super::{Motion, Pose, Velocity};
 /// A vehicle, real or simulated.
 ///
 /// A real one reads its sensors in [`handle_time`](Self::handle_time) and writes to its actuators
-/// in [`drive`](Self::drive); it keeps its own limits whatever it is asked for, and should stop by
-/// itself when it has not been asked for anything for a while.
+/// in [`drive`](Self::drive). It keeps its own limits whatever it is commanded.
+///
+/// A platform MUST stop by itself when neither [`drive`](Self::drive) nor [`head`](Self::head) has
+/// been called for 200 ms ([`CommandDeadline::DEFAULT`](super::CommandDeadline::DEFAULT)), outside of
+/// the program that calls it: in the motor controller, or on a thread that only writes to the
+/// motors. While it moves it is commanded every [`Pilot::STEP`](super::Pilot::STEP) (20 ms), so that
+/// silence means that the program hangs. [`CommandDeadline`](super::CommandDeadline) keeps the time.
 pub trait Platform: Send {
     /// It is `now`: reads the sensors, or moves on. While something is to be done this is called
     /// every [`Pilot::STEP`](super::Pilot::STEP).
@@ -21,7 +26,8 @@ pub trait Platform: Send {
     /// From now on the place where it is has this pose in the local frame.
     fn set_pose(&mut self, pose: Pose);
 
-    /// What it is to do until it is told something else.
+    /// What it is to do until the next command, and for at most the deadline above. A command that
+    /// is [not finite](Drive::is_finite) must stop it.
     fn drive(&mut self, command: Drive);
 
     /// To keep a heading in radians clockwise from the local X axis, at a speed in metres per second,
@@ -59,6 +65,34 @@ pub enum Drive {
     Effort(Effort),
 }
 
+impl Drive {
+    /// Whether all of its numbers are finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        match self {
+            Self::Stop => true,
+            Self::Velocity(velocity) => velocity.is_finite(),
+            Self::Effort(effort) => {
+                let Effort {
+                    forward,
+                    turn,
+                    brake,
+                    turn_brake,
+                } = *effort;
+                [forward, turn, brake, turn_brake]
+                    .iter()
+                    .all(|share| share.is_finite())
+            }
+        }
+    }
+
+    /// The command, or [`Stop`](Self::Stop) in place of one that is not finite.
+    #[must_use]
+    pub fn or_stop(self) -> Self {
+        if self.is_finite() { self } else { Self::Stop }
+    }
+}
+
 /// Effort about and along the axes that a ground vehicle has, as a share of what there is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Effort {
@@ -90,9 +124,13 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The closest velocity that a ground vehicle with these limits can have.
+    /// The closest velocity that a ground vehicle with these limits can have; 0 in place of one that
+    /// is not finite.
     #[must_use]
     pub fn clamp(&self, velocity: Velocity) -> Velocity {
+        if !velocity.is_finite() {
+            return Velocity::default();
+        }
         Velocity::forward(
             velocity.x.clamp(-self.reverse, self.speed),
             velocity.yaw.clamp(-self.yaw_rate, self.yaw_rate),

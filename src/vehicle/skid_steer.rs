@@ -3,7 +3,9 @@
 use std::time::{Duration, Instant};
 
 use super::random::Random;
-use super::{Acceleration, Drive, Effort, Limits, Motion, Platform, Pose, Velocity, wrap};
+use super::{
+    Acceleration, CommandDeadline, Drive, Effort, Limits, Motion, Platform, Pose, Velocity, wrap,
+};
 
 /// How a simulated vehicle behaves.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +31,8 @@ impl Default for SkidSteerConfig {
 
 /// A simulated skid-steer platform on flat ground.
 ///
-/// It is integrated in steps of at most [`STEP`](Self::STEP). Its speed and yaw rate follow what
+/// It is integrated in steps of at most [`STEP`](Self::STEP), and stops by itself 200 ms after its
+/// last command ([`CommandDeadline::DEFAULT`]). Its speed and yaw rate follow what
 /// is wanted within the limits; full effort reaches full speed, because drag grows with speed.
 #[derive(Debug, Clone)]
 pub struct SkidSteer {
@@ -37,6 +40,7 @@ pub struct SkidSteer {
     /// What it keeps to; at most what the configuration allows.
     limits: Limits,
     command: Drive,
+    deadline: CommandDeadline,
     motion: Motion,
     /// Speed and yaw rate of the wheels; the vehicle's own are these and the slip.
     wheels: (f64, f64),
@@ -60,6 +64,7 @@ impl SkidSteer {
             config,
             limits: config.limits,
             command: Drive::Stop,
+            deadline: CommandDeadline::new(CommandDeadline::DEFAULT),
             motion: Motion::default(),
             wheels: (0.0, 0.0),
             slip: (0.0, 0.0),
@@ -171,6 +176,9 @@ impl Platform for SkidSteer {
         let since = now.saturating_duration_since(self.time.unwrap_or(now));
         self.time = Some(self.time.map_or(now, |time| time.max(now)));
         self.motion.sampled_at = self.time;
+        if self.deadline.has_passed(now) {
+            self.command = Drive::Stop;
+        }
         let mut left = since.min(Self::LONGEST_GAP);
         while !left.is_zero() {
             let step = left.min(Self::STEP);
@@ -191,7 +199,8 @@ impl Platform for SkidSteer {
     }
 
     fn drive(&mut self, command: Drive) {
-        self.command = command;
+        self.command = command.or_stop();
+        self.deadline.restart(self.time);
     }
 
     fn limits(&self) -> Limits {

@@ -59,9 +59,13 @@ pub(super) fn turn_rate(yaw: f64, heading: f64, limits: &Limits) -> f64 {
     (TURN_GAIN * error).clamp(-most, most)
 }
 
-/// Keeps a heading and a speed; slower as long as the heading is wrong.
+/// Keeps a heading and a speed; slower as long as the heading is wrong. Stands still if any of the
+/// numbers is unknown (NaN).
 pub(crate) fn along(yaw: f64, heading: f64, speed: f64, limits: &Limits) -> Velocity {
     let error = wrap(heading - yaw);
+    if !error.is_finite() || !speed.is_finite() {
+        return Velocity::default();
+    }
     let share = if error.abs() > TURN_FIRST {
         0.0
     } else {
@@ -71,7 +75,7 @@ pub(crate) fn along(yaw: f64, heading: f64, speed: f64, limits: &Limits) -> Velo
 }
 
 /// The heading and the speed that lead to a point: at most with a speed, so that it could stop after
-/// `way` more metres.
+/// `way` more metres. The speed is 0 if the pose is unknown (NaN).
 pub(super) fn towards(
     pose: &Pose,
     (x, y): (f64, f64),
@@ -81,9 +85,44 @@ pub(super) fn towards(
 ) -> (f64, f64) {
     let heading = pose.bearing(x, y);
     let error = wrap(heading - pose.yaw);
+    // `min` would ignore an unknown term, and leave the full speed.
+    if !error.is_finite() || speed.is_nan() || way.is_nan() {
+        return (heading, 0.0);
+    }
     let stoppable = (2.0 * MARGIN * limits.deceleration * way).sqrt();
     // The speed at which the circle through the point can be driven.
     let turnable = pose.distance(x, y) * MARGIN * limits.yaw_rate / (2.0 * error.sin().abs());
     let speed = speed.min(stoppable).min(turnable);
     (heading, speed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_pose_gives_no_speed() {
+        let limits = Limits::default();
+        for pose in [
+            Pose {
+                x: f64::NAN,
+                ..Pose::default()
+            },
+            Pose {
+                y: f64::NAN,
+                ..Pose::default()
+            },
+            Pose {
+                yaw: f64::NAN,
+                ..Pose::default()
+            },
+        ] {
+            let (_, speed) = towards(&pose, (5.0, 0.0), 2.0, 5.0, &limits);
+            assert_eq!(speed, 0.0, "{pose:?}");
+        }
+        let velocity = along(f64::NAN, 0.0, 2.0, &limits);
+        assert_eq!(velocity, Velocity::default());
+        let (_, speed) = towards(&Pose::default(), (5.0, 0.0), 2.0, f64::INFINITY, &limits);
+        assert_eq!(speed, 2.0);
+    }
 }

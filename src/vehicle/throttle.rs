@@ -50,17 +50,20 @@ impl Throttle {
         );
         self.ramp = Some((now, ramped));
         Effort {
-            forward: share(ramped.x, measured.x, limits.speed),
-            turn: share(ramped.yaw, measured.yaw, limits.yaw_rate),
+            forward: share(ramped.x, measured.x, limits.speed, limits.reverse),
+            turn: share(ramped.yaw, measured.yaw, limits.yaw_rate, limits.yaw_rate),
             ..Effort::default()
         }
     }
 }
 
-/// The share of the full effort for a wanted and a measured speed.
-fn share(wanted: f64, measured: f64, full: f64) -> f64 {
+/// The share of the full effort for a wanted and a measured speed; full effort reaches another speed
+/// forward than backward.
+fn share(wanted: f64, measured: f64, ahead: f64, back: f64) -> f64 {
     let missing = wanted - measured;
-    let effort = (wanted + Throttle::GAIN * missing) / full.max(f64::MIN_POSITIVE);
+    let pushed = wanted + Throttle::GAIN * missing;
+    let full = if pushed < 0.0 { back } else { ahead };
+    let effort = pushed / full.max(f64::MIN_POSITIVE);
     // What is not a number pushes nothing.
     if effort.is_nan() {
         0.0

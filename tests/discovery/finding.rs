@@ -248,7 +248,8 @@ fn a_service_that_is_offered_or_withdrawn_later_is_noticed_at_once() {
     let now = world.now;
     world
         .stack(vehicle)
-        .offer(now, Box::new(Handlers::new(CAMERA)));
+        .offer(now, Box::new(Handlers::new(CAMERA)))
+        .unwrap();
     assert!(offered(&mut world));
     let now = world.now;
     assert!(world.stack(vehicle).withdraw(now, CAMERA.urn));

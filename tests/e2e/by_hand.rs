@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 
 use crate::browser::{Browser, SCREENS};
-use crate::steps::{emergency, take_control};
+use crate::steps::{emergency, look_from_all_screens, take_control};
 use crate::system::program;
 
 /// A program that runs until it is dropped.
@@ -48,6 +48,16 @@ impl Running {
     }
 }
 
+impl Running {
+    /// Stops the program where it is, or lets it go on.
+    fn suspend(&self, on: bool) {
+        let signal = if on { "-STOP" } else { "-CONT" };
+        let pid = self.0.id().to_string();
+        let sent = Command::new("kill").args([signal, &pid]).status();
+        assert!(sent.unwrap().success());
+    }
+}
+
 impl Drop for Running {
     fn drop(&mut self) {
         let _ = self.0.kill();
@@ -58,7 +68,7 @@ impl Drop for Running {
 /// Takes control, drives by key and stick, stops in an emergency, and sees what a lost station
 /// looks like and that the page finds the next one.
 pub(crate) fn run() {
-    let (_vehicle, _) = Running::start("jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
+    let (vehicle, _) = Running::start("jaus", &["vehicle", "--name", "G-Bat"], "Ctrl-C");
     let (station, address) =
         Running::start("jaus-ocu", &["--listen", "127.0.0.1:0"], "page is at ");
     let mut page = Browser::start(None);
@@ -100,5 +110,37 @@ pub(crate) fn run() {
     );
     page.wait("document.body.dataset.link === 'live'");
     take_control(&mut page);
+    refuses_to_drive_without_news(&mut page, &vehicle);
+    names_what_is_gone(&mut page, vehicle);
     assert!(page.complaints().is_empty(), "{:?}", page.complaints());
+}
+
+/// While the vehicle is suspended, all that the page shows is old: it says so, and does not drive.
+fn refuses_to_drive_without_news(page: &mut Browser, vehicle: &Running) {
+    page.key_down("ArrowUp", "ArrowUp");
+    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    look_from_all_screens(page, "by-hand-driving");
+    vehicle.suspend(true);
+    page.wait("document.querySelector('#drive-line').textContent.includes('picture is stale')");
+    page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
+    page.key_up("ArrowUp", "ArrowUp");
+    page.key_down("ArrowUp", "ArrowUp");
+    page.key_up("ArrowUp", "ArrowUp");
+    assert_eq!(page.text("#drive-source"), "Idle");
+    page.wait("document.querySelector('#speed').closest('[data-old]')");
+    page.wait("document.querySelector('#state-old').textContent.includes('velocity')");
+    page.wait("document.querySelector('#missing').textContent.includes('silent')");
+    look_from_all_screens(page, "by-hand-stale");
+    vehicle.suspend(false);
+    page.wait("document.querySelector('#missing').hidden");
+    page.wait("document.querySelector('#state-old').textContent === ''");
+}
+
+fn names_what_is_gone(page: &mut Browser, vehicle: Running) {
+    drop(vehicle);
+    page.wait(
+        "/^Primitive Driver [0-9.]+ is gone$/.test(document.querySelector('#missing').textContent)",
+    );
+    page.wait("document.querySelector('#drive-line').textContent.includes('is gone')");
+    look_from_all_screens(page, "by-hand-gone");
 }

@@ -79,11 +79,19 @@ fn run(system: &System) {
     page.wait("+document.querySelector('#progress').ariaValueNow > 5");
     look_from_all_screens(&mut page, "3-driving");
 
+    says_that_the_planner_is_gone(system, &mut page);
+    take_control(&mut page);
+    plan(&mut page, 4.5, 1.5);
+    approve(&mut page);
+
     take_over_by_keyboard(&mut page);
     emergency(&mut page);
 
     for program in system.programs() {
         system.kill(program);
+        if program != "jaus-ocu" {
+            page.wait("!document.querySelector('#missing').hidden");
+        }
         page.screenshot(&format!("5-without-{program}"));
         system.start(program);
         comes_alive(&mut page);
@@ -99,6 +107,7 @@ fn comes_alive(page: &mut Browser) {
     page.wait("document.querySelectorAll('#parts .part').length >= 4");
     page.wait("document.querySelector('#north').textContent !== '–'");
     page.wait("document.querySelector('#map-empty').hidden");
+    page.wait("document.querySelector('#missing').hidden");
 }
 
 /// Touches the map, corrects the place by hand, and waits for a route.
@@ -123,6 +132,19 @@ fn approve(page: &mut Browser) {
     page.wait(
         "document.querySelector('#stages [aria-current] .stage-name')?.textContent === 'Driving'",
     );
+}
+
+/// A planner that dies while it drives is named, and the station stops the vehicle.
+fn says_that_the_planner_is_gone(system: &System, page: &mut Browser) {
+    system.kill("jaus-planner");
+    let line = "document.querySelector('#mission-line').textContent";
+    page.wait(&format!("/planner [0-9.]+ is (gone|silent)/.test({line})"));
+    page.wait(&format!("{line}.includes('was told to stop')"));
+    page.wait("document.querySelector('#missing').textContent.includes('Planner')");
+    look_from_all_screens(page, "3-planner-gone");
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
+    system.start("jaus-planner");
+    comes_alive(page);
 }
 
 /// Holding a key drives the vehicle, mission or not; letting go stops it.

@@ -14,6 +14,7 @@ mod cli_support;
 mod papers;
 mod peer;
 mod right;
+mod safety;
 mod vehicle;
 #[path = "../support/vehicle_process.rs"]
 mod vehicle_process;

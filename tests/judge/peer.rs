@@ -50,7 +50,11 @@ pub(crate) struct Peer {
     /// one is given again and again.
     answers: BTreeMap<u16, Vec<Vec<Answer>>>,
     delay: Duration,
+    behaviour: Option<Behaviour>,
 }
+
+/// What a peer does with a message, before it looks for an answer of its list.
+pub(crate) type Behaviour = Box<dyn FnMut(&Received) -> Option<Bytes> + Send>;
 
 /// A peer on the network; gone when dropped.
 pub(crate) struct Running {
@@ -93,6 +97,15 @@ impl Peer {
         self
     }
 
+    /// Does this with each message; what it does not answer is answered as by other peers.
+    pub(crate) fn behaves(
+        mut self,
+        behaviour: impl FnMut(&Received) -> Option<Bytes> + Send + 'static,
+    ) -> Self {
+        self.behaviour = Some(Box::new(behaviour));
+        self
+    }
+
     /// Puts the peer on the loopback interface, into the group that the flags name.
     pub(crate) fn start(self, flags: &[String]) -> Running {
         let group: Group = flags.last().unwrap().parse().unwrap();
@@ -131,6 +144,9 @@ impl Peer {
     }
 
     async fn answer(&mut self, request: &Received) -> Vec<Answer> {
+        if let Some(octets) = self.behaviour.as_mut().and_then(|it| it(request)) {
+            return vec![(None, octets)];
+        }
         let code = u16::from_le_bytes(*request.payload.first_chunk().unwrap());
         if let Some(answers) = self.answers.get_mut(&code) {
             tokio::time::sleep(self.delay).await;

@@ -6,7 +6,11 @@ use crate::vehicle_process::VehicleProcess;
 
 /// A vehicle in the network that the flags name.
 fn start(flags: &[&str]) -> VehicleProcess {
-    VehicleProcess::start(jaus().args(["vehicle", "--id", "101.1.1"]).args(flags))
+    VehicleProcess::start(
+        jaus()
+            .args(["vehicle", "--id", "101.1.1", "--profile", "contest"])
+            .args(flags),
+    )
 }
 
 #[test]

@@ -24,7 +24,15 @@ impl Vehicle {
         let group = SocketAddrV4::new(Ipv4Addr::new(239, 255, 79, 1), free_port());
         let process = VehicleProcess::start(
             jaus()
-                .args(["vehicle", "--id", &VEHICLE.to_string(), "--name", "Rover"])
+                .args([
+                    "vehicle",
+                    "--id",
+                    &VEHICLE.to_string(),
+                    "--name",
+                    "Rover",
+                    "--profile",
+                    "contest",
+                ])
                 .args(["--loopback", "--port", &port.to_string()])
                 .args(["--group", &group.to_string()]),
         );

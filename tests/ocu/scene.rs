@@ -2,12 +2,16 @@
 
 use std::future::Future;
 use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::group::own_group;
 use futures_util::{SinkExt, StreamExt};
-use jaus::component::{AccessControl, Component, Kind, Management};
+use jaus::component::{AccessControl, Builder, Component, Handlers, Kind, Management, TimeOfDay};
 use jaus::link::Group;
+use jaus::messages::mobility::report_local_pose::TimeStamp;
+use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
 use jaus::node::{Config, Node};
 use jaus::ocu::{Listen, Station};
 use jaus::parts::{Part, Seat};
@@ -36,6 +40,7 @@ pub(crate) struct Scene {
     pub(crate) address: SocketAddr,
     group: Group,
     timeout: u8,
+    frozen: Option<Arc<AtomicBool>>,
     station: JoinHandle<()>,
     nodes: Vec<Node>,
 }
@@ -45,14 +50,23 @@ impl Scene {
         Self::with(Station::default(), 0).await
     }
 
+    /// With a pose sensor that repeats its last sample while the switch is on.
+    pub(crate) async fn with_frozen_pose(switch: Arc<AtomicBool>) -> Self {
+        Self::start(Station::default(), 0, Some(switch)).await
+    }
+
     /// With a vehicle whose control has to be renewed after so many seconds; 0 for never.
     pub(crate) async fn with(station: Station, timeout: u8) -> Self {
+        Self::start(station, timeout, None).await
+    }
+
+    async fn start(station: Station, timeout: u8, frozen: Option<Arc<AtomicBool>>) -> Self {
         let group = own_group();
         let node = Node::start(Config::loopback(101, 1).group(group)).unwrap();
         let platform = SkidSteer::new(SkidSteerConfig::default());
         let vehicle = Vehicle::new(Pilot::new(platform, Frame::at(52.5, 13.4)))
-            .with_time(Instant::now(), Duration::ZERO);
-        let rover = rover(&vehicle, &node, timeout);
+            .with_clock(TimeOfDay::new(|| Duration::ZERO));
+        let rover = rover(&vehicle, &node, timeout, frozen.as_ref());
         let station = Station {
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
             ..station
@@ -64,6 +78,7 @@ impl Scene {
             address,
             group,
             timeout,
+            frozen,
             station,
             nodes: vec![node, desk],
         }
@@ -96,7 +111,15 @@ impl Scene {
 
     /// The vehicle's component ends, and another one begins that knows nothing of the first.
     pub(crate) async fn restart_rover(&mut self) {
+        self.end_rover();
+        self.start_rover().await;
+    }
+
+    pub(crate) fn end_rover(&mut self) {
         drop(self.rover.take());
+    }
+
+    pub(crate) async fn start_rover(&mut self) {
         let restarted = async {
             // Its number is free once it has taken leave.
             while self.nodes[0]
@@ -108,7 +131,8 @@ impl Scene {
             }
         };
         within_limit(restarted).await;
-        self.rover = Some(rover(&self.vehicle, &self.nodes[0], self.timeout));
+        let frozen = self.frozen.as_ref();
+        self.rover = Some(rover(&self.vehicle, &self.nodes[0], self.timeout, frozen));
     }
 
     pub(crate) fn is_controlled(&self) -> bool {
@@ -125,6 +149,11 @@ impl Scene {
             kind: Kind::Vehicle,
             name: "Rover".to_owned(),
         }
+    }
+
+    /// Another part of the vehicle that is made of services.
+    pub(crate) fn attach(&self, component: u8, builder: Builder) -> Component {
+        builder.attach(&self.nodes[0], component).unwrap()
     }
 
     pub(crate) fn speed(&self) -> f64 {
@@ -149,15 +178,43 @@ impl Drop for Scene {
 }
 
 /// A component with what it takes to be driven.
-fn rover(vehicle: &Vehicle, node: &Node, timeout: u8) -> Component {
+fn rover(
+    vehicle: &Vehicle,
+    node: &Node,
+    timeout: u8,
+    frozen: Option<&Arc<AtomicBool>>,
+) -> Component {
     let control = AccessControl::new().timeout(timeout);
-    Component::builder(Kind::Vehicle, "Rover")
+    let rover = Component::builder(Kind::Vehicle, "Rover")
         .management(Management::new().access_control(control))
         .offer(vehicle.velocity_state_sensor())
-        .offer(vehicle.local_pose_sensor())
-        .offer(vehicle.primitive_driver())
-        .attach(node, 1)
-        .unwrap()
+        .offer(vehicle.primitive_driver());
+    let rover = match frozen {
+        Some(switch) => rover.offer(pose_that_freezes(Arc::clone(switch))),
+        None => rover.offer(vehicle.local_pose_sensor()),
+    };
+    rover.attach(node, 1).unwrap()
+}
+
+/// A pose sensor whose samples advance unless the switch is on.
+fn pose_that_freezes(switch: Arc<AtomicBool>) -> Handlers {
+    let start = Instant::now();
+    let mut sampled = Duration::ZERO;
+    Handlers::new(local_pose_sensor::LATEST).answer(move |_: QueryLocalPose| {
+        if !switch.load(Ordering::Relaxed) {
+            sampled = start.elapsed();
+        }
+        let seconds = u8::try_from(sampled.as_secs()).unwrap();
+        let stamp = TimeStamp::default().with_seconds(seconds).unwrap();
+        let milliseconds = u16::try_from(sampled.subsec_millis()).unwrap();
+        let mut report = ReportLocalPose {
+            time_stamp: stamp.with_milliseconds(milliseconds).ok(),
+            ..ReportLocalPose::default()
+        };
+        report.set_x_m(3.0).unwrap();
+        report.set_y_m(4.0).unwrap();
+        report
+    })
 }
 
 async fn start(

@@ -171,12 +171,13 @@ impl Client {
             if self.control != Some(id) {
                 continue;
             }
-            self.holds = news == ControlNews::Granted;
-            if self.holds {
-                self.next = now;
-            } else if let ControlNews::Refused(_) | ControlNews::Released = news {
-                self.control = None;
+            match news {
+                ControlNews::Status(_) => continue,
+                ControlNews::Granted => self.next = now,
+                ControlNews::Refused(_) | ControlNews::Released => self.control = None,
+                ControlNews::Lost(_) => {}
             }
+            self.holds = news == ControlNews::Granted;
         }
     }
 

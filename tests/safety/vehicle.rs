@@ -8,7 +8,7 @@ use jaus::endpoint::{Outgoing, Received};
 use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
 use jaus::service::{
     Condition, Discovery, Handlers, Kind, Liveness, Management, MotionPolicy, Profile, Scope,
-    Service, Stack, Standing, State, StopCause, Time, Timing, mobility,
+    Service, Stack, Standing, State, StopCause, Time, TimeOfDay, Timing, mobility,
 };
 use jaus::vehicle::{Drive, Effort, Frame, Limits, Motion, Pilot, Platform, Pose};
 
@@ -38,13 +38,14 @@ impl Program {
         seed: u64,
     ) -> Self {
         let is_own = driver == Driver::Own;
+        let time = TimeOfDay::new(move || clock.since_1970());
         let mut services: Vec<Box<dyn Service>> = vec![Box::new(Liveness::new())];
         if is_own {
             services.push(Box::new(own_service(plant)));
         } else {
-            services.extend(drivers(now, plant, &clock, driver.is_held()));
+            services.extend(drivers(plant, &time, driver.is_held()));
         }
-        services.push(Box::new(Time::new(move || clock.since_1970())));
+        services.push(Box::new(Time::new(time)));
         let profile = Profile::new(Kind::Vehicle, "Rover");
         let discovery = Discovery::new(VEHICLE, profile, Scope::System, Timing::default(), seed);
         let mut stack = Stack::new(discovery, services).management(Management::new());
@@ -106,12 +107,7 @@ impl Program {
 }
 
 /// All drivers on one vehicle.
-fn drivers(
-    now: Instant,
-    plant: &SharedPlant,
-    clock: &WallClock,
-    holds: bool,
-) -> Vec<Box<dyn Service>> {
+fn drivers(plant: &SharedPlant, time: &TimeOfDay, holds: bool) -> Vec<Box<dyn Service>> {
     let pilot = Pilot::new(Wheels(plant.clone()), Frame::at(52.5, 13.4));
     let policy = match holds {
         true => MotionPolicy::Hold,
@@ -119,7 +115,7 @@ fn drivers(
     };
     let vehicle = mobility::Vehicle::new(pilot)
         .motion_policy(policy)
-        .with_time(now, clock.since_1970());
+        .with_clock(time.clone());
     vec![
         Box::new(vehicle.velocity_state_sensor()),
         Box::new(vehicle.local_pose_sensor()),
@@ -173,6 +169,6 @@ impl Platform for Wheels {
     }
 
     fn fault(&self) -> Option<String> {
-        self.0.fault()
+        self.0.fault().map(str::to_owned)
     }
 }

@@ -1,7 +1,7 @@
 //! A component that offers the service. Ask it with
 //! `jaus query --loopback --jsidl services 101.1.40 QueryLamp`.
 
-use jaus::component::{Component, Kind};
+use jaus::component::{AccessControl, Component, Kind};
 use jaus::node::{Config, Node};
 
 #[tokio::main(flavor = "current_thread")]
@@ -9,6 +9,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let node = Node::start(Config::loopback(101, 1))?;
     let lamp = Component::builder(Kind::Vehicle, "Lamp")
         .offer(own_service::service())
+        .access_control(AccessControl::new())
         .attach(&node, 40)?;
     println!("{} is up; Ctrl-C ends it", lamp.id());
     Ok(tokio::signal::ctrl_c().await?)

@@ -88,6 +88,7 @@ impl codec::Message for ReportArrays {
     const CODE: u16 = 0xF051;
     const NAME: &'static str = "ReportArrays";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         379
@@ -245,6 +246,7 @@ impl codec::Message for ReportArrayList {
     const CODE: u16 = 0xF052;
     const NAME: &'static str = "ReportArrayList";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2

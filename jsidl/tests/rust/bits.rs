@@ -59,6 +59,7 @@ impl codec::Message for ReportTime {
     const CODE: u16 = 0xF011;
     const NAME: &'static str = "ReportTime";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         7

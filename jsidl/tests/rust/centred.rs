@@ -117,6 +117,7 @@ impl codec::Message for SetLean {
     const CODE: u16 = 0xF0A1;
     const NAME: &'static str = "SetLean";
     const IS_COMMAND: bool = true;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         4

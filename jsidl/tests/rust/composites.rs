@@ -68,6 +68,7 @@ impl codec::Message for QueryNothing {
     const CODE: u16 = 0xF030;
     const NAME: &'static str = "QueryNothing";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2
@@ -125,6 +126,7 @@ impl codec::Message for ReportTree {
     const CODE: u16 = 0xF031;
     const NAME: &'static str = "ReportTree";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         3
@@ -447,6 +449,7 @@ impl codec::Message for ReportListOfLists {
     const CODE: u16 = 0xF032;
     const NAME: &'static str = "ReportListOfLists";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2
@@ -572,6 +575,7 @@ impl codec::Message for SetChoice {
     const CODE: u16 = 0xF033;
     const NAME: &'static str = "SetChoice";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2
@@ -1199,6 +1203,7 @@ impl codec::Message for ReportEmptyVariant {
     const CODE: u16 = 0xF034;
     const NAME: &'static str = "ReportEmptyVariant";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         3
@@ -1379,6 +1384,7 @@ impl codec::Message for ReportOptional {
     const CODE: u16 = 0xF035;
     const NAME: &'static str = "ReportOptional";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         8
@@ -1902,6 +1908,7 @@ impl codec::Message for ReportManyOptional {
     const CODE: u16 = 0xF036;
     const NAME: &'static str = "ReportManyOptional";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         4

@@ -331,6 +331,7 @@ impl codec::Message for Open {
     const CODE: u16 = 0xD001;
     const NAME: &'static str = "Open";
     const IS_COMMAND: bool = true;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2
@@ -383,6 +384,7 @@ impl codec::Message for Close {
     const CODE: u16 = 0xD002;
     const NAME: &'static str = "Close";
     const IS_COMMAND: bool = true;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2
@@ -435,6 +437,7 @@ impl codec::Message for Stop {
     const CODE: u16 = 0xD003;
     const NAME: &'static str = "Stop";
     const IS_COMMAND: bool = true;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2
@@ -487,6 +490,7 @@ impl codec::Message for ReportDoor {
     const CODE: u16 = 0xD004;
     const NAME: &'static str = "ReportDoor";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2

@@ -55,6 +55,7 @@ impl codec::Message for SetPosition {
     const CODE: u16 = 0xF041;
     const NAME: &'static str = "SetPosition";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         3

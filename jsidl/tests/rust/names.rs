@@ -106,6 +106,7 @@ impl codec::Message for Option_ {
     const CODE: u16 = 0xF061;
     const NAME: &'static str = "Option";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         13
@@ -338,6 +339,7 @@ impl codec::Message for Result_ {
     const CODE: u16 = 0xF062;
     const NAME: &'static str = "Result";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         3
@@ -506,6 +508,7 @@ impl codec::Message for Vec_ {
     const CODE: u16 = 0xF063;
     const NAME: &'static str = "Vec";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         3
@@ -947,6 +950,7 @@ impl codec::Message for Codec {
     const CODE: u16 = 0xF064;
     const NAME: &'static str = "codec";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         7
@@ -1070,6 +1074,7 @@ impl codec::Message for Move {
     const CODE: u16 = 0xF065;
     const NAME: &'static str = "move";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2
@@ -1122,6 +1127,7 @@ impl codec::Message for Move2 {
     const CODE: u16 = 0xF066;
     const NAME: &'static str = "Move";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         2
@@ -1181,6 +1187,7 @@ impl codec::Message for ReportSame {
     const CODE: u16 = 0xF067;
     const NAME: &'static str = "ReportSame";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         6
@@ -1536,6 +1543,7 @@ impl codec::Message for SameRecAgain {
     const CODE: u16 = 0xF068;
     const NAME: &'static str = "SameRecAgain";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         4

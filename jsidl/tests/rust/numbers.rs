@@ -82,6 +82,7 @@ impl codec::Message for ReportNumbers {
     const CODE: u16 = 0xF001;
     const NAME: &'static str = "ReportNumbers";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         44
@@ -311,6 +312,7 @@ impl codec::Message for SetScaled {
     const CODE: u16 = 0xF002;
     const NAME: &'static str = "SetScaled";
     const IS_COMMAND: bool = true;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         15
@@ -490,6 +492,7 @@ impl codec::Message for SetScaledOptional {
     const CODE: u16 = 0xF003;
     const NAME: &'static str = "SetScaledOptional";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         4
@@ -636,6 +639,7 @@ impl codec::Message for ReportNamed {
     const CODE: u16 = 0xF004;
     const NAME: &'static str = "ReportNamed";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         8

@@ -62,6 +62,7 @@ impl codec::Message for SetTexts {
     const CODE: u16 = 0xF021;
     const NAME: &'static str = "SetTexts";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         15
@@ -163,6 +164,7 @@ impl codec::Message for SetBlobs {
     const CODE: u16 = 0xF022;
     const NAME: &'static str = "SetBlobs";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         4

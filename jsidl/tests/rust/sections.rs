@@ -57,6 +57,7 @@ impl codec::Message for ReportSections {
     const CODE: u16 = 0xF071;
     const NAME: &'static str = "ReportSections";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         5

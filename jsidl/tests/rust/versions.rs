@@ -92,6 +92,7 @@ impl codec::Message for ReportState {
     const CODE: u16 = 0xF081;
     const NAME: &'static str = "ReportState";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         7
@@ -194,6 +195,7 @@ impl codec::Message for ReportMode {
     const CODE: u16 = 0xF082;
     const NAME: &'static str = "ReportMode";
     const IS_COMMAND: bool = false;
+    const NEEDS_CONTROL: bool = false;
 
     fn encoded_len(&self) -> usize {
         3
@@ -287,6 +289,7 @@ pub mod v1_0 {
         const CODE: u16 = 0xF081;
         const NAME: &'static str = "ReportState";
         const IS_COMMAND: bool = false;
+        const NEEDS_CONTROL: bool = false;
 
         fn encoded_len(&self) -> usize {
             5

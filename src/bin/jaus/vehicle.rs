@@ -5,9 +5,9 @@
     reason = "the simulation runs in real time and knows the time of day"
 )]
 
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use jaus::address::JausId;
 use jaus::cli::failure::{Failure, Outcome};
 use jaus::cli::network::Network;
@@ -16,8 +16,10 @@ use jaus::cli::runtime::{self, Clock, between};
 use jaus::cli::tree;
 use jaus::component::{
     AccessControl, Builder, Component, Condition, Kind, Management, Standing, State, Time,
+    TimeOfDay,
 };
 use jaus::node::Node;
+use jaus::service::MotionPolicy;
 use jaus::service::mobility::Vehicle;
 use jaus::vehicle::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
 use tokio::time::{MissedTickBehavior, interval};
@@ -32,6 +34,7 @@ use crate::node;
 #[command(after_help = "Examples:\n  \
     jaus vehicle --loopback               for trying things out on one computer\n  \
     jaus vehicle --id 105.1.1 --interface eth0\n  \
+    jaus vehicle --profile contest        for clients that send once and never renew control\n  \
     jaus vehicle --split                  Platform Management and Navigation as two components\n  \
     jaus vehicle --noise 0.1 --seed 7     with wheels that slip\n  \
     jaus -v vehicle                       also tells what clients want of it")]
@@ -53,15 +56,34 @@ pub(crate) struct VehicleCommand {
     #[arg(long, value_name = "CODE", default_value = "1")]
     authority: u8,
 
-    /// After how many seconds control ends unless its client requests it again; 0 for never
-    #[arg(long, value_name = "SECONDS", default_value = "0")]
-    timeout: u8,
+    /// What clients are expected: `standard` ones renew control and repeat their efforts; those of
+    /// the public contests do neither, so that `contest` means --timeout 0 and --hold
+    #[arg(long, value_enum, default_value_t)]
+    profile: Profile,
+
+    /// After how many seconds control ends unless its client requests it again, a quarter of it late;
+    /// 0 for never [default: 4]
+    #[arg(long, value_name = "SECONDS")]
+    timeout: Option<u8>,
+
+    /// Keep an effort or a velocity as long as its client shows life within a second, instead of half
+    /// a second
+    #[arg(long)]
+    hold: bool,
 
     #[command(flatten)]
     simulation: Simulation,
 
     #[command(flatten)]
     network: Network,
+}
+
+/// What clients are expected to do.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum Profile {
+    #[default]
+    Standard,
+    Contest,
 }
 
 #[derive(Args)]
@@ -105,13 +127,15 @@ impl VehicleCommand {
         let navigation = self.navigation(id)?;
         runtime::run(async {
             let node = Node::start(config).map_err(Failure::of)?;
-            let vehicle = self.simulation.vehicle();
+            let time = TimeOfDay::new(time_of_day);
+            let vehicle = self.simulation.vehicle().with_clock(time.clone());
+            let vehicle = vehicle.motion_policy(self.motion_policy());
             let control = AccessControl::new()
                 .authority(self.authority)
-                .timeout(self.timeout);
+                .timeout(self.timeout());
             let manager = Component::builder(Kind::Vehicle, name.clone()).access_control(control);
             let driver = Component::builder(Kind::Vehicle, name).component_name("Navigation");
-            let driver = drivable(driver, &vehicle, control);
+            let driver = drivable(driver, &vehicle, control, time);
             let attach = |builder: Builder, id: JausId| {
                 builder.attach(&node, id.component()).map_err(Failure::of)
             };
@@ -134,6 +158,20 @@ impl VehicleCommand {
             node.shutdown().await;
             outcome
         })
+    }
+
+    fn timeout(&self) -> u8 {
+        self.timeout.unwrap_or(match self.profile {
+            Profile::Standard => AccessControl::TIMEOUT,
+            Profile::Contest => 0,
+        })
+    }
+
+    fn motion_policy(&self) -> MotionPolicy {
+        match self.hold || self.profile == Profile::Contest {
+            true => MotionPolicy::Hold,
+            false => MotionPolicy::default(),
+        }
     }
 
     /// The id of the component that drives.
@@ -208,15 +246,20 @@ impl Simulation {
             noise: self.noise,
             seed: self.seed,
         });
-        Vehicle::new(Pilot::new(platform, self.at)).with_time(Instant::now(), time_of_day())
+        Vehicle::new(Pilot::new(platform, self.at))
     }
 }
 
 /// A component with all that it takes to be driven.
-fn drivable(builder: Builder, vehicle: &Vehicle, control: AccessControl) -> Builder {
+fn drivable(
+    builder: Builder,
+    vehicle: &Vehicle,
+    control: AccessControl,
+    time: TimeOfDay,
+) -> Builder {
     builder
         .management(Management::new().access_control(control).initializes())
-        .offer(Time::new(time_of_day))
+        .offer(Time::new(time))
         .offer(vehicle.list_manager())
         .offer(vehicle.velocity_state_sensor())
         .offer(vehicle.local_pose_sensor())

@@ -1,4 +1,5 @@
 //! Tests of planning and of the waterfall.
 
+mod lost_link;
 mod paths;
 mod stages;

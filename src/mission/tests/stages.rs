@@ -5,23 +5,25 @@ use std::time::{Duration, Instant};
 use proptest::prelude::*;
 
 use crate::mission::{
-    Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Refusal, Run, Settings, Stage,
+    Action, Destination, Link, LinkState, LostLink, Mission, NotPlanned, Path, Refusal, Run,
+    Settings, Stage,
 };
 
-const SECOND: Duration = Duration::from_secs(1);
-const SETTINGS: Settings = Settings {
+pub(super) const SECOND: Duration = Duration::from_secs(1);
+pub(super) const SETTINGS: Settings = Settings {
     attempts: 3,
     pause: SECOND,
     patience: Duration::from_secs(10),
     settling: SECOND,
     stall: Duration::from_secs(30),
     speed: 1.0,
+    lost_link: LostLink::Stop,
 };
 
 /// A mission in virtual time.
-struct World {
-    mission: Mission,
-    now: Instant,
+pub(super) struct World {
+    pub(super) mission: Mission,
+    pub(super) now: Instant,
     actions: Vec<Action>,
 }
 
@@ -41,13 +43,20 @@ fn passing(reason: &str) -> NotPlanned {
 }
 
 impl World {
+    fn new() -> Self {
+        Self::with(LostLink::Stop)
+    }
+
     #[expect(
         clippy::disallowed_methods,
         reason = "any moment will do as the beginning of virtual time"
     )]
-    fn new() -> Self {
+    pub(super) fn with(lost_link: LostLink) -> Self {
         Self {
-            mission: Mission::new(SETTINGS),
+            mission: Mission::new(Settings {
+                lost_link,
+                ..SETTINGS
+            }),
             now: Instant::now(),
             actions: Vec::new(),
         }
@@ -55,35 +64,39 @@ impl World {
 
     fn under_way(approved: bool) -> Self {
         let mut world = Self::new();
+        world.go(approved);
+        world
+    }
+
+    pub(super) fn go(&mut self, approved: bool) {
         let to = Destination {
             x: 3.0,
             y: 4.0,
             speed: None,
         };
-        world.mission.go_to(world.now, to, approved);
-        world
+        self.mission.go_to(self.now, to, approved);
     }
 
-    fn stage(&self) -> Stage {
+    pub(super) fn stage(&self) -> Stage {
         self.mission.report().stage
     }
 
-    fn reason(&self) -> &str {
+    pub(super) fn reason(&self) -> &str {
         &self.mission.report().reason
     }
 
-    fn run(&self) -> Run {
+    pub(super) fn run(&self) -> Run {
         self.mission.report().run
     }
 
     /// What is to be done, all at once.
-    fn take_actions(&mut self) -> Vec<Action> {
+    pub(super) fn take_actions(&mut self) -> Vec<Action> {
         let actions: Vec<_> = std::iter::from_fn(|| self.mission.poll_action()).collect();
         self.actions.extend(actions.iter().cloned());
         actions
     }
 
-    fn pass(&mut self, time: Duration) {
+    pub(super) fn pass(&mut self, time: Duration) {
         let end = self.now + time;
         while let Some(wake) = self.mission.poll_timeout().filter(|&wake| wake <= end) {
             self.now = self.now.max(wake);
@@ -97,28 +110,28 @@ impl World {
         self.mission.handle_link(self.now, link, state);
     }
 
-    fn map(&mut self) {
+    pub(super) fn map(&mut self) {
         let run = self.run();
         self.mission.handle_map(self.now, run, Ok(()));
     }
 
-    fn plan(&mut self) {
+    pub(super) fn plan(&mut self) {
         let run = self.run();
         self.mission.handle_path(self.now, run, Ok(path()));
     }
 
-    fn hand_over(&mut self) {
+    pub(super) fn hand_over(&mut self) {
         let run = self.run();
         self.mission.handle_handed_over(self.now, run, Ok(()));
     }
 
-    fn set_back(&mut self, reason: &str) {
+    pub(super) fn set_back(&mut self, reason: &str) {
         let run = self.run();
         self.mission.handle_setback(self.now, run, reason);
     }
 
     /// As far as driving.
-    fn drive(&mut self) {
+    pub(super) fn drive(&mut self) {
         self.map();
         self.plan();
         self.hand_over();

@@ -19,8 +19,7 @@ use crate::messages::ground::{
     ReportRasterMaps, ReportStage, mission_planner, raster_maps,
 };
 use crate::messages::mobility::{
-    QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState, local_pose_sensor,
-    velocity_state_sensor,
+    QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState,
 };
 use crate::ocu::picture::Picture;
 use crate::ocu::report::Report;
@@ -68,8 +67,8 @@ impl Topics {
             status: role::is_managed(part),
             control: role::is_managed(part) || part.offers(access_control::URN),
             stage: role::tells_stage(part),
-            pose: part.offers(local_pose_sensor::URN),
-            velocity: part.offers(velocity_state_sensor::URN),
+            pose: role::reports_pose(part),
+            velocity: role::reports_velocity(part),
             mission: part.offers(mission_planner::URN),
             maps: part.offers(raster_maps::URN),
         }
@@ -152,10 +151,12 @@ impl Following {
                 match component.subscribe::<R, Q>(peer, &query, when).await {
                     Ok(mut reports) => {
                         while let Some(update) = reports.next().await {
-                            let Update::Report(report) = update else {
-                                continue;
+                            let report = match update {
+                                Update::Report(report) => report.into(),
+                                Update::Up => Report::Subscription { is_up: true },
+                                Update::Down { .. } => Report::Subscription { is_up: false },
                             };
-                            if sighted.send((peer, report.into())).await.is_err() {
+                            if sighted.send((peer, report)).await.is_err() {
                                 return;
                             }
                         }

@@ -21,6 +21,8 @@ pub(super) struct Grip {
     /// Whether what is held is to act on commands, also after it was started again; nothing while
     /// nobody has said so since this station was started.
     ready: Option<bool>,
+    /// Whether parts are to stand by as soon as they are held, because what drove them is lost.
+    stops: bool,
     holds: BTreeMap<JausId, Hold>,
     /// Who asked for control and waits for the answers of the parts.
     waiting: Vec<Reply>,
@@ -170,15 +172,29 @@ impl Grip {
         self.let_go(picture)
     }
 
+    /// Everything is wanted, and to stand by: what drove the vehicle is lost.
+    pub(super) fn want_stopped(&mut self, now: Instant, picture: &Picture) {
+        drop(self.want(Wanted::Everything, picture));
+        self.set_ready(now, false);
+        self.stops = true;
+    }
+
+    /// Whether the vehicle was stopped because what drove it is lost, and its drivers are held.
+    pub(super) fn is_stopped(&self, picture: &Picture) -> bool {
+        self.stops && self.state(picture).held
+    }
+
     /// Everything is to be given back.
     pub(super) fn release(&mut self, picture: &Picture) -> Vec<Arc<Control>> {
         self.ready = Some(false);
+        self.stops = false;
         self.want(Wanted::Nothing, picture)
     }
 
     /// Whether what is held is to act on commands; it is being told so.
     pub(super) fn set_ready(&mut self, now: Instant, ready: bool) {
         self.ready = Some(ready);
+        self.stops &= !ready;
         for hold in self.holds.values_mut() {
             if let Hold::Held { resumed, .. } = hold {
                 *resumed = now;
@@ -204,6 +220,8 @@ impl Grip {
                 let control = Arc::new(control);
                 if is_ready {
                     resume(&control, hands);
+                } else if self.stops {
+                    stand_by(&control, hands);
                 }
                 tracing::info!("in control of {part}");
                 *hold = Hold::Held {
@@ -385,6 +403,19 @@ fn resume(control: &Arc<Control>, hands: &mut Hands) {
             }
         }),
         async move { control.resume().await.map_err(|error| error.to_string()) },
+    );
+}
+
+/// Makes a part stop acting on commands; nobody waits for it.
+fn stand_by(control: &Arc<Control>, hands: &mut Hands) {
+    let control = Arc::clone(control);
+    hands.tell(
+        Box::new(|result| {
+            if let Err(reason) = result {
+                tracing::warn!("not in standby: {reason}");
+            }
+        }),
+        async move { control.standby().await.map_err(|error| error.to_string()) },
     );
 }
 

@@ -11,7 +11,7 @@ use super::Reply;
 use crate::address::JausId;
 use crate::codec::{Message, OutOfRange};
 use crate::component::{Component, Control, ControlError, DeliverError};
-use crate::messages::core::{ClearEmergency, QueryStatus, ReportStatus, SetEmergency};
+use crate::messages::core::{QueryStatus, ReportStatus};
 use crate::messages::mobility::SetWrenchEffort;
 use crate::ocu::state::Edition;
 use crate::ocu::stick::Push;
@@ -154,12 +154,7 @@ impl Hands {
         let component = self.component.clone();
         self.jobs.spawn(async move {
             let deed = async {
-                let delivered = if on {
-                    component.deliver(peer, &set_emergency()).await
-                } else {
-                    component.deliver(peer, &clear_emergency()).await
-                };
-                note(peer, delivered);
+                note(peer, emergency::deliver(&component, peer, on).await);
             };
             // Some peers never acknowledge: what counts is their status.
             let _ = timeout(ALARM_PATIENCE, deed).await;
@@ -172,7 +167,7 @@ impl Hands {
 
     /// Shouts that there is an emergency, without waiting for anything.
     pub(super) fn shout(&self, peer: JausId) {
-        if let Err(error) = self.component.send(peer, &set_emergency()) {
+        if let Err(error) = emergency::send(&self.component, peer) {
             tracing::warn!(%peer, %error, "emergency could not be sent");
         }
     }
@@ -198,15 +193,38 @@ pub(super) async fn release(control: Arc<Control>) {
     }
 }
 
-fn set_emergency() -> SetEmergency {
-    SetEmergency {
-        emergency_code: 1.into(),
-    }
-}
+/// The only ways in which an emergency leaves this station, so that its priority is decided here.
+mod emergency {
+    use crate::address::JausId;
+    use crate::component::{Component, DeliverError, SendError};
+    use crate::messages::core::set_emergency::EmergencyCode;
+    use crate::messages::core::{ClearEmergency, SetEmergency};
+    use crate::wire::Priority;
 
-fn clear_emergency() -> ClearEmergency {
-    ClearEmergency {
-        emergency_code: 1.into(),
+    const PRIORITY: Priority = Priority::SafetyCritical;
+    const SET: SetEmergency = SetEmergency {
+        emergency_code: EmergencyCode(1),
+    };
+    const CLEAR: ClearEmergency = ClearEmergency {
+        emergency_code: EmergencyCode(1),
+    };
+
+    /// Sets an emergency at once, without an acknowledgement.
+    pub(super) fn send(component: &Component, peer: JausId) -> Result<(), SendError> {
+        component.send_with(PRIORITY, peer, &SET)
+    }
+
+    /// Sets an emergency or clears it, acknowledged.
+    pub(super) async fn deliver(
+        component: &Component,
+        peer: JausId,
+        on: bool,
+    ) -> Result<(), DeliverError> {
+        if on {
+            component.deliver_with(PRIORITY, peer, &SET).await
+        } else {
+            component.deliver_with(PRIORITY, peer, &CLEAR).await
+        }
     }
 }
 

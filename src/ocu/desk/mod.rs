@@ -9,6 +9,7 @@ mod hands;
 mod maps;
 mod wishes;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -17,16 +18,18 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use self::alarm::Alarm;
 use self::following::{Following, Sighting};
-use self::grip::Grip;
+use self::grip::{Grip, Wanted};
 use self::hands::{Finished, Hands};
 pub(super) use self::maps::CellsReply;
 use self::maps::Maps;
 use super::PageId;
+use super::missing::Absence;
 use super::picture::Picture;
 use super::role::Role;
 use super::state::{Drive, State};
 use super::stick::{Push, Stick};
 use super::wish::Wish;
+use crate::address::JausId;
 use crate::component::Component;
 use crate::parts::PartError;
 use crate::view::Timestamp;
@@ -64,6 +67,10 @@ pub(super) struct Desk {
     grip: Grip,
     alarm: Alarm,
     maps: Maps,
+    /// Which parts were missing when that was last logged.
+    missing: BTreeMap<JausId, Absence>,
+    /// Why driving was ended by the station, until a page drives again.
+    halted: Option<String>,
     orders: mpsc::Receiver<Order>,
     sightings: mpsc::Receiver<Sighting>,
     snapshots: watch::Sender<Arc<str>>,
@@ -92,6 +99,8 @@ impl Desk {
             grip: Grip::default(),
             alarm: Alarm::default(),
             maps: Maps::default(),
+            missing: BTreeMap::new(),
+            halted: None,
             orders: inbox,
             sightings,
             snapshots: publisher,
@@ -144,13 +153,16 @@ impl Desk {
     }
 
     fn handle_beat(&mut self, now: Instant) {
-        self.look_around();
+        self.look_around(now);
+        self.log_missing(now);
+        self.halt_on_old_picture(now);
         if self.alarm.is_wanted() || self.picture.in_emergency().next().is_some() {
             // Whoever has set it: nothing acts again by itself when it is over.
             self.stick.stop(now);
             self.grip.set_ready(now, false);
         }
         self.alarm.handle_time(now, &self.picture, &mut self.hands);
+        self.stop_after_lost_planner(now);
         self.grip.handle_time(now, &self.picture, &mut self.hands);
         self.steer(now);
         self.seq += 1;
@@ -159,12 +171,68 @@ impl Desk {
         }
     }
 
-    fn look_around(&mut self) {
+    fn look_around(&mut self, now: Instant) {
+        self.picture.handle_time(now);
         let directory = self.hands.component().directory();
         if !std::ptr::eq(&*directory, self.picture.directory()) {
-            self.picture.handle_directory(directory);
+            self.picture.handle_directory(now, directory);
             self.following.follow(&self.picture);
         }
+    }
+
+    /// Logs which parts disappear, fall silent, and come back.
+    fn log_missing(&mut self, now: Instant) {
+        let mut missing = BTreeMap::new();
+        for (id, name, how) in self.picture.missing(now) {
+            missing.insert(id, how);
+            if self.missing.get(&id) != Some(&how) {
+                tracing::warn!("{name} {id} is {}", how.name());
+            }
+        }
+        for id in self.missing.keys().filter(|id| !missing.contains_key(id)) {
+            if self.picture.parts().contains_key(id) {
+                tracing::info!("{id} is back");
+            }
+        }
+        self.missing = missing;
+    }
+
+    /// Ends manual drive when the picture is stale.
+    fn halt_on_old_picture(&mut self, now: Instant) {
+        if self.stick.driven().is_none() {
+            return;
+        }
+        if let Some(why) = self.picture.stale(now) {
+            tracing::warn!("manual drive ends: {why}");
+            self.stick.stop(now);
+            self.halted = Some(why);
+        }
+    }
+
+    /// A planner that is lost while it drives for this operator leaves the drivers without a client
+    /// that watches them: the station takes them and has them stand by.
+    fn stop_after_lost_planner(&mut self, now: Instant) {
+        let Some((planner, how)) = self.picture.lost_planner(now) else {
+            return;
+        };
+        if self.grip.wanted() == Wanted::Planner {
+            tracing::warn!(
+                "the planner {planner} is {} while it drives: stopping the vehicle",
+                how.name()
+            );
+            self.grip.want_stopped(now, &self.picture);
+        }
+    }
+
+    /// Why driving has ended although no page let go of the stick; empty otherwise.
+    fn halt_reason(&self) -> String {
+        if self.stick.fell_silent() {
+            let limit = Stick::DEAD_MAN.as_millis();
+            return format!(
+                "nothing came from the page for {limit} ms: the vehicle was told to stop"
+            );
+        }
+        self.halted.clone().unwrap_or_default()
     }
 
     /// Tells the vehicle what the stick says, until it has acknowledged that it is let go.
@@ -207,8 +275,11 @@ impl Desk {
                 active: driven.is_some(),
                 forward: push.forward(),
                 turn: push.turn(),
+                reason: self.halt_reason(),
             },
-            mission: self.picture.mission_state(now),
+            mission: self
+                .picture
+                .mission_state(now, self.grip.is_stopped(&self.picture)),
             map: self.picture.map_state(),
         }
     }

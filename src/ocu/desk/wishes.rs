@@ -61,7 +61,7 @@ impl Desk {
         if self.alarm.is_wanted() {
             return Err("clear the emergency of this vehicle before you choose another".to_owned());
         }
-        self.picture.select(subsystem)?;
+        self.picture.select(now, subsystem)?;
         self.stick.stop(now);
         // What is held belongs to the other vehicle, and is given back by dropping it.
         drop(self.grip.release(&self.picture));
@@ -142,9 +142,15 @@ impl Desk {
         if !self.grip.is_ready() {
             return Err("the vehicle is in standby; resume first".to_owned());
         }
+        if let Some(why) = self.picture.stale(now) {
+            self.stick.handle_release(now, page);
+            self.steer(now);
+            return Err(why);
+        }
         self.stick
             .handle_push(now, page, push)
             .map_err(|busy| busy.to_string())?;
+        self.halted = None;
         self.take_over(now);
         if let Some(why) = self.grip.obstacle(driver) {
             self.stick.handle_release(now, page);
@@ -207,6 +213,12 @@ impl Desk {
                 )));
             }
             None => return reply(Err("the planner has told of no mission yet".to_owned())),
+        }
+        if let Some(why) = self.picture.stale(now) {
+            return reply(Err(why));
+        }
+        if !self.picture.is_position_known() {
+            return reply(Err("the vehicle does not know where it is".to_owned()));
         }
         self.stick.stop(now);
         let drivers = self.grip.want(Wanted::Planner, &self.picture);

@@ -3,7 +3,7 @@
 // page is hidden, loses the connection or the control, driving ends at once and does not begin
 // again before everything has been let go.
 
-import { get, mark, say, toast } from "./dom.js";
+import { get, mark, plain, say, toast } from "./dom.js";
 import { Gamepads } from "./gamepad.js";
 
 const PERIOD = 100;
@@ -29,6 +29,8 @@ export class Drive {
   #locked = false;
   #obstacle = "Nothing is known of the vehicle yet.";
   #confirmed = null;
+  /** Why the station ended driving although nothing was let go. */
+  #halt = "";
 
   constructor(link, emergency) {
     this.#link = link;
@@ -48,6 +50,9 @@ export class Drive {
   update(state, obstacle) {
     this.#obstacle = obstacle;
     this.#confirmed = state?.drive ?? null;
+    const halt = plain(state?.drive?.reason, 200);
+    if (halt && halt !== this.#halt) toast("bad", `Driving has ended: ${halt}`);
+    this.#halt = halt;
     mark(get("stick"), "aria-disabled", String(Boolean(obstacle)));
     if (obstacle && this.#timer) this.release();
     if (!this.#timer) this.#render([0, 0], null);
@@ -187,7 +192,8 @@ export class Drive {
 
   #line(source) {
     if (source) return this.#confirmed?.active ? "Sending: the vehicle is driven" : "Sending";
-    return this.#obstacle || "Ready: nothing is sent until you hold something";
+    if (this.#obstacle) return this.#obstacle;
+    return this.#halt ? `Stopped: ${this.#halt}` : "Ready: nothing is sent until you hold something";
   }
 }
 

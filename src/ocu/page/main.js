@@ -8,7 +8,7 @@ import { Link } from "./link.js";
 import { MapView } from "./map.js";
 import { Messages } from "./messages.js";
 import { Mission } from "./mission.js";
-import { part, showControl, showLink, showStatus, showVehicles } from "./status.js";
+import { part, showControl, showLink, showMissing, showStatus, showVehicles } from "./status.js";
 import { followTheme } from "./theme.js";
 import { showSystem } from "./tree.js";
 
@@ -60,6 +60,7 @@ function render() {
   showVehicles(state);
   showControl(state, authority, operable);
   showStatus(state, Number.isFinite(link.age) ? link.age : 0);
+  showMissing(state, live);
   map.update(state, live, link.token);
   mission.update(state, operable);
   showSystem(state);
@@ -72,10 +73,15 @@ function obstacle(live) {
   if (!state.vehicle) return "No vehicle";
   if (state.vehicle.emergency) return "Emergency: clear it before driving";
   if (!state.control?.wanted) return "Take control before driving";
+  if (state.vehicle.stale) return sentence(state.vehicle.stale);
+  const driver = part(state, "primitive_driver");
+  if (state.control.held && driver?.ours && driver.state === "standby") return "In standby: press Resume before driving";
   // While control is asked for, as when the operator takes over from the planner, what is held is
   // sent already and acts as soon as the vehicle agrees.
-  return state.control.held ? "" : state.control.reason;
+  return state.control.held ? "" : sentence(state.control.reason);
 }
+
+const sentence = (text) => plain(text, 140).replace(/^./, (letter) => letter.toUpperCase());
 
 // What the operator wants.
 

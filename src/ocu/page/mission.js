@@ -1,7 +1,7 @@
 // The mission: its stages one after the other as the waterfall has them, progress, attempts and
 // reasons; choosing a destination, approving and stopping.
 
-import { figure, get, make, mark, number, plain, say, show, words } from "./dom.js";
+import { duration, figure, get, list, make, mark, number, plain, say, show, words } from "./dom.js";
 
 /** The stages as the protocol and as people name them. */
 const STAGES = [
@@ -14,7 +14,18 @@ const STAGES = [
   ["driving", "Driving"],
   ["arrived", "Arrived"],
 ];
-const OVER = ["idle", "arrived", "failed", "stopped"];
+const OVER = ["idle", "arrived", "failed", "stopped", "lost"];
+
+/** A planner reports its mission 4 times a second; what is older, in milliseconds, is said to be old. */
+const OLD = 2_000;
+
+/** What became of a mission whose planner is lost, and what is left to the operator. */
+function lostPlanner({ id, how, told_to_stop: stopped }) {
+  const loss = `The planner ${plain(id, 16)} is ${plain(how, 10)}`;
+  return stopped
+    ? `${loss}. The vehicle was told to stop: press Emergency stop if it still moves.`
+    : `${loss}. This station does not control the drivers: press Emergency stop if the vehicle still moves.`;
+}
 
 export class Mission {
   #ask;
@@ -66,9 +77,10 @@ export class Mission {
     const mission = state.mission && typeof state.mission === "object" ? state.mission : null;
     this.#mission = mission;
     this.#operable = operable;
-    const stage = plain(mission?.stage ?? "idle", 30);
+    const lost = mission?.lost ?? null;
+    const stage = lost ? "lost" : plain(mission?.stage ?? "idle", 30);
     this.#showStages(mission, stage);
-    this.#showLine(mission, stage);
+    this.#showLine(mission, stage, state.vehicle?.missing);
     const progress = mission ? Math.round(Math.min(100, Math.max(0, number(mission.progress) ?? 0))) : 0;
     mark(get("progress"), "aria-valuenow", progress);
     mark(get("progress"), "data-state", stage);
@@ -76,7 +88,7 @@ export class Mission {
     const attempts = number(mission?.attempts) ?? 0;
     show(get("attempt"), attempts > 0 && !OVER.includes(stage));
     say(get("attempt"), `Attempt ${number(mission?.attempt) ?? 0} of ${attempts}`);
-    get("approve").disabled = !operable || !this.waits;
+    get("approve").disabled = !operable || !this.waits || Boolean(state.vehicle?.stale);
     get("stop").disabled = !operable || !mission || OVER.includes(stage);
     get("plan").disabled = !operable;
     document.body.dataset.mission = OVER.includes(stage) ? "over" : "under-way";
@@ -88,7 +100,7 @@ export class Mission {
     // A mission that ended does not say where: it was where it was seen last.
     if (index >= 0) this.#furthest.index = index;
     const reached = index >= 0 ? index : stage === "idle" ? -1 : this.#furthest.index;
-    const ended = { failed: "failed", stopped: "stopped" }[stage];
+    const ended = { failed: "failed", stopped: "stopped", lost: "failed" }[stage];
     STAGES.forEach(([key, name], position) => {
       let how = position < reached ? "done" : position > reached ? "ahead" : "active";
       if (position === reached && ended) how = ended;
@@ -102,9 +114,12 @@ export class Mission {
     });
   }
 
-  #showLine(mission, stage) {
+  #showLine(mission, stage, missing) {
     const line = get("mission-line");
     mark(line, "data-state", stage);
+    if (stage === "lost") return say(line, lostPlanner(mission.lost));
+    const planner = mission ? null : list(missing, 64).find((one) => one?.role === "planner");
+    if (planner) return say(line, `The planner ${plain(planner.id, 16)} is ${plain(planner.how, 10)}: no mission can be planned`);
     if (!mission || stage === "idle") return say(line, plain(mission?.reason, 255) || "No mission");
     const what = {
       map: "Asking for the map",
@@ -121,7 +136,9 @@ export class Mission {
     const left = number(mission.remaining_m);
     const far = left !== null && !OVER.includes(stage) ? `, ${figure(left, 1)} m to go` : "";
     const reason = plain(mission.reason, 255);
-    say(line, `${what}${far}${reason ? `: ${reason}` : ""}`);
+    const age = number(mission.age_ms) ?? 0;
+    const old = age > OLD ? ` (${duration(age)} old)` : "";
+    say(line, `${what}${far}${reason ? `: ${reason}` : ""}${old}`);
   }
 
   #place() {

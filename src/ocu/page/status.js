@@ -1,7 +1,7 @@
 // The top bar and the status panel: which vehicle, how good the connection is, who is in control,
 // and how the vehicle moves.
 
-import { duration, figure, get, list, make, mark, number, plain, say, show, words } from "./dom.js";
+import { duration, figure, get, list, make, mark, number, plain, say, show, toast, words } from "./dom.js";
 
 const FRESH = 1_000;
 
@@ -46,6 +46,33 @@ export function showVehicles(state) {
   select.disabled = !options.length;
 }
 
+/** How a part is missing, in words. */
+const absence = ({ name, id, how }) => `${plain(name, 40)} ${plain(id, 16)} is ${how === "gone" ? "gone" : "silent"}`;
+
+/** The ids of the parts that were missing when that was last shown. */
+let missed = new Set();
+
+/** Says which parts of the vehicle are missing, for as long as they are. Without a live connection there is no news of them. */
+export function showMissing(state, live) {
+  const parts = list(state.vehicle?.parts, 64);
+  const missing = list(state.vehicle?.missing, 64);
+  const now = new Set(missing.map(({ id }) => plain(id, 16)));
+  for (const { id, role } of parts) {
+    if (missed.has(id) && !now.has(id)) toast("good", `${words(role)} ${plain(id, 16)} is back`);
+  }
+  missed = now;
+  const silent = missing.filter(({ how }) => how !== "gone");
+  // All parts at once: the network is the reason, or the whole vehicle.
+  const all = parts.length > 1 && silent.length === parts.length;
+  const texts = all
+    ? [`Vehicle ${plain(state.vehicle?.subsystem, 8)} is silent: none of its parts reports`]
+    : missing.map(absence);
+  const more = texts.length > 2 ? ` and ${texts.length - 2} more` : "";
+  const notice = get("missing");
+  show(notice, live && texts.length > 0);
+  say(notice, texts.slice(0, 2).join(" · ") + more);
+}
+
 /** Shows who controls, and offers to take or release control. */
 export function showControl(state, authority, operable) {
   const { held, wanted, reason } = state.control ?? {};
@@ -74,8 +101,10 @@ export function showStatus(state, late) {
   const { vehicle } = state;
   const driver = part(state, "primitive_driver");
   const mode = vehicle?.emergency ? "emergency" : driver?.state;
+  const modeAge = (number(driver?.state_age_ms) ?? 0) + late;
   const box = get("state");
   mark(box, "data-state", mode ? plain(mode, 20) : "unknown");
+  mark(box, "data-old", mode && modeAge > FRESH ? "yes" : null);
   say(get("state-word"), mode ? words(mode) : vehicle ? "Unknown" : "No vehicle");
   say(get("state-detail"), driver ? authority(driver) : vehicle ? "no primitive driver" : "");
   const [pose, velocity] = [vehicle?.pose, vehicle?.velocity];
@@ -84,9 +113,11 @@ export function showStatus(state, late) {
   fill("heading", bearing(pose?.yaw), 0, pose, late);
   fill("north", pose?.x, 2, pose, late);
   fill("east", pose?.y, 2, pose, late);
-  const ages = [["pose", pose], ["velocity", velocity]].filter(([, one]) => number(one?.age_ms) !== null);
-  const old = ages.filter(([, one]) => one.age_ms + late > FRESH);
-  say(get("state-old"), old.map(([name, one]) => `${name} ${duration(one.age_ms + late)} old`).join(", "));
+  const ages = [["state", driver?.state_age_ms], ["pose", pose?.age_ms], ["velocity", velocity?.age_ms]];
+  const old = ages.filter(([, age]) => number(age) !== null && age + late > FRESH);
+  // There is room for one age only: what is old is often old for one reason.
+  const oldest = Math.max(...old.map(([, age]) => age + late));
+  say(get("state-old"), old.length ? `${duration(oldest)} old: ${old.map(([name]) => name).join(", ")}` : "");
 }
 
 /** Who commands a part, in words. */

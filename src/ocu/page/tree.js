@@ -1,7 +1,7 @@
 // The tree of subsystems, nodes, components and services, kept up to date in place so that what
 // is folded stays folded; and the vehicle's parts with their states.
 
-import { get, list, make, mark, number, plain, say, show, words } from "./dom.js";
+import { duration, get, list, make, mark, number, plain, say, show, words } from "./dom.js";
 import { authority } from "./status.js";
 
 const PERIOD = 400;
@@ -16,7 +16,7 @@ export function showSystem(state, urgent) {
   const counts = { nodes: 0, components: 0 };
   update(get("tree"), subsystems.map((one) => subsystem(one, counts)));
   say(get("system-count"), `${counts.components} components on ${counts.nodes} nodes`);
-  showParts(list(state.vehicle?.parts, 64));
+  showParts(list(state.vehicle?.parts, 64), list(state.vehicle?.missing, 64));
 }
 
 // What the tree is to be: branches with key, title, badge and children.
@@ -104,8 +104,11 @@ function create(branch) {
   return element;
 }
 
-function showParts(parts) {
+function showParts(present, missing) {
   const area = get("parts");
+  const gone = missing.filter((one) => one?.how === "gone");
+  const silent = new Set(missing.map((one) => plain(one?.id, 16)));
+  const parts = [...present, ...gone];
   show(area, parts.length > 0);
   const old = new Map([...area.children].map((child) => [child.dataset.key, child]));
   for (const part of parts) {
@@ -120,10 +123,12 @@ function showParts(parts) {
     const [, name, mode, detail] = row.children;
     // A sensor or a store has no state, and is controlled by nobody: that it is there is what counts.
     const managed = part?.managed === true;
-    mark(row, "data-state", managed ? plain(part.state ?? "unknown", 20) : "present");
-    mark(row, "data-old", managed && (number(part.age_ms) ?? 0) > 3_000 ? "yes" : null);
+    const lost = silent.has(key);
+    mark(row, "data-state", lost ? "lost" : managed ? plain(part.state ?? "unknown", 20) : "present");
+    mark(row, "data-missing", lost ? "yes" : null);
     say(name, words(part?.role ?? part?.id));
-    say(mode, managed ? words(part.state ?? "unknown") : "");
+    const age = number(part?.age_ms) === null ? "" : ` ${duration(part.age_ms)}`;
+    say(mode, lost ? `${part?.how === "gone" ? "Gone" : "Silent"}${age}` : managed ? words(part.state ?? "unknown") : "");
     const stage = part?.stage?.state ? ` · ${words(part.stage.state).toLowerCase()}` : "";
     const reason = plain(part?.stage?.reason, 160);
     const control = managed ? ` · ${authority(part)}` : "";

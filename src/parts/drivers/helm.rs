@@ -4,7 +4,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::vehicle::{Drive, Limits, Motion, Platform, Pose, Velocity};
+use super::Freshness;
+use crate::vehicle::{CommandDeadline, Drive, Limits, Motion, Platform, Pose, Velocity};
 
 /// What a driver knows and wants. Cheap to clone; the clones are one.
 #[derive(Debug, Clone)]
@@ -15,9 +16,11 @@ struct State {
     settings: HelmSettings,
     limits: Limits,
     motion: Motion,
-    pose_at: Option<Instant>,
-    velocity_at: Option<Instant>,
+    pose: Freshness,
+    velocity: Freshness,
     order: Option<Order>,
+    /// Since the pilot has controlled this platform last.
+    deadline: CommandDeadline,
 }
 
 /// How a driver does its work.
@@ -25,7 +28,7 @@ struct State {
 pub(in crate::parts) struct HelmSettings {
     /// What the vehicle can do at most.
     pub(in crate::parts) limits: Limits,
-    /// Older reports of the sensors are of no use.
+    /// It stops when the samples of the sensors are older.
     pub(in crate::parts) stale: Duration,
     /// Whether the next driver keeps headings by itself. Else it needs to be told velocities, and
     /// they need to be measured.
@@ -58,49 +61,69 @@ impl Helm {
             settings,
             limits: settings.limits,
             motion: Motion::default(),
-            pose_at: None,
-            velocity_at: None,
+            pose: Freshness::default(),
+            velocity: Freshness::default(),
             order: None,
+            deadline: CommandDeadline::default(),
         })))
     }
 
-    /// A sensor has reported a pose: X, Y and yaw. If it does not know one, there is none.
-    pub(in crate::parts) fn handle_pose(&self, now: Instant, pose: Option<(f64, f64, f64)>) {
-        if let Some((x, y, yaw)) = pose {
-            let mut state = self.lock();
-            state.motion.pose = Pose {
-                yaw,
-                ..Pose::at(x, y)
-            };
-            state.pose_at = Some(now);
+    /// A sensor has reported a pose: X, Y and yaw, sampled at `stamp` of its clock. Without a pose it
+    /// does not know where the vehicle is, and the vehicle stops at once.
+    pub(in crate::parts) fn handle_pose(
+        &self,
+        now: Instant,
+        stamp: Option<Duration>,
+        pose: Option<(f64, f64, f64)>,
+    ) {
+        let mut state = self.lock();
+        match pose {
+            None => state.pose.forget(),
+            Some((x, y, yaw)) => {
+                state.pose.handle(now, stamp);
+                state.motion.pose = Pose {
+                    yaw,
+                    ..Pose::at(x, y)
+                };
+            }
         }
     }
 
     /// The same for a velocity: speed forward and yaw rate.
-    pub(in crate::parts) fn handle_velocity(&self, now: Instant, velocity: Option<(f64, f64)>) {
-        if let Some((x, yaw)) = velocity {
-            let mut state = self.lock();
-            state.motion.velocity = Velocity::forward(x, yaw);
-            state.velocity_at = Some(now);
+    pub(in crate::parts) fn handle_velocity(
+        &self,
+        now: Instant,
+        stamp: Option<Duration>,
+        velocity: Option<(f64, f64)>,
+    ) {
+        let mut state = self.lock();
+        match velocity {
+            None => state.velocity.forget(),
+            Some((x, yaw)) => {
+                state.velocity.handle(now, stamp);
+                state.motion.velocity = Velocity::forward(x, yaw);
+            }
         }
     }
 
     /// What is to be done now.
     pub(in crate::parts) fn plan(&self, now: Instant) -> Plan {
-        let state = self.lock();
+        let mut state = self.lock();
         let Some(order) = state.order else {
             return Plan::Rest;
         };
-        let needs = [
-            (state.pose_at, "pose", true),
-            (state.velocity_at, "velocity", !state.settings.by_heading),
-        ];
-        let mut lacks = needs.into_iter().filter(|&(_, _, needed)| needed);
-        let lack = lacks.find_map(|(at, what, _)| lack(now, at, state.settings.stale, what));
-        match lack {
+        if state.deadline.has_passed(now) {
+            return Plan::Wait("the driver's control loop does not run".to_owned());
+        }
+        match state.lack(now) {
             Some(why) => Plan::Wait(why),
             None => Plan::Go(order, state.motion),
         }
+    }
+
+    /// Which sensor's samples are missing or too old, if any are.
+    pub(in crate::parts) fn lack(&self, now: Instant) -> Option<String> {
+        self.lock().lack(now)
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -108,17 +131,28 @@ impl Helm {
     }
 }
 
-/// Why a report is of no use, if it is not.
-fn lack(now: Instant, at: Option<Instant>, stale: Duration, what: &str) -> Option<String> {
-    let Some(at) = at else {
-        return Some(format!("no {what} is known yet"));
-    };
-    let age = now.saturating_duration_since(at);
-    (age > stale).then(|| format!("the {what} is {:.1} s old", age.as_secs_f64()))
+impl State {
+    fn lack(&self, now: Instant) -> Option<String> {
+        let needs = [
+            (&self.pose, "pose", true),
+            (&self.velocity, "velocity", !self.settings.by_heading),
+        ];
+        let mut needs = needs.into_iter().filter(|&(_, _, needed)| needed);
+        needs.find_map(|(sensor, what, _)| match sensor.age(now) {
+            None => Some(format!("no {what} is known")),
+            Some(age) if age > self.settings.stale => {
+                Some(format!("the {what} is {:.1} s old", age.as_secs_f64()))
+            }
+            Some(_) => None,
+        })
+    }
 }
 
 impl Platform for Helm {
-    fn handle_time(&mut self, _: Instant) {}
+    /// An order holds as long as the pilot goes on controlling this platform.
+    fn handle_time(&mut self, now: Instant) {
+        self.lock().deadline.restart(Some(now));
+    }
 
     fn motion(&self) -> Motion {
         self.lock().motion
@@ -132,7 +166,7 @@ impl Platform for Helm {
         let mut state = self.lock();
         let by_heading = state.settings.by_heading;
         let heading = state.motion.pose.yaw;
-        state.order = match command {
+        state.order = match command.or_stop() {
             Drive::Velocity(velocity) if by_heading => Some(Order::Heading {
                 heading,
                 speed: velocity.x.max(0.0),
@@ -144,6 +178,9 @@ impl Platform for Helm {
     }
 
     fn head(&mut self, heading: f64, speed: f64, limits: &Limits) {
+        if !heading.is_finite() || !speed.is_finite() {
+            return self.drive(Drive::Stop);
+        }
         if !self.lock().settings.by_heading {
             let yaw = self.motion().pose.yaw;
             let velocity = crate::vehicle::along(yaw, heading, speed, limits);
@@ -195,18 +232,22 @@ mod tests {
         assert_eq!(helm.plan(start), Plan::Rest);
         let order = Velocity::forward(1.0, 0.1);
         helm.drive(Drive::Velocity(order));
-        assert_eq!(wait(&helm.plan(start)), "no pose is known yet");
-        helm.handle_pose(start, Some((1.0, 2.0, 0.5)));
-        assert_eq!(wait(&helm.plan(start)), "no velocity is known yet");
-        helm.handle_velocity(start, Some((0.5, 0.0)));
+        assert_eq!(wait(&helm.plan(start)), "no pose is known");
+        helm.handle_pose(start, None, Some((1.0, 2.0, 0.5)));
+        assert_eq!(wait(&helm.plan(start)), "no velocity is known");
+        helm.handle_velocity(start, None, Some((0.5, 0.0)));
         let Plan::Go(Order::Velocity(velocity), motion) = helm.plan(start) else {
             panic!("it can go");
         };
         assert_eq!((velocity, motion.pose.y), (order, 2.0));
         let later = start + Duration::from_millis(800);
-        helm.handle_velocity(later, Some((0.5, 0.0)));
-        helm.handle_pose(later, None);
+        helm.handle_time(later);
+        helm.handle_velocity(later, None, Some((0.5, 0.0)));
         assert_eq!(wait(&helm.plan(later)), "the pose is 0.8 s old");
+        helm.handle_pose(later, None, Some((1.0, 2.0, 0.5)));
+        assert!(matches!(helm.plan(later), Plan::Go(..)));
+        helm.handle_pose(later, None, None);
+        assert_eq!(wait(&helm.plan(later)), "no pose is known");
         helm.drive(Drive::Stop);
         assert_eq!(helm.plan(later), Plan::Rest);
     }
@@ -215,12 +256,57 @@ mod tests {
     fn a_heading_is_left_to_a_driver_that_keeps_headings() {
         let mut helm = helm(true);
         let now = Instant::now();
-        helm.handle_pose(now, Some((0.0, 0.0, 0.0)));
+        helm.handle_pose(now, None, Some((0.0, 0.0, 0.0)));
         helm.head(4.0, 9.0, &Limits::default());
         let Plan::Go(Order::Heading { heading, speed }, _) = helm.plan(now) else {
             panic!("it can go");
         };
         assert!((heading - (4.0 - std::f64::consts::TAU)).abs() < 1e-9);
         assert_eq!(speed, 2.0, "as fast as the vehicle can");
+    }
+
+    #[test]
+    fn a_frozen_pose_is_no_pose_within_the_limit() {
+        let mut helm = helm(true);
+        let start = Instant::now();
+        let period = Duration::from_millis(40);
+        let mut plan = |count: u32, stamp: u32| {
+            let now = start + period * count;
+            helm.handle_time(now);
+            helm.head(0.0, 1.0, &Limits::default());
+            let stamp = Duration::from_secs(3600) + period * stamp;
+            helm.handle_pose(now, Some(stamp), Some((1.0, 2.0, 0.5)));
+            helm.plan(now)
+        };
+        for count in 0..10 {
+            let goes = matches!(plan(count, count), Plan::Go(..));
+            assert_eq!(goes, count > 0, "{count}");
+        }
+        // Reports go on coming, with the pose of the same moment.
+        let plans: Vec<_> = (10..30).map(|count| plan(count, 9)).collect();
+        assert!(matches!(plans[14], Plan::Go(..)), "0.6 s old");
+        assert_eq!(wait(&plans[15]), "the pose is 0.6 s old");
+    }
+
+    #[test]
+    fn an_order_ends_when_the_control_loop_hangs() {
+        let mut helm = helm(true);
+        let start = Instant::now();
+        helm.handle_time(start);
+        helm.head(0.0, 1.0, &Limits::default());
+        let later = start + CommandDeadline::DEFAULT;
+        helm.handle_pose(later, None, Some((0.0, 0.0, 0.0)));
+        assert!(matches!(helm.plan(later), Plan::Go(..)));
+        let too_late = later + Duration::from_millis(1);
+        assert!(wait(&helm.plan(too_late)).contains("control loop"));
+    }
+
+    #[test]
+    fn a_heading_that_is_no_number_is_no_order() {
+        for by_heading in [true, false] {
+            let mut helm = helm(by_heading);
+            helm.head(f64::NAN, 1.0, &Limits::default());
+            assert_eq!(helm.plan(Instant::now()), Plan::Rest);
+        }
     }
 }

@@ -15,9 +15,9 @@ use std::time::{Duration, Instant};
 
 use tokio::time::{Interval, MissedTickBehavior, interval, sleep, timeout};
 
-use super::Watchman;
 use super::helm::{Helm, Order, Plan};
 use super::verdict::{Told, Verdict, judge};
+use super::{FaultMonitor, Watchman};
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::component::{
@@ -60,6 +60,8 @@ pub(in crate::parts) struct Next<L> {
     /// For how long its commanders must have said nothing before it listens to them again after it
     /// has stood down.
     pub(in crate::parts) settling: Duration,
+    /// Notes sensors that are missing while the vehicle should move.
+    pub(in crate::parts) sensors: FaultMonitor,
 }
 
 /// How the way to the next driver has ended.
@@ -115,7 +117,12 @@ impl<L: Language> Next<L> {
     }
 
     /// Waits for an order. Why it stood down is told until somebody else commands it, or it is resumed.
-    async fn rest(&self, ticks: &mut Interval, watchman: &mut Watchman, mut down: Option<String>) {
+    async fn rest(
+        &mut self,
+        ticks: &mut Interval,
+        watchman: &mut Watchman,
+        mut down: Option<String>,
+    ) {
         let before = self.component.standing();
         while self.helm.plan(Instant::now()) == Plan::Rest {
             let standing = self.component.standing();
@@ -123,7 +130,11 @@ impl<L: Language> Next<L> {
             if standing.controller != before.controller {
                 down = None;
             }
-            if let Some(reason) = down.as_deref().or(watchman.emergency()) {
+            self.check_sensors(None).await;
+            if let Some(failure) = self.sensors.failure() {
+                let reason = format!("failure: {failure}");
+                self.tell(StageState::Blocked, self.find(), reason).await;
+            } else if let Some(reason) = down.as_deref().or(watchman.emergency()) {
                 self.tell_down(reason).await;
             } else if let Some(cause) = self.vehicle.last_stop() {
                 let why = format!("stopped: {cause}");
@@ -197,8 +208,13 @@ impl<L: Language> Next<L> {
                 why: ControlRefused::NotAvailable,
                 ..
             }) => {
-                let why = "can not be controlled, for instance because of an emergency";
-                return Err(End::StandDown(format!("{peer} {why}")));
+                // Not in a failure either, but that ends by itself.
+                return Err(match examine(&self.component, peer).await {
+                    Ok(Verdict::Anew) => anew(format!("{peer} has failed, or was started again")),
+                    _ => End::StandDown(format!(
+                        "{peer} cannot be controlled, for instance because of an emergency"
+                    )),
+                });
             }
             Err(error) => {
                 return Err(match examine(&self.component, peer).await {
@@ -232,12 +248,14 @@ impl<L: Language> Next<L> {
             let command = match self.helm.plan(now) {
                 Plan::Go(order, motion) => {
                     busy = now;
+                    self.check_sensors(None).await;
                     self.tell(StageState::Active, Some(peer), String::new())
                         .await;
                     self.language.command(now, order, &motion)
                 }
                 Plan::Wait(why) => {
                     busy = now;
+                    self.check_sensors(Some(&why)).await;
                     self.tell(StageState::Blocked, Some(peer), why).await;
                     self.language.halt()
                 }
@@ -266,6 +284,21 @@ impl<L: Language> Next<L> {
                 Err(_) => tracing::debug!(%peer, "not acknowledged in time"),
             }
             ticks.tick().await;
+        }
+    }
+
+    /// What sensors lack for too long while the vehicle should move is a failure of the component,
+    /// which stops and gives control up. It is over when they report again, and the component waits
+    /// in Standby.
+    async fn check_sensors(&mut self, lack: Option<&str>) {
+        let now = Instant::now();
+        let condition = match lack {
+            Some(why) => self.sensors.lacks(now, why, FaultMonitor::LIMIT),
+            None if self.sensors.failure().is_some() && self.helm.lack(now).is_some() => None,
+            None => self.sensors.is_over(),
+        };
+        if let Some(condition) = condition {
+            self.component.set_condition(condition).await;
         }
     }
 
@@ -323,7 +356,7 @@ async fn supervise(component: &Component, peer: JausId) -> End {
             // That it is silent the commands notice.
             Ok(Verdict::GoOn) | Err(_) => {}
             Ok(Verdict::Anew) => {
-                let why = format!("{peer} was started again");
+                let why = format!("{peer} has failed, or was started again");
                 return End::Anew {
                     peer: Some(peer),
                     why,

@@ -9,6 +9,7 @@ use std::convert::Infallible;
 use std::time::Instant;
 
 use super::Helm;
+use super::freshness::time_in_month;
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::component::{Audience, Component, GroupSubscription, GroupUpdate, When};
@@ -24,6 +25,8 @@ use crate::parts::PartError;
 pub(in crate::parts) struct Sense<R> {
     reports: GroupSubscription<R>,
     source: Option<JausId>,
+    /// Whether the source was lost since the last report.
+    was_lost: bool,
     what: &'static str,
 }
 
@@ -41,6 +44,7 @@ impl<R: Message> Sense<R> {
         Ok(Self {
             reports: reports.map_err(|error| PartError::Broken(error.to_string()))?,
             source: None,
+            was_lost: false,
             what,
         })
     }
@@ -63,10 +67,12 @@ impl<R: Message> Sense<R> {
                 GroupUpdate::Down { why, .. } if self.source == Some(source) => {
                     tracing::info!("no {} from {source}: {why}", self.what);
                     self.source = None;
+                    self.was_lost = true;
                 }
                 GroupUpdate::Gone if self.source == Some(source) => {
                     tracing::info!("no {} from {source}: it is gone", self.what);
                     self.source = None;
+                    self.was_lost = true;
                 }
                 _ => {}
             }
@@ -74,9 +80,17 @@ impl<R: Message> Sense<R> {
     }
 }
 
+impl<R: Message> Sense<R> {
+    /// Whether the source was lost since this was asked last, so that the next report may be of
+    /// another one, with another clock.
+    pub(in crate::parts) const fn take_loss(&mut self) -> bool {
+        std::mem::replace(&mut self.was_lost, false)
+    }
+}
+
 impl Sense<ReportLocalPose> {
-    /// X, Y and yaw.
-    const FIELDS: u16 = 0b100_0011;
+    /// X, Y, yaw and time stamp.
+    const FIELDS: u16 = 0b1_0100_0011;
 
     /// The pose in the local frame.
     pub(in crate::parts) fn pose(component: &Component, hz: f64) -> Result<Self, PartError> {
@@ -86,19 +100,24 @@ impl Sense<ReportLocalPose> {
         Self::of(component, local_pose_sensor::URN, &query, hz, "pose")
     }
 
-    /// Tells a helm whatever comes.
+    /// Hands all reports to a helm.
     pub(in crate::parts) async fn steer(mut self, helm: &Helm) -> Result<Infallible, PartError> {
         loop {
             let report = self.next().await?;
+            let now = Instant::now();
+            if self.take_loss() {
+                helm.handle_pose(now, None, None);
+            }
             let place = report.x_m().zip(report.y_m()).zip(report.yaw_rad());
-            helm.handle_pose(Instant::now(), place.map(|((x, y), yaw)| (x, y, yaw)));
+            let stamp = report.time_stamp.and_then(time_in_month);
+            helm.handle_pose(now, stamp, place.map(|((x, y), yaw)| (x, y, yaw)));
         }
     }
 }
 
 impl Sense<ReportVelocityState> {
-    /// Velocity along X, and yaw rate.
-    const FIELDS: u16 = 0b100_0001;
+    /// Velocity along X, yaw rate and time stamp.
+    const FIELDS: u16 = 0b1_0100_0001;
 
     /// The velocity along and about the vehicle's own axes.
     pub(in crate::parts) fn velocity(component: &Component, hz: f64) -> Result<Self, PartError> {
@@ -114,12 +133,17 @@ impl Sense<ReportVelocityState> {
         )
     }
 
-    /// Tells a helm whatever comes.
+    /// Hands all reports to a helm.
     pub(in crate::parts) async fn steer(mut self, helm: &Helm) -> Result<Infallible, PartError> {
         loop {
             let report = self.next().await?;
+            let now = Instant::now();
+            if self.take_loss() {
+                helm.handle_velocity(now, None, None);
+            }
             let velocity = report.velocity_x_m_per_s().zip(report.yaw_rate_rad_per_s());
-            helm.handle_velocity(Instant::now(), velocity);
+            let stamp = report.time_stamp.and_then(time_in_month);
+            helm.handle_velocity(now, stamp, velocity);
         }
     }
 }

@@ -1,11 +1,24 @@
 //! How a driver stands with those who command it: told to people, and remembered after an emergency.
 
-use crate::component::{AccessControl, Management, Standing, State};
+use std::convert::Infallible;
+
+use crate::component::{AccessControl, Component, Management, Standing, State};
+use crate::parts::PartError;
 
 /// Management and Access Control of a driver: control ends after so many seconds unless its client
 /// asks for it again; 0 is for ever.
 pub(in crate::parts) fn guard(control_timeout: u8) -> Management {
     Management::new().access_control(AccessControl::new().timeout(control_timeout))
+}
+
+/// Waits until a client has shut the component down; its program ends then.
+pub(in crate::parts) async fn shut_down(component: &Component) -> Result<Infallible, PartError> {
+    let mut standings = component.watch_standing();
+    let is_down = |standing: &Standing| standing.state == State::Shutdown;
+    match standings.wait_for(is_down).await {
+        Ok(_) => Err(PartError::ShutDown),
+        Err(_) => Err(PartError::NodeStopped),
+    }
 }
 
 /// Notes every change of a component's standing, and says what keeps it from acting.

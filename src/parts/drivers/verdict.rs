@@ -21,7 +21,8 @@ pub(in crate::parts) struct Told {
 pub(in crate::parts) enum Verdict {
     /// All is well.
     GoOn,
-    /// It has to be taken under control, or resumed, once more: it was started again.
+    /// It has to be taken under control, or resumed, once more: it was started again, or has failed
+    /// because its sensors were silent, which ends when they report again.
     Anew,
     /// It was stopped, or taken over, by somebody who had a reason: nothing must move again by
     /// itself.
@@ -42,6 +43,7 @@ pub(in crate::parts) fn judge(own: JausId, peer: JausId, told: &Told) -> Verdict
         _ if told.stage.stands_down() => {
             Verdict::StandDown(format!("{peer}: {}", told.stage.reason))
         }
+        _ if told.status == State::Failure as u8 => Verdict::Anew,
         Some(_) if told.status == ready => Verdict::GoOn,
         None if told.status == ready || told.status == standby => Verdict::Anew,
         Some(_) if told.status == standby => Verdict::Anew,
@@ -90,6 +92,15 @@ mod tests {
         assert_eq!(judged(State::Standby, None, idle()), Verdict::Anew);
         assert_eq!(judged(State::Standby, Some(OWN), idle()), Verdict::Anew);
         assert_eq!(judged(State::Ready, None, idle()), Verdict::Anew);
+    }
+
+    #[test]
+    fn a_failure_of_sensors_is_waited_for_and_one_of_motors_ends_it() {
+        // A driver whose sensors have failed names the one that it commands.
+        let sensors = judged(State::Failure, None, blocked(Some(PEER)));
+        assert_eq!(sensors, Verdict::Anew);
+        let motors = judged(State::Failure, None, blocked(None));
+        assert_eq!(motors, Verdict::StandDown("101.2.33: why".to_owned()));
     }
 
     #[test]

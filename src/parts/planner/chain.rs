@@ -15,12 +15,18 @@ use crate::messages::core::report_status::Status;
 use crate::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
 use crate::messages::ground::report_stage::State;
 use crate::messages::ground::{QueryStage, ReportStage, stage};
-use crate::messages::mobility::{local_path_segment_driver, local_vector_driver, primitive_driver};
-use crate::mission::{Link, LinkState};
+use crate::messages::mobility::{
+    ReportLocalPose, local_path_segment_driver, local_vector_driver, primitive_driver,
+};
+use crate::mission::{Link, LinkState, Point};
+use crate::parts::PartError;
+use crate::parts::drivers::Sense;
 
 /// What has become of a driver of the chain.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum News {
+    /// Where the vehicle is in the local frame.
+    Pose(Point),
     /// It was found, or lost.
     Found(Link, Option<JausId>),
     /// Its stage, and how much of what it was told is done, from 0 to 100 %.
@@ -64,6 +70,21 @@ pub(super) async fn watch(component: &Component, link: Link, tell: &mpsc::Sender
             }
         }
         tokio::time::sleep(PAUSE).await;
+    }
+}
+
+/// Follows the pose of the vehicle. Ends when the component has stopped.
+pub(super) async fn follow(
+    mut poses: Sense<ReportLocalPose>,
+    tell: &mpsc::Sender<News>,
+) -> Result<(), PartError> {
+    loop {
+        let report = poses.next().await?;
+        if let Some(point) = report.x_m().zip(report.y_m())
+            && tell.send(News::Pose(point)).await.is_err()
+        {
+            return Ok(());
+        }
     }
 }
 

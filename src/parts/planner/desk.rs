@@ -18,7 +18,10 @@ use super::{Planner, find_soon, hand_over};
 use crate::address::JausId;
 use crate::component::{Component, Control};
 use crate::messages::core::report_status::Status;
-use crate::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
+use crate::messages::core::{
+    QueryControl, QueryHeartbeatPulse, QueryStatus, ReportControl, ReportHeartbeatPulse,
+    ReportStatus,
+};
 use crate::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, ReportStage, stage};
 use crate::mission::{
     self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Run, Stage,
@@ -35,6 +38,8 @@ enum Done {
     Map(Run, Result<Map, String>),
     Planned(Run, Result<Path, NotPlanned>),
     HandedOver(Run, Result<(Control, Vec<(Link, LinkState)>), String>),
+    /// Whether the client that has lost control is alive.
+    Checked(Run, bool),
     /// Why control was lost; `Err` if somebody has taken it or there is an emergency.
     Lost(Run, Result<String, String>),
 }
@@ -154,6 +159,14 @@ impl<'a> Desk<'a> {
                 }
                 Some(Action::FetchMap(run)) => self.job = Some(self.fetch_map(run)),
                 Some(Action::Plan(run, to)) => self.job = Some(self.plan(run, to)),
+                Some(Action::CheckClient(run, client)) => {
+                    let component = self.component.clone();
+                    self.job = Some(Box::pin(async move {
+                        let query = QueryHeartbeatPulse {};
+                        let answer = component.query::<ReportHeartbeatPulse, _>(client, &query);
+                        Done::Checked(run, answer.await.is_ok())
+                    }));
+                }
                 Some(Action::HandOver(run, path, speed)) => {
                     self.job = Some(self.hand_over(run, path, speed));
                 }
@@ -239,6 +252,10 @@ impl<'a> Desk<'a> {
                 self.tell(|mission, now| mission.handle_handed_over(now, run, Err(reason)))
                     .await;
             }
+            Done::Checked(run, is_alive) => {
+                self.tell(|mission, now| mission.handle_lost_client(now, run, is_alive))
+                    .await;
+            }
             Done::Lost(run, Ok(setback)) => {
                 self.tell(|mission, now| mission.handle_setback(now, run, &setback))
                     .await;
@@ -249,6 +266,7 @@ impl<'a> Desk<'a> {
 
     async fn hear(&mut self, news: News) {
         match news {
+            News::Pose(point) => self.tell(|mission, _| mission.handle_pose(point)).await,
             News::Found(link, peer) => self.peers[link as usize] = peer,
             News::Stage(link, state, progress) => {
                 self.tell(|mission, now| {

@@ -7,6 +7,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use crate::address::JausId;
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::messages::ground::report_planned_path::{MissionRec, PointRec};
@@ -172,7 +173,15 @@ impl Service for MissionPlanner {
         let now = *context.standing();
         if now.stops(before) {
             let reason = why_stopped(before, &now);
-            self.tell(context, |mission| mission.stop(&reason));
+            match (lost_client(before, &now), now.controller) {
+                (Some(client), _) => {
+                    self.tell(context, |mission| mission.lose_client(client, &reason));
+                }
+                (None, Some(_)) if before.controller.is_none() => {
+                    self.tell(context, |mission| mission.handle_new_client(&reason));
+                }
+                _ => self.tell(context, |mission| mission.stop(&reason)),
+            }
         }
     }
 }
@@ -186,6 +195,13 @@ fn wanted(command: &SetDestination) -> (Destination, bool) {
     (destination, command.approved == Approved::YES)
 }
 
+/// The client whose control has ended, if there is nothing else that stops the planner.
+fn lost_client(before: &Standing, now: &Standing) -> Option<JausId> {
+    let is_well = matches!(now.state, State::Ready | State::Standby);
+    let client = before.controller.filter(|_| is_well)?;
+    now.controller.is_none().then_some(client.id)
+}
+
 /// Why the planner may not go on with what it was told `before`.
 fn why_stopped(before: &Standing, now: &Standing) -> String {
     let client = |standing: &Standing| standing.controller.map(|controller| controller.id);
@@ -194,7 +210,9 @@ fn why_stopped(before: &Standing, now: &Standing) -> String {
         (_, Some(id)) if client(before) != Some(id) => {
             format!("{id} has taken control of the planner")
         }
-        (State::Ready, None) => "nobody controls the planner any more".to_owned(),
+        (State::Ready | State::Standby, None) if before.controller.is_some() => {
+            "control of the planner has ended".to_owned()
+        }
         (state, _) => format!("the planner is in the state {state}"),
     }
 }
@@ -236,7 +254,7 @@ mod tests {
     use std::sync::atomic::{AtomicU32, Ordering};
 
     use super::*;
-    use crate::mission::{Action, Stage};
+    use crate::mission::{Action, LostLink, Stage};
     use crate::service::rig::{CLIENT, Rig, STRANGER};
 
     struct Desk {
@@ -247,10 +265,14 @@ mod tests {
 
     impl Desk {
         fn new() -> Self {
+            Self::with(Settings::default())
+        }
+
+        fn with(settings: Settings) -> Self {
             let woken = Arc::new(AtomicU32::new(0));
             let count = Arc::clone(&woken);
             let wake = move || _ = count.fetch_add(1, Ordering::Relaxed);
-            let missions = Missions::new(Settings::default(), wake);
+            let missions = Missions::new(settings, wake);
             Self {
                 rig: Rig::new(vec![Box::new(missions.service())]),
                 missions,
@@ -345,7 +367,7 @@ mod tests {
                 Some(STRANGER),
                 "42.2.1 has taken control of the planner",
             ),
-            (State::Ready, None, "nobody controls the planner any more"),
+            (State::Ready, None, "control of the planner has ended"),
         ] {
             let mut desk = Desk::new();
             desk.go(3.0);
@@ -354,6 +376,68 @@ mod tests {
             assert_eq!(report.stage, report_mission::Stage::STOPPED);
             assert_eq!(report.reason, reason);
             desk.rig.stand(State::Ready, Some(CLIENT));
+            assert_eq!(desk.report().stage, report_mission::Stage::STOPPED);
+        }
+    }
+
+    /// A planner that holds a mission, or drives back, when the link is lost; it drives.
+    fn driving(lost_link: LostLink) -> Desk {
+        let mut desk = Desk::with(Settings {
+            lost_link,
+            ..Settings::default()
+        });
+        desk.go(3.0);
+        desk.rig.send(CLIENT, &ApproveMission { mission: 1 });
+        desk.plan(vec![(0.0, 0.0), (3.0, 2.0)]);
+        assert_eq!(desk.report().stage, report_mission::Stage::PATH);
+        let _ = desk.missions.tell(|mission| {
+            mission.handle_pose((0.0, 0.0));
+            mission.handle_pose((1.0, 0.0));
+        });
+        desk
+    }
+
+    #[test]
+    fn a_held_mission_goes_on_only_by_a_new_client_that_approves_it() {
+        let mut desk = driving(LostLink::Hold);
+        desk.rig.stand(State::Standby, None);
+        let report = desk.report();
+        assert_eq!(report.stage, report_mission::Stage::AWAITING_APPROVAL);
+        desk.rig.stand(State::Standby, Some(STRANGER));
+        desk.rig.stand(State::Ready, Some(STRANGER));
+        assert_eq!(
+            desk.report().stage,
+            report_mission::Stage::AWAITING_APPROVAL,
+            "not by itself"
+        );
+        desk.rig.send(STRANGER, &ApproveMission { mission: 1 });
+        assert_eq!(desk.report().stage, report_mission::Stage::MAP);
+    }
+
+    #[test]
+    fn an_emergency_ends_a_held_mission() {
+        let mut desk = driving(LostLink::Hold);
+        desk.rig.stand(State::Standby, None);
+        desk.rig.stand(State::Emergency, None);
+        assert_eq!(desk.report().stage, report_mission::Stage::STOPPED);
+    }
+
+    #[test]
+    fn a_new_lease_or_an_emergency_ends_the_way_back() {
+        for (state, client) in [
+            (State::Standby, Some(STRANGER)),
+            (State::Standby, Some(CLIENT)),
+            (State::Emergency, None),
+        ] {
+            let mut desk = driving(LostLink::Return);
+            desk.rig.stand(State::Standby, None);
+            let now = desk.rig.now;
+            let _ = desk.missions.tell(|mission| {
+                let run = mission.report().run;
+                mission.handle_lost_client(now, run, false);
+            });
+            assert_eq!(desk.report().stage, report_mission::Stage::PATH);
+            desk.rig.stand(state, client);
             assert_eq!(desk.report().stage, report_mission::Stage::STOPPED);
         }
     }

@@ -15,7 +15,7 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
-use super::{Context, Handled, Service, Standing, State, code_of, read};
+use super::{Context, Handled, Hazards, Service, Standing, State, code_of, read};
 use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::messages::core::reject_element_request::ResponseCode;
@@ -237,6 +237,13 @@ impl Service for ListManager {
             ..list_manager::V1_1
         };
         vec![list_manager::V1_1, first]
+    }
+
+    fn hazards(&self) -> Hazards {
+        Hazards {
+            set_up_by: Some(SetElement::NAME),
+            ..Hazards::default()
+        }
     }
 
     fn handle_message(

@@ -24,12 +24,14 @@ impl Behaviour for AccelerationStateSensor {
         match code {
             QueryAccelerationState::CODE => {
                 if let Some(query) = exchange.query() {
-                    exchange.reply(&report(&query, exchange));
+                    let report = report(&query, exchange);
+                    exchange.reply(&report);
                 }
             }
             QueryAccelerationStateExt::CODE => {
                 if let Some(query) = exchange.query() {
-                    exchange.reply(&report_ext(&query, exchange));
+                    let report = report_ext(&query, exchange);
+                    exchange.reply(&report);
                 }
             }
             _ => return Handled::No,
@@ -43,7 +45,10 @@ impl Behaviour for AccelerationStateSensor {
     }
 }
 
-fn report(query: &QueryAccelerationState, exchange: &Exchange<'_, '_>) -> ReportAccelerationState {
+fn report(
+    query: &QueryAccelerationState,
+    exchange: &mut Exchange<'_, '_>,
+) -> ReportAccelerationState {
     let acceleration = exchange.cockpit.pilot.motion().acceleration;
     let wanted = Wanted(query.presence_vector.into());
     ReportAccelerationState {
@@ -61,8 +66,9 @@ fn report(query: &QueryAccelerationState, exchange: &Exchange<'_, '_>) -> Report
 
 fn report_ext(
     query: &QueryAccelerationStateExt,
-    exchange: &Exchange<'_, '_>,
+    exchange: &mut Exchange<'_, '_>,
 ) -> ReportAccelerationStateExt {
+    let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let acceleration = exchange.cockpit.pilot.motion().acceleration;
     let wanted = Wanted(query.presence_vector.into());
     ReportAccelerationStateExt {
@@ -74,7 +80,7 @@ fn report_ext(
         pitch_acceleration: wanted.real(5, acceleration.pitch, ext::PitchAcceleration::new),
         yaw_acceleration: wanted.real(6, acceleration.yaw, ext::YawAcceleration::new),
         rotational_acceleration_rms: None,
-        time_seconds: wanted.field(8, exchange.seconds()),
-        time_nano_seconds: wanted.field(9, exchange.nanoseconds()),
+        time_seconds: wanted.field(8, seconds),
+        time_nano_seconds: wanted.field(9, nanoseconds),
     }
 }

@@ -1,26 +1,39 @@
-//! The time of day, from a moment at which it was known.
+//! The time stamps of reports: when their samples were taken, by the component's time of day.
 
 use std::time::{Duration, Instant};
 
 use crate::messages::mobility::report_local_pose::TimeStamp;
+use crate::service::TimeOfDay;
 use crate::service::calendar::Date;
 
-/// Knows what time it was at some moment, and so what time it is.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Clock {
-    /// The moment.
-    pub(super) at: Instant,
-    /// The time then, since the beginning of 1970 (UTC).
-    pub(super) since_1970: Duration,
+/// Stamps samples. The same sample always has the same stamp, until the time is set.
+#[derive(Debug)]
+pub(super) struct SampleClock {
+    time: TimeOfDay,
+    /// The last sample, by how much the time had been corrected then, and its stamp.
+    last: Option<(Instant, i64, Duration)>,
 }
 
-impl Clock {
-    /// The time since the beginning of 1970.
-    pub(super) fn since_1970(&self, now: Instant) -> Duration {
-        match now.checked_duration_since(self.at) {
-            Some(later) => self.since_1970 + later,
-            None => self.since_1970.saturating_sub(self.at - now),
+impl SampleClock {
+    pub(super) const fn new(time: TimeOfDay) -> Self {
+        Self { time, last: None }
+    }
+
+    /// When a sample was taken, since the beginning of 1970; it is `now`.
+    pub(super) fn since_1970(&mut self, now: Instant, sampled_at: Option<Instant>) -> Duration {
+        let Some(sampled_at) = sampled_at else {
+            return self.time.now();
+        };
+        let ahead = self.time.ahead();
+        if let Some((at, corrected, stamp)) = self.last
+            && (at, corrected) == (sampled_at, ahead)
+        {
+            return stamp;
         }
+        let age = now.saturating_duration_since(sampled_at);
+        let stamp = self.time.now().saturating_sub(age);
+        self.last = Some((sampled_at, ahead, stamp));
+        stamp
     }
 }
 

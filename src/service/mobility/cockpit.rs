@@ -5,7 +5,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::clock::Clock;
+use super::clock::SampleClock;
 use super::place::Place;
 use crate::messages::core::set_element::ElementRec;
 use crate::messages::mobility::{
@@ -52,7 +52,7 @@ impl Travel {
 
 /// A vehicle under way that is looked at only after so long was held up with all that steers it:
 /// what its client wanted before counts no more.
-const HUNG: Duration = Duration::from_secs(1);
+const HUNG: Duration = Duration::from_millis(500);
 /// Between two looks at a vehicle in trouble.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -68,7 +68,7 @@ pub(super) struct Cockpit {
     /// The list that the list drivers work off.
     pub(super) elements: Elements,
     pub(super) travel: Travel,
-    pub(super) clock: Option<Clock>,
+    pub(super) clock: Option<SampleClock>,
     /// Magnetic north as seen from true north, in radians, once set.
     pub(super) magnetic_variation: f64,
 }

@@ -85,24 +85,27 @@ impl Exchange<'_, '_> {
         }
     }
 
-    /// The time since the beginning of 1970, if it is known.
-    pub(super) fn since_1970(&self) -> Option<Duration> {
-        let clock = self.cockpit.clock.as_ref()?;
-        Some(clock.since_1970(self.now))
+    /// When the vehicle's motion was sampled, since the beginning of 1970; `None` without a clock.
+    fn sampled_since_1970(&mut self) -> Option<Duration> {
+        let sampled_at = self.cockpit.pilot.motion().sampled_at;
+        let clock = self.cockpit.clock.as_mut()?;
+        Some(clock.since_1970(self.now, sampled_at))
     }
 
-    /// Seconds of the time since 1970, for the reports of version 1.1.
-    pub(super) fn seconds(&self) -> Option<u32> {
-        u32::try_from(self.since_1970()?.as_secs()).ok()
+    /// When the motion was sampled, for the reports of version 1.1: seconds since 1970, and the rest
+    /// in nanoseconds.
+    pub(super) fn seconds_and_nanoseconds(&mut self) -> (Option<u32>, Option<u32>) {
+        let Some(time) = self.sampled_since_1970() else {
+            return (None, None);
+        };
+        (
+            u32::try_from(time.as_secs()).ok(),
+            Some(time.subsec_nanos()),
+        )
     }
 
-    /// The rest of the time since 1970 in nanoseconds.
-    pub(super) fn nanoseconds(&self) -> Option<u32> {
-        Some(self.since_1970()?.subsec_nanos())
-    }
-
-    /// The time, for the reports of version 1.0.
-    pub(super) fn stamp(&self) -> Option<TimeStamp> {
-        clock::stamp(self.since_1970()?)
+    /// When the motion was sampled, for the reports of version 1.0.
+    pub(super) fn stamp(&mut self) -> Option<TimeStamp> {
+        clock::stamp(self.sampled_since_1970()?)
     }
 }

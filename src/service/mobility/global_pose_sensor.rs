@@ -28,12 +28,14 @@ impl Behaviour for GlobalPoseSensor {
         match code {
             QueryGlobalPose::CODE => {
                 if let Some(query) = exchange.query() {
-                    exchange.reply(&report(&query, exchange));
+                    let report = report(&query, exchange);
+                    exchange.reply(&report);
                 }
             }
             QueryGlobalPoseExt::CODE => {
                 if let Some(query) = exchange.query() {
-                    exchange.reply(&report_ext(&query, exchange));
+                    let report = report_ext(&query, exchange);
+                    exchange.reply(&report);
                 }
             }
             QueryGeomagneticProperty::CODE => {
@@ -118,7 +120,7 @@ fn told_ext(message: &SetGlobalPoseExt, pose: &GlobalPose) -> GlobalPose {
     }
 }
 
-fn report(query: &QueryGlobalPose, exchange: &Exchange<'_, '_>) -> ReportGlobalPose {
+fn report(query: &QueryGlobalPose, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPose {
     let pose = pose(exchange);
     let wanted = Wanted(query.presence_vector.into());
     ReportGlobalPose {
@@ -134,7 +136,8 @@ fn report(query: &QueryGlobalPose, exchange: &Exchange<'_, '_>) -> ReportGlobalP
     }
 }
 
-fn report_ext(query: &QueryGlobalPoseExt, exchange: &Exchange<'_, '_>) -> ReportGlobalPoseExt {
+fn report_ext(query: &QueryGlobalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPoseExt {
+    let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let pose = pose(exchange);
     let wanted = Wanted(query.presence_vector.into());
     ReportGlobalPoseExt {
@@ -144,8 +147,8 @@ fn report_ext(query: &QueryGlobalPoseExt, exchange: &Exchange<'_, '_>) -> Report
         roll: wanted.real(8, pose.roll, ext::Roll::new),
         pitch: wanted.real(9, pose.pitch, ext::Pitch::new),
         heading: wanted.real(10, pose.yaw, ext::Heading::new),
-        time_seconds: wanted.field(13, exchange.seconds()),
-        time_nano_seconds: wanted.field(14, exchange.nanoseconds()),
+        time_seconds: wanted.field(13, seconds),
+        time_nano_seconds: wanted.field(14, nanoseconds),
         ..ReportGlobalPoseExt::default()
     }
 }

@@ -27,12 +27,14 @@ impl Behaviour for LocalPoseSensor {
         match code {
             QueryLocalPose::CODE => {
                 if let Some(query) = exchange.query() {
-                    exchange.reply(&report(&query, exchange));
+                    let report = report(&query, exchange);
+                    exchange.reply(&report);
                 }
             }
             QueryLocalPoseExt::CODE => {
                 if let Some(query) = exchange.query() {
-                    exchange.reply(&report_ext(&query, exchange));
+                    let report = report_ext(&query, exchange);
+                    exchange.reply(&report);
                 }
             }
             SetLocalPose::CODE => {
@@ -104,7 +106,7 @@ fn told_ext(message: &SetLocalPoseExt, pose: &Pose) -> Pose {
     }
 }
 
-fn report(query: &QueryLocalPose, exchange: &Exchange<'_, '_>) -> ReportLocalPose {
+fn report(query: &QueryLocalPose, exchange: &mut Exchange<'_, '_>) -> ReportLocalPose {
     let pose = pose(exchange);
     let wanted = Wanted(query.presence_vector.into());
     ReportLocalPose {
@@ -120,7 +122,8 @@ fn report(query: &QueryLocalPose, exchange: &Exchange<'_, '_>) -> ReportLocalPos
     }
 }
 
-fn report_ext(query: &QueryLocalPoseExt, exchange: &Exchange<'_, '_>) -> ReportLocalPoseExt {
+fn report_ext(query: &QueryLocalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportLocalPoseExt {
+    let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let pose = pose(exchange);
     let wanted = Wanted(query.presence_vector.into());
     ReportLocalPoseExt {
@@ -130,8 +133,8 @@ fn report_ext(query: &QueryLocalPoseExt, exchange: &Exchange<'_, '_>) -> ReportL
         roll: wanted.real(9, pose.roll, ext::Roll::new),
         pitch: wanted.real(10, pose.pitch, ext::Pitch::new),
         heading: wanted.real(11, pose.yaw, ext::Heading::new),
-        time_seconds: wanted.field(14, exchange.seconds()),
-        time_nano_seconds: wanted.field(15, exchange.nanoseconds()),
+        time_seconds: wanted.field(14, seconds),
+        time_nano_seconds: wanted.field(15, nanoseconds),
         ..ReportLocalPoseExt::default()
     }
 }

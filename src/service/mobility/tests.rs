@@ -11,12 +11,13 @@ use std::time::Duration;
 
 use super::*;
 use crate::codec::{FormattedBlob, Message};
+use crate::messages::core;
 use crate::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
 use crate::messages::core::{ConfirmElementRequest, RejectElementRequest, SetElement};
 use crate::messages::mobility::{ExecuteList, SetLocalWaypoint};
 use crate::service::rig::{CLIENT, Rig, STRANGER};
-use crate::service::{MotionPolicy, Service, State};
-use crate::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+use crate::service::{MotionPolicy, Service, State, Time, TimeOfDay};
+use crate::vehicle::{Frame, Motion, Observed, Pilot, SkidSteer, SkidSteerConfig};
 
 /// Berlin, where the vehicle of the tests stands.
 const FRAME: (f64, f64) = (52.5, 13.4);
@@ -50,7 +51,7 @@ fn rig() -> (Rig, Vehicle) {
     let rig = Rig::new(services);
     // 2015-06-08 01:02:03.004 UTC.
     let since_1970 = Duration::from_millis(1_433_725_323_004);
-    let vehicle = vehicle.with_time(rig.now, since_1970);
+    let vehicle = vehicle.with_clock(TimeOfDay::new(move || since_1970));
     (rig, vehicle)
 }
 

@@ -2,11 +2,11 @@
 //! offers it.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::acceleration_state_sensor::AccelerationStateSensor;
 use super::behaviour::Behaviour;
-use super::clock::Clock;
+use super::clock::SampleClock;
 use super::cockpit::Cockpit;
 use super::exchange::Exchange;
 use super::global_pose_sensor::GlobalPoseSensor;
@@ -24,7 +24,7 @@ use crate::codec::ServiceId;
 use crate::endpoint::Received;
 use crate::service::{
     Context, Elements, Handled, Hazards, ListManager, MotionPolicy, Service, Standing, StopCause,
-    code_of,
+    TimeOfDay, code_of,
 };
 use crate::vehicle::{GlobalPose, Motion, Pilot};
 
@@ -44,10 +44,11 @@ impl Vehicle {
         }
     }
 
-    /// Tells it what time it was at some moment, as the time since the beginning of 1970 (UTC).
+    /// Stamps its reports with the times at which their samples were taken. Share the time with the
+    /// component's [`Time`](crate::service::Time) service, so that Set Time sets the stamps, too.
     #[must_use]
-    pub fn with_time(self, at: Instant, since_1970: Duration) -> Self {
-        self.lock().clock = Some(Clock { at, since_1970 });
+    pub fn with_clock(self, time: TimeOfDay) -> Self {
+        self.lock().clock = Some(SampleClock::new(time));
         self
     }
 

@@ -29,12 +29,14 @@ impl Behaviour for VelocityStateSensor {
         match code {
             QueryVelocityState::CODE => {
                 if let Some(query) = exchange.query() {
-                    exchange.reply(&report(&query, exchange));
+                    let report = report(&query, exchange);
+                    exchange.reply(&report);
                 }
             }
             QueryVelocityStateExt::CODE => {
                 if let Some(query) = exchange.query() {
-                    exchange.reply(&report_ext(&query, exchange));
+                    let report = report_ext(&query, exchange);
+                    exchange.reply(&report);
                 }
             }
             _ => return Handled::No,
@@ -48,7 +50,7 @@ impl Behaviour for VelocityStateSensor {
     }
 }
 
-fn report(query: &QueryVelocityState, exchange: &Exchange<'_, '_>) -> ReportVelocityState {
+fn report(query: &QueryVelocityState, exchange: &mut Exchange<'_, '_>) -> ReportVelocityState {
     let velocity = exchange.cockpit.pilot.motion().velocity;
     let wanted = Wanted(query.presence_vector.into());
     ReportVelocityState {
@@ -66,8 +68,9 @@ fn report(query: &QueryVelocityState, exchange: &Exchange<'_, '_>) -> ReportVelo
 
 fn report_ext(
     query: &QueryVelocityStateExt,
-    exchange: &Exchange<'_, '_>,
+    exchange: &mut Exchange<'_, '_>,
 ) -> ReportVelocityStateExt {
+    let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
     let velocity = exchange.cockpit.pilot.motion().velocity;
     let wanted = Wanted(query.velocity_var_presence_vector.into());
     let along = VelocityVehicleXyzRec {
@@ -83,8 +86,8 @@ fn report_ext(
             pitch_rate: wanted.real(2, velocity.pitch, report_velocity_state_ext::PitchRate::new),
             yaw_rate: wanted.real(3, velocity.yaw, report_velocity_state_ext::YawRate::new),
             speed_over_ground: wanted.real(5, velocity.x.hypot(velocity.y), SpeedOverGround::new),
-            time_seconds: wanted.field(9, exchange.seconds()),
-            time_nano_seconds: wanted.field(10, exchange.nanoseconds()),
+            time_seconds: wanted.field(9, seconds),
+            time_nano_seconds: wanted.field(10, nanoseconds),
             ..Default::default()
         },
     }

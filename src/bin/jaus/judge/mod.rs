@@ -41,9 +41,11 @@ const MAIN: JausId = JausId::new(42, 1, 1);
 ///
 /// Part A are the six tasks of the 2010 challenge, part B the 36 steps of the interface tasks since
 /// 2014, as their judging tool was seen to ask them, and part C what their judges look for besides:
-/// that a vehicle moves for nobody but who is in control, and stops. Five components of the judge ask, subscribe,
-/// take control from one another and declare emergencies; --id moves the first of them, and the
-/// other four, 1 to 4, are on the node beside it. Every step is judged by the answers that the
+/// that a vehicle moves only for the client in control, and stops in standby, in an emergency and
+/// after control is released, although new efforts go on arriving 10 times a second: an effort that
+/// expires by itself proves nothing. Five components of the judge ask, subscribe, take control from
+/// one another and declare emergencies; --id moves the first of them, and the other four, 1 to 4,
+/// are on the node beside it. Every step is judged by the answers that the
 /// standard requires, within the time limit. Steps that need a service which the component does not
 /// list are skipped, and counted. What is said by multicast goes to all components of the node.
 ///

@@ -13,7 +13,9 @@ use tokio::time::{Instant, sleep_until};
 
 use super::memory::Memory;
 use super::panel::{Heard, Panel};
-use super::step::{Act, Check, Exchange, Expectation, Form, Reach, Speaker, Step, Until};
+use super::step::{
+    Act, Check, Exchange, Expectation, Form, Reach, Speaker, Step, Throughout, Until,
+};
 use super::subject::Subject;
 use super::verdict::{Proceeding, Said, StepResult, Verdict};
 use super::watch::Observation;
@@ -106,6 +108,7 @@ impl Runner {
                     Ok(())
                 }
                 Act::Until(until) => self.until(until, proceedings).await?,
+                Act::Throughout(throughout) => self.throughout(throughout, proceedings).await?,
             };
             if check.is_err() {
                 break;
@@ -270,6 +273,37 @@ impl Runner {
         proceeding.measured = Some(format!("after {:.1} s", start.elapsed().as_secs_f64()));
         proceedings.push(proceeding);
         Ok(check.map_err(|reason| format!("{reason}, within {} s", until.at_most.as_secs_f64())))
+    }
+
+    /// Repeats exchanges for a time, in which something must hold.
+    async fn throughout(
+        &mut self,
+        throughout: &Throughout,
+        proceedings: &mut Vec<Proceeding>,
+    ) -> Came {
+        let start = Instant::now();
+        let mut next = start;
+        let check = loop {
+            let mut round = Vec::new();
+            for exchange in &throughout.exchanges {
+                let check = self.exchange(exchange, &mut round).await?;
+                if check.is_err() {
+                    proceedings.append(&mut round);
+                    return Ok(check);
+                }
+            }
+            let check = (throughout.holds)(&self.memory);
+            if check.is_err() || start.elapsed() >= throughout.lasting {
+                break check;
+            }
+            next += throughout.every;
+            self.listen_until(next).await?;
+        };
+        let lasted = start.elapsed().as_secs_f64();
+        let mut proceeding = Proceeding::of(None, vec![throughout.words.to_owned()]);
+        proceeding.measured = Some(format!("for {lasted:.1} s"));
+        proceedings.push(proceeding);
+        Ok(check.map_err(|reason| format!("{reason} after {lasted:.1} s of commands")))
     }
 
     /// Leaves the subject as it was found: no events, no emergency, nobody in control.

@@ -123,6 +123,8 @@ pub(super) enum Act {
     Pause(Duration),
     /// The exchanges are repeated until the check says that the end is reached.
     Until(Until),
+    /// The exchanges are repeated for a time, in which the check must never fail.
+    Throughout(Throughout),
 }
 
 /// What is said, to whom it is up to answer, and how.
@@ -184,6 +186,17 @@ pub(super) struct Until {
     pub(super) reached: fn(&Memory) -> Check,
     pub(super) every: Duration,
     pub(super) at_most: Duration,
+}
+
+/// Something that must not happen, however long it is provoked.
+pub(super) struct Throughout {
+    /// What must hold, in words.
+    pub(super) words: &'static str,
+    pub(super) exchanges: Vec<Exchange>,
+    /// Looked at after each round.
+    pub(super) holds: fn(&Memory) -> Check,
+    pub(super) every: Duration,
+    pub(super) lasting: Duration,
 }
 
 /// Begins a step.

@@ -53,15 +53,61 @@ fn a_report_has_the_fields_that_were_asked_for_and_no_others() {
 
 #[test]
 fn time_stamps_tell_the_time_of_day_and_advance() {
-    let (mut rig, _) = rig();
+    let (mut rig, vehicle) = rig();
     let stamp = velocity(&mut rig).time_stamp.unwrap();
     assert_eq!(
         (stamp.day(), stamp.hour(), stamp.minutes(), stamp.seconds()),
         (8, 1, 2, 3)
     );
+    let later = Duration::from_millis(1_433_725_325_504);
+    let _ = vehicle.with_clock(TimeOfDay::new(move || later));
     rig.run(seconds(2.5));
     let stamp = local_pose(&mut rig).time_stamp.unwrap();
     assert_eq!((stamp.seconds(), stamp.milliseconds()), (5, 504));
+}
+
+/// A sensor's component, and the vehicle that it watches.
+fn watched() -> (Rig, Observed) {
+    let observed = Observed::default();
+    let time = TimeOfDay::new(|| Duration::from_millis(1_433_725_323_004));
+    let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()));
+    let vehicle = vehicle.with_clock(time.clone());
+    let sensor = Box::new(vehicle.local_pose_sensor());
+    (Rig::new(vec![sensor, Box::new(Time::new(time))]), observed)
+}
+
+#[test]
+fn a_report_is_stamped_with_the_time_of_its_sample_and_not_of_the_answer() {
+    let (mut rig, observed) = watched();
+    observed.set(Motion {
+        sampled_at: rig.now.checked_sub(seconds(0.5)),
+        ..Motion::default()
+    });
+    let first = local_pose(&mut rig).time_stamp.unwrap();
+    assert_eq!((first.seconds(), first.milliseconds()), (2, 504));
+    rig.run(seconds(1.0));
+    let second = local_pose(&mut rig).time_stamp.unwrap();
+    assert_eq!(second, first, "the same sample");
+}
+
+#[test]
+fn set_time_sets_the_stamps_of_the_vehicle_too() {
+    let (mut rig, observed) = watched();
+    observed.set(Motion {
+        sampled_at: Some(rig.now),
+        ..Motion::default()
+    });
+    assert_eq!(local_pose(&mut rig).time_stamp.unwrap().hour(), 1);
+    let time = core::report_time::TimeStamp::default();
+    let time = time.with_day(8).unwrap().with_hour(17).unwrap();
+    rig.send(
+        CLIENT,
+        &core::SetTime {
+            time_stamp: Some(time),
+            date_stamp: None,
+        },
+    );
+    assert_eq!(local_pose(&mut rig).time_stamp.unwrap().hour(), 17);
 }
 
 #[test]

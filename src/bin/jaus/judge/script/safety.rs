@@ -13,7 +13,7 @@ use super::super::memory::Memory;
 use super::super::step::{
     Act, Check, Exchange, Part,
     Speaker::{Fourth, Main, Second},
-    Step, Until, present, step,
+    Step, Throughout, Until, present, step,
 };
 use super::challenge::{accepted, released, request_control};
 use super::{ACCESS_CONTROL, MANAGEMENT, PRIMITIVE_DRIVER, VELOCITY_STATE_SENSOR};
@@ -22,25 +22,24 @@ use super::{ACCESS_CONTROL, MANAGEMENT, PRIMITIVE_DRIVER, VELOCITY_STATE_SENSOR}
 const EFFORT: f64 = 30.0;
 /// In metres a second: below it, a vehicle stands.
 const STANDING: f64 = 0.05;
-/// How long a vehicle that must not move is watched.
-const PATIENCE: Duration = Duration::from_millis(500);
+/// How long efforts go on while the vehicle must not move. An effort may expire by itself, after
+/// 500 ms in this stack: only a vehicle that gets new ones all the time shows that it ignores them.
+const PROVOCATION: Duration = Duration::from_secs(3);
 /// How long a vehicle may take to move, or to stop.
 const RESPONSE: Duration = Duration::from_secs(4);
+/// Efforts are repeated, and control is renewed, as often.
 const ROUND: Duration = Duration::from_millis(100);
 
 pub(super) fn steps() -> Vec<Step> {
     vec![
         safety(1, "No motion for who is not in control")
-            .act(effort(Second).into())
-            .act(Act::Pause(PATIENCE))
-            .ask(Main, query_velocity(), "at rest", stands),
+            .act(stands_throughout(|| vec![effort(Second)])),
         in_control(2, "No motion in standby")
-            .act(effort(Main).into())
-            .act(Act::Pause(PATIENCE))
-            .ask(Main, query_velocity(), "at rest", stands),
+            .act(stands_throughout(|| vec![renew(), effort(Main)])),
         driving(3, "Standby stops the vehicle")
             .tell(Main, Standby)
-            .act(until_it_stands()),
+            .act(until_it_stands(|| vec![renew(), effort(Main)]))
+            .act(stands_throughout(|| vec![renew(), effort(Main)])),
         driving(4, "An emergency stops the vehicle")
             .tell(
                 Fourth,
@@ -48,7 +47,8 @@ pub(super) fn steps() -> Vec<Step> {
                     emergency_code: set_emergency::EmergencyCode(1),
                 },
             )
-            .act(until_it_stands())
+            .act(until_it_stands(|| vec![effort(Main)]))
+            .act(stands_throughout(|| vec![effort(Main)]))
             .finally(Exchange::new(
                 Fourth,
                 ClearEmergency {
@@ -57,7 +57,8 @@ pub(super) fn steps() -> Vec<Step> {
             )),
         driving(5, "The end of control stops the vehicle")
             .ask(Main, ReleaseControl, "control released", released)
-            .act(until_it_stands()),
+            .act(until_it_stands(|| vec![effort(Main)]))
+            .act(stands_throughout(|| vec![effort(Main)])),
     ]
 }
 
@@ -80,12 +81,10 @@ fn in_control(number: u8, title: &'static str) -> Step {
 
 /// A step that begins with a vehicle that moves.
 fn driving(number: u8, title: &'static str) -> Step {
-    let mut step = in_control(number, title)
-        .tell(Main, Resume)
-        .act(effort(Main).into());
+    let mut step = in_control(number, title).tell(Main, Resume);
     step.acts.push(Act::Until(Until {
         words: "the vehicle moves",
-        exchanges: vec![effort(Main), ask_velocity()],
+        exchanges: vec![renew(), effort(Main), ask_velocity()],
         reached: |memory| match memory.speed {
             Some(speed) if speed.abs() > STANDING => Ok(()),
             _ => Err("the vehicle did not move".to_owned()),
@@ -96,20 +95,37 @@ fn driving(number: u8, title: &'static str) -> Step {
     step
 }
 
-fn until_it_stands() -> Act {
+/// The vehicle comes to rest although the commands go on.
+fn until_it_stands(commands: fn() -> Vec<Exchange>) -> Act {
     Act::Until(Until {
-        words: "the vehicle stands",
-        exchanges: vec![ask_velocity()],
-        reached: |memory| match memory.speed {
-            Some(speed) if speed.abs() <= STANDING => Ok(()),
-            speed => Err(format!(
-                "the vehicle still moves at {:.2} m/s",
-                speed.unwrap_or(f64::NAN)
-            )),
-        },
+        words: "the vehicle stands although efforts go on",
+        exchanges: and_velocity(commands),
+        reached: stands,
         every: ROUND,
         at_most: RESPONSE,
     })
+}
+
+/// The vehicle never moves while the commands go on.
+fn stands_throughout(commands: fn() -> Vec<Exchange>) -> Act {
+    Act::Throughout(Throughout {
+        words: "the vehicle stands although efforts go on",
+        exchanges: and_velocity(commands),
+        holds: stands,
+        every: ROUND,
+        lasting: PROVOCATION,
+    })
+}
+
+fn and_velocity(commands: fn() -> Vec<Exchange>) -> Vec<Exchange> {
+    let mut exchanges = commands();
+    exchanges.push(ask_velocity());
+    exchanges
+}
+
+/// Keeps control: some subjects take it away from a client that does not renew it.
+fn renew() -> Exchange {
+    Exchange::new(Main, request_control()).expect(Main, "control accepted", accepted)
 }
 
 /// Pushes forwards.
@@ -136,12 +152,10 @@ fn takes_velocity(report: &ReportVelocityState, memory: &mut Memory) -> Check {
     Ok(())
 }
 
-fn stands(report: &ReportVelocityState, memory: &mut Memory) -> Check {
-    takes_velocity(report, memory)?;
+fn stands(memory: &Memory) -> Check {
     match memory.speed {
-        Some(speed) if speed.abs() > STANDING => {
-            Err(format!("the vehicle moves at {speed:.2} m/s"))
-        }
-        _ => Ok(()),
+        Some(speed) if speed.abs() <= STANDING => Ok(()),
+        Some(speed) => Err(format!("the vehicle moves at {speed:.2} m/s")),
+        None => Err("the vehicle has not reported its velocity".to_owned()),
     }
 }

@@ -1,0 +1,157 @@
+//! The thread that reads a stop input: nothing else of the program delays it.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the line is read in real time, on a thread of its own"
+)]
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use tokio::sync::watch;
+
+use crate::actuator::{Interlock, StopInput};
+
+/// A stop input that is being read. An open line opens the interlock at once, by itself.
+#[derive(Debug)]
+pub(super) struct StopLine {
+    pressed: watch::Receiver<Option<String>>,
+    ends: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl StopLine {
+    /// Between two readings.
+    const PERIOD: Duration = Duration::from_millis(10);
+
+    /// Begins to read.
+    ///
+    /// # Errors
+    /// If the system has no thread left.
+    pub(super) fn start(mut input: Box<dyn StopInput>, interlock: Interlock) -> io::Result<Self> {
+        let first = read(input.as_mut(), &interlock);
+        let (tell, pressed) = watch::channel(first);
+        let ends = Arc::new(AtomicBool::new(false));
+        let end = Arc::clone(&ends);
+        let thread = std::thread::Builder::new().name("stop input".to_owned());
+        let thread = thread.spawn(move || {
+            while !end.load(Ordering::Relaxed) {
+                let open = read(input.as_mut(), &interlock);
+                tell.send_if_modified(|before| {
+                    let is_news = *before != open;
+                    *before = open;
+                    is_news
+                });
+                std::thread::sleep(Self::PERIOD);
+            }
+        })?;
+        Ok(Self {
+            pressed,
+            ends,
+            thread: Some(thread),
+        })
+    }
+
+    /// Why the line is open; `None` while it is closed.
+    pub(super) fn pressed(&mut self) -> Option<String> {
+        // A thread that has ended reads nothing any more.
+        if self.pressed.has_changed().is_err() {
+            return Some("the stop input is not read any more".to_owned());
+        }
+        self.pressed.borrow_and_update().clone()
+    }
+
+    /// Waits until the line is opened or closed.
+    pub(super) async fn changed(&mut self) {
+        if self.pressed.changed().await.is_err() {
+            // `pressed` tells, whenever it is asked.
+            std::future::pending::<()>().await;
+        }
+    }
+}
+
+impl Drop for StopLine {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // A thread that has panicked reads nothing either.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Why the line is open. That opens the interlock, which the component closes again after it has
+/// noted the stop.
+fn read(input: &mut dyn StopInput, interlock: &Interlock) -> Option<String> {
+    let why = match input.is_closed() {
+        Ok(true) => return None,
+        Ok(false) => "the stop input is pressed".to_owned(),
+        Err(error) => format!("the stop input cannot be read: {error}"),
+    };
+    interlock.open();
+    Some(why)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::actuator::SimulatedStop;
+
+    struct Broken;
+
+    impl StopInput for Broken {
+        fn is_closed(&mut self) -> io::Result<bool> {
+            Err(io::Error::other("the chip is gone"))
+        }
+    }
+
+    /// Its driver panics at the second reading.
+    #[derive(Default)]
+    struct Panics(bool);
+
+    impl StopInput for Panics {
+        fn is_closed(&mut self) -> io::Result<bool> {
+            assert!(!std::mem::replace(&mut self.0, true), "a broken driver");
+            Ok(true)
+        }
+    }
+
+    fn until(line: &mut StopLine, is_so: impl Fn(Option<&str>) -> bool) {
+        for _ in 0..2000 {
+            if is_so(line.pressed().as_deref()) {
+                return;
+            }
+            std::thread::sleep(StopLine::PERIOD);
+        }
+        panic!("in vain");
+    }
+
+    #[test]
+    fn an_open_line_opens_the_interlock() {
+        let (button, interlock) = (SimulatedStop::default(), Interlock::default());
+        let mut line = StopLine::start(Box::new(button.clone()), interlock.clone()).unwrap();
+        assert!(line.pressed().is_none() && !interlock.is_open());
+        button.press();
+        until(&mut line, |pressed| {
+            pressed == Some("the stop input is pressed")
+        });
+        assert!(interlock.is_open());
+        button.release();
+        until(&mut line, |pressed| pressed.is_none());
+        assert!(interlock.is_open(), "it does not close by itself");
+    }
+
+    #[test]
+    fn a_line_that_cannot_be_read_is_open() {
+        let mut line = StopLine::start(Box::new(Broken), Interlock::default()).unwrap();
+        until(&mut line, |pressed| {
+            pressed.is_some_and(|why| why.contains("the chip is gone"))
+        });
+        let mut line = StopLine::start(Box::new(Panics::default()), Interlock::default()).unwrap();
+        until(&mut line, |pressed| {
+            pressed.is_some_and(|why| why.contains("not read any more"))
+        });
+    }
+}

@@ -1,0 +1,138 @@
+//! What pages see and may do when a part of the vehicle is missing, or the page itself falls silent.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::time::Duration;
+
+use jaus::component::{Component, Handlers, Kind, Management};
+use jaus::messages::ground::{QueryMission, ReportMission, mission_planner};
+use serde_json::{Value, json};
+
+use crate::scene::{Scene, driver_of, within_limit};
+
+fn missing(state: &Value) -> Vec<&Value> {
+    let missing = state["vehicle"]["missing"].as_array();
+    missing.into_iter().flatten().collect()
+}
+
+#[tokio::test]
+async fn a_driver_that_ends_is_named_and_nobody_drives_until_it_is_back() {
+    let mut scene = Scene::new().await;
+    let mut page = scene.driver().await;
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    scene.end_rover();
+    // Before Discovery has lost it, it is silent.
+    let is_gone = |state: &Value| missing(state).iter().any(|it| it["how"] == "gone");
+    let state = page.until(is_gone).await;
+    let part = missing(&state)[0];
+    assert_eq!(part["name"], "Primitive Driver");
+    assert_eq!(part["id"], "101.1.1");
+    let why = &state["vehicle"]["stale"];
+    assert_eq!(why, "the primitive driver 101.1.1 is gone");
+    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
+    page.ask(push).await.unwrap_err();
+
+    scene.start_rover().await;
+    page.until(|state| missing(state).is_empty() && state["vehicle"]["stale"].is_null())
+        .await;
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+}
+
+#[tokio::test]
+async fn a_pose_that_freezes_ends_manual_drive_although_it_is_still_reported() {
+    let frozen = Arc::new(AtomicBool::new(false));
+    let scene = Scene::with_frozen_pose(Arc::clone(&frozen)).await;
+    let mut page = scene.driver().await;
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    frozen.store(true, Ordering::Relaxed);
+    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
+    let refused = within_limit(async {
+        loop {
+            if let Err(refused) = page.ask(push.clone()).await {
+                return refused;
+            }
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+    })
+    .await;
+    assert!(refused.contains("no new pose"), "{refused}");
+    let state = page.state().await;
+    let x = state["vehicle"]["pose"]["x"].as_f64().unwrap();
+    assert!((x - 3.0).abs() < 0.01, "{x}");
+    assert!(state["vehicle"]["pose"]["age_ms"].as_u64().unwrap() >= 1000);
+    assert!(missing(&state).is_empty(), "the sensor does report");
+    scene.until(|scene| scene.speed() == 0.0).await;
+    frozen.store(false, Ordering::Relaxed);
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+}
+
+#[tokio::test]
+async fn a_page_that_falls_silent_while_it_drives_is_told_why_the_vehicle_stopped() {
+    let scene = Scene::new().await;
+    let mut page = scene.driver().await;
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    // The page says nothing any more.
+    let silent = |state: &Value| state["drive"]["reason"] != "";
+    let state = page.until(silent).await;
+    let reason = state["drive"]["reason"].as_str().unwrap();
+    assert!(reason.contains("nothing came from the page"), "{reason}");
+    assert_eq!(state["drive"]["active"], false);
+    scene.until(|scene| scene.speed() == 0.0).await;
+
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    page.ask(json!({"type": "drive_end"})).await.unwrap();
+    let state = page.until(|state| state["drive"]["active"] == false).await;
+    assert_eq!(state["drive"]["reason"], "", "it was let go");
+}
+
+/// A planner with mission 7, in the stage that is set.
+fn planner(scene: &Scene, stage: Arc<AtomicU8>) -> Component {
+    let mission = Handlers::new(mission_planner::LATEST).answer(move |_: QueryMission| {
+        let stage = stage.load(Ordering::Relaxed).into();
+        ReportMission {
+            mission: 7,
+            stage,
+            ..ReportMission::default()
+        }
+    });
+    scene.attach(
+        36,
+        Component::builder(Kind::Vehicle, "Rover")
+            .management(Management::default())
+            .offer(mission),
+    )
+}
+
+#[tokio::test]
+async fn a_planner_that_ends_while_it_drives_is_named_and_the_station_stops_the_vehicle() {
+    let scene = Scene::new().await;
+    let stage = Arc::new(AtomicU8::new(3));
+    let planner = planner(&scene, Arc::clone(&stage));
+    let mut page = scene.page().await;
+    page.until(|state| state["mission"]["stage"] == "awaiting_approval")
+        .await;
+    page.until(|state| state["vehicle"]["stale"].is_null())
+        .await;
+    page.ask(json!({"type": "control", "on": true}))
+        .await
+        .unwrap();
+    page.ask(json!({"type": "resume"})).await.unwrap();
+    page.ask(json!({"type": "approve", "mission": 7}))
+        .await
+        .unwrap();
+    stage.store(7, Ordering::Relaxed);
+    page.until(|state| state["mission"]["stage"] == "driving" && driver_of(state)["ours"] == false)
+        .await;
+
+    drop(planner);
+    let stopped = |state: &Value| {
+        state["mission"]["lost"]["told_to_stop"] == true
+            && driver_of(state)["ours"] == true
+            && driver_of(state)["state"] == "standby"
+    };
+    let state = page.until(stopped).await;
+    assert_eq!(state["mission"]["lost"]["id"], "101.1.36");
+    let push = json!({"type": "drive", "forward": 0.5, "turn": 0.0});
+    let refused = page.ask(push).await.unwrap_err();
+    assert!(refused.contains("resume first"), "{refused}");
+}
