@@ -338,7 +338,11 @@ fn a_release_that_was_lost_is_repeated() {
     drive.world.run(millis(1500));
     drive.world.ra_cut = false;
     drive.world.run(millis(200));
-    assert_eq!(drive.rover().controller, Some((COMMANDER, 127)), "all were lost");
+    assert_eq!(
+        drive.rover().controller,
+        Some((COMMANDER, 127)),
+        "all were lost"
+    );
     drive.control_within(millis(4000));
 }
 
