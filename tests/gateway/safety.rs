@@ -202,6 +202,24 @@ fn a_component_that_is_being_reclaimed_initializes_and_is_not_available() {
 }
 
 #[test]
+fn the_gateway_is_ready_for_a_component_only_while_a_client_has_control_of_it() {
+    let mut drive = Drive::of(33);
+    let state = |drive: &mut Drive| {
+        let driver = RaId::new(SUBSYSTEM, 1, 33, 1);
+        let query = Message::new(driver, COMMANDER, 0x2002, bytes(""));
+        drive.world.ra[drive.ra].heard.clear();
+        drive.world.ra_says(drive.ra, &query);
+        drive.world.ra_heard(drive.ra, 0x4002)[0].data[0]
+    };
+    assert_eq!(state(&mut drive), 0);
+    drive.take_control();
+    assert_eq!(state(&mut drive), 1);
+    assert!(drive.rover().controller_ready);
+    drive.tell(&jaus::messages::core::ReleaseControl {});
+    assert_eq!(state(&mut drive), 0);
+}
+
+#[test]
 fn an_effort_ends_with_its_client_and_so_does_control() {
     let mut drive = Drive::driving();
     drive.world.jaus[drive.operator].up = false;
@@ -315,20 +333,16 @@ fn a_gateway_that_was_suspended_does_not_act_on_what_has_waited_for_it() {
 #[test]
 fn a_release_that_was_lost_is_repeated() {
     let mut drive = Drive::driving();
+    drive.world.ra_cut = true;
     drive.tell(&jaus::messages::core::ReleaseControl {});
-    // The component is ours again, as if all releases had been lost.
     drive.world.run(millis(1500));
-    assert_eq!(drive.rover().controller, None);
-    let regain = Message::new(
-        COMMANDER,
-        RaId::new(SUBSYSTEM, 1, 33, 1),
-        0x000D,
-        bytes("7f"),
+    drive.world.ra_cut = false;
+    drive.world.run(millis(200));
+    assert_eq!(
+        drive.rover().controller,
+        Some((COMMANDER, 127)),
+        "all were lost"
     );
-    let now = drive.world.now;
-    drive.rover().handle_message(now, &regain);
-    assert!(drive.rover().controller.is_some());
-    drive.world.settle();
     drive.control_within(millis(4000));
 }
 

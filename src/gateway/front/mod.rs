@@ -25,6 +25,7 @@ mod ra_event;
 mod ready;
 mod stop;
 mod streams;
+mod subscribed;
 mod target;
 mod voice;
 mod waiting;
@@ -46,6 +47,7 @@ use self::motion::Motion;
 use self::ready::Readiness;
 pub(super) use self::ready::status;
 use self::streams::Streams;
+use self::subscribed::hz_of;
 pub(super) use self::target::Target;
 pub(super) use self::voice::Voice;
 use self::waiting::{Held, Relayed};
@@ -229,24 +231,6 @@ impl Front {
             _ => self.stack.handle_message(now, message),
         }
         self.follow(now, tally);
-    }
-
-    /// A subscription needs a report that can be told at once.
-    fn subscribe(
-        &mut self,
-        now: Instant,
-        message: &Received,
-        wanted: Option<(f64, Bytes)>,
-        tally: &mut Tally,
-    ) {
-        let state = wanted.and_then(|(hz, query)| Some((hz, state_of(&self.words, &query)?)));
-        self.review = Some(now);
-        match state {
-            Some((hz, report)) if !self.is_fresh(now, report) => {
-                self.hold(now, message, report, Some(hz), tally);
-            }
-            _ => self.stack.handle_message(now, message),
-        }
     }
 
     /// A message for the RA component.
@@ -515,22 +499,6 @@ impl Front {
         }
     }
 
-    /// The rates of all that somebody subscribes to, by the code of the RA report.
-    fn wanted(&self) -> BTreeMap<u16, f64> {
-        let mut wanted = BTreeMap::new();
-        let subscribed = self.stack.subscribed();
-        let subscribed = subscribed.filter_map(|(query, hz)| {
-            let hz = hz.unwrap_or(Self::CHANGES_HZ);
-            Some((state_of(&self.words, query)?, hz))
-        });
-        let held = self.held.iter().filter_map(|it| Some((it.report, it.hz?)));
-        for (report, hz) in subscribed.chain(held) {
-            let most = wanted.entry(report).or_insert(hz);
-            *most = hz.max(*most).min(Connections::MAX_RATE);
-        }
-        wanted
-    }
-
     /// Whether everything is released that was controlled on either side.
     pub(super) fn is_released(&self) -> bool {
         self.lease.is_released() && !self.stack.is_releasing()
@@ -593,13 +561,6 @@ impl Front {
     }
 }
 
-fn hz_of(create: &CreateEvent) -> f64 {
-    match create.event_type.0 {
-        0 => create.requested_periodic_rate_hz(),
-        _ => Front::CHANGES_HZ,
-    }
-}
-
 /// What the counterpart of an RA component offers.
 fn offers(ra: RaId, role: Option<&Role>) -> Vec<crate::codec::ServiceId> {
     let guarded = !RaComponent(ra.component).is_infrastructure();
@@ -611,12 +572,4 @@ fn offers(ra: RaId, role: Option<&Role>) -> Vec<crate::codec::ServiceId> {
     ];
     let guards = guards.into_iter().filter(|_| guarded);
     guards.chain(role.map(|role| role.service)).collect()
-}
-
-/// The RA report that answers a JAUS query, if it tells a state.
-fn state_of(words: &Words, query: &Bytes) -> Option<u16> {
-    let code = code_of(query)?;
-    let (code, _) = crosses(code).then(|| words.to_ra(query).ok())??;
-    let report = pairs::report_of(code)?;
-    pairs::state(report).map(|_| report)
 }
