@@ -20,7 +20,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
             println!("{} drives with {ahead:.0} %", from.source);
             throttle.store(ahead as i32, Relaxed);
         })
-        // Standby, an emergency, lost control and shutdown all end here.
+        // Standby, an emergency, lost control, a silent client and shutdown all end here.
         .on_stop(move |_| motor.store(0, Relaxed));
 
     let rover = Component::builder(Kind::Vehicle, "Rover")
@@ -30,9 +30,15 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{} is up; Ctrl-C ends it", rover.id());
 
     let mut standing = rover.watch_standing();
-    while standing.changed().await.is_ok() {
-        let now = rover.standing();
-        println!("{} now, controlled by {:?}", now.state, now.controller);
+    loop {
+        tokio::select! {
+            _ = tokio::signal::ctrl_c() => break,
+            Ok(()) = standing.changed() => {
+                let now = rover.standing();
+                println!("{} now, controlled by {:?}", now.state, now.controller);
+            }
+        }
     }
+    node.shutdown().await; // which stops the motor, too
     Ok(())
 }

@@ -300,14 +300,21 @@ async fn resume_waits_until_the_peer_says_that_it_is_ready() {
     let mut scene = Scene::new();
     let control = scene.controlled().await;
     let peer = &mut scene.peer;
+    // The lease asks for the status besides.
     let answering = async {
         peer.expect::<Resume>().await;
-        for code in [2, 1] {
+        for code in [2, 2].into_iter().chain(std::iter::repeat(1)) {
             peer.expect::<QueryStatus>().await;
             peer.say(&status(code));
         }
     };
-    let (resumed, ()) = within_limit(async { tokio::join!(control.resume(), answering) }).await;
+    let resumed = within_limit(async {
+        tokio::select! {
+            resumed = control.resume() => resumed,
+            () = answering => unreachable!(),
+        }
+    })
+    .await;
     resumed.unwrap();
     let answering = async {
         loop {

@@ -185,11 +185,13 @@ async fn a_motor_fault_stops_both_sides_and_is_a_failure_until_it_is_gone() {
     scene
         .until_state(PRIMITIVE, State::Failure, &control, &ahead())
         .await;
-    let stage = scene.stage(PRIMITIVE).await.unwrap();
-    assert_eq!(
-        (stage.state, stage.reason.as_str()),
-        (StageState::Blocked, "no current")
-    );
+    scene
+        .until("the reason", || async {
+            let stage = scene.stage(PRIMITIVE).await?;
+            let is_told = stage.state == StageState::Blocked && stage.reason == "no current";
+            is_told.then_some(())
+        })
+        .await;
     tokio::time::sleep(Duration::from_secs(1)).await;
     let before = scene.wheels().await;
     tokio::time::sleep(Duration::from_millis(300)).await;
@@ -344,6 +346,19 @@ async fn motors_are_commanded_to_stop_when_the_part_is_stopped() {
         .await;
 }
 
+/// Lets a writer go that waits for a reader of this file, so that a test that fails ends.
+struct Stall(PathBuf);
+
+impl Drop for Stall {
+    fn drop(&mut self) {
+        let file = self.0.clone();
+        if file.exists() {
+            std::thread::spawn(move || std::fs::read(file));
+            std::thread::sleep(Duration::from_millis(500));
+        }
+    }
+}
+
 /// Milliseconds since midnight.
 fn milliseconds(stamp: TimeStamp) -> i64 {
     let minutes = i64::from(stamp.hour()) * 60 + i64::from(stamp.minutes());
@@ -360,6 +375,7 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
     let stalled = directory.join("pose.toml.new");
     let made = Command::new("mkfifo").arg(&stalled).status().unwrap();
     assert!(made.success());
+    let _stall = Stall(stalled.clone());
     let scene = Scene::new();
     let wheels = scene.start(PRIMITIVE, |seat| PrimitiveDriver::default().run(seat));
     let sensor = PoseSensor {

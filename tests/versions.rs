@@ -43,11 +43,11 @@ fn both(heard: mpsc::UnboundedSender<Heard>) -> Handlers {
     let newer = heard.clone();
     Handlers::new(V1_1)
         .and_version(V1_0)
-        .receive(move |vector: mobility::SetLocalVector, _, _| {
+        .receive_unguarded(move |vector: mobility::SetLocalVector, _, _| {
             let speed = Some(vector.speed_m_per_s());
             newer.send(("1.1", speed, vector.heading_rad())).unwrap();
         })
-        .receive(move |vector: v1_0::SetLocalVector, _, _| {
+        .receive_unguarded(move |vector: v1_0::SetLocalVector, _, _| {
             let (speed, heading) = (vector.speed_m_per_s(), vector.heading_rad());
             heard.send(("1.0", speed, heading)).unwrap();
         })

@@ -138,7 +138,9 @@ impl Actuator for PulseMotor {
     }
 
     fn fault(&self) -> Option<String> {
-        self.shared.lock().fault.clone()
+        let fault = self.shared.lock().fault.clone();
+        let has_ended = self.thread.as_ref().is_some_and(JoinHandle::is_finished);
+        fault.or_else(|| has_ended.then(|| "the thread that sends pulses has ended".to_owned()))
     }
 }
 

@@ -2,10 +2,6 @@
 //!
 //! A program runs on one thread: its component, its control loops and this watchdog. A loop that
 //! hangs therefore ends the pings, and systemd starts the program again after `WatchdogSec=`.
-#![expect(
-    clippy::disallowed_methods,
-    reason = "the watchdog is fed in real time"
-)]
 
 #[cfg(unix)]
 use std::ffi::OsStr;

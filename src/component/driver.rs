@@ -1,7 +1,7 @@
 //! The task of a component: it gives the services messages and the time, and carries out what
 //! they want. However it ends, the services stop what they move.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -13,12 +13,12 @@ use super::clients::{Clients, Goodbye, Hold};
 use super::watch::Outlet;
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::endpoint::Received;
+use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::QueryHeartbeatPulse;
 use crate::node::{self, Port, Resident};
 use crate::service::{
     Change, Condition, Directory, Event, Inquiry, NoAnswer, Patience, Service, Stack, Standing,
-    StopCause, UnsafeService,
+    UnsafeService,
 };
 
 /// What the application wants of its component.
@@ -71,8 +71,7 @@ pub(super) struct Driver {
     stack: Stack,
     port: Port,
     resident: Resident,
-    /// Probes that wait to be acknowledged, each with its receiver.
-    unacknowledged: JoinSet<Option<JausId>>,
+    probes: Probes,
     inbox: mpsc::Receiver<Command>,
     publisher: Publisher,
     patience: Patience,
@@ -94,7 +93,7 @@ impl Driver {
             stack,
             resident: port.reside(),
             port,
-            unacknowledged: JoinSet::new(),
+            probes: Probes::default(),
             inbox,
             publisher,
             patience,
@@ -129,8 +128,10 @@ impl Driver {
                 Some(goodbye) = self.goodbyes.recv() => {
                     self.clients.part(&mut self.stack, goodbye);
                 }
-                Some(acknowledged) = self.unacknowledged.join_next() => {
-                    self.note_acknowledged(acknowledged.ok().flatten());
+                Some((peer, delivered)) = self.probes.next() => {
+                    if delivered {
+                        self.stack.handle_acknowledged(Instant::now(), peer);
+                    }
                 }
                 () = sleep_until(wake) => self.stack.handle_timeout(Instant::now()),
             }
@@ -145,17 +146,10 @@ impl Driver {
         }
     }
 
-    fn note_acknowledged(&mut self, peer: Option<JausId>) {
-        if let Some(peer) = peer {
-            self.stack.handle_acknowledged(Instant::now(), peer);
-        }
-    }
-
     /// Stops what the services move, gives back what others keep for this component, and waits for a
     /// moment until they have confirmed that.
     async fn leave(mut self) {
         let now = Instant::now();
-        self.stack.stop(&StopCause::Ended);
         self.stack.take_leave(now);
         self.settle();
         let end = now + Self::LEAVE;
@@ -253,16 +247,16 @@ impl Driver {
             port,
             clients,
             patience,
-            unacknowledged,
+            probes,
             ..
         } = self;
         clients.obey(stack, hold, *patience, |stack| {
-            transmit(stack, port, unacknowledged)
+            transmit(stack, port, probes)
         });
     }
 
     fn transmit(&mut self) -> Result<(), node::SendError> {
-        transmit(&mut self.stack, &self.port, &mut self.unacknowledged)
+        transmit(&mut self.stack, &self.port, &mut self.probes)
     }
 
     /// Gives up the questions whose askers have gone away.
@@ -278,30 +272,53 @@ impl Driver {
     }
 }
 
-/// The most probes whose acknowledgement is waited for at a time.
-const MOST_UNACKNOWLEDGED: usize = 64;
+/// Probes that wait to be acknowledged: one for each peer at a time, so that a silent one does not fill
+/// its window.
+#[derive(Default)]
+struct Probes {
+    tasks: JoinSet<(JausId, bool)>,
+    peers: BTreeSet<JausId>,
+}
+
+impl Probes {
+    /// The most peers; it is more than a component probes within the lifetime of a probe.
+    const MOST: usize = 512;
+
+    /// Sends a probe and waits for its acknowledgement, or sends it without one.
+    fn send(&mut self, port: &Port, mut probe: Outgoing) -> Result<(), node::SendError> {
+        let peer = probe.destination;
+        if self.peers.len() >= Self::MOST || !self.peers.insert(peer) {
+            probe.acknowledge = false;
+            return port.send(probe).map(drop);
+        }
+        let sender = port.sender();
+        self.tasks.spawn(async move {
+            let delivered = sender.deliver(probe).await;
+            (peer, delivered.is_ok())
+        });
+        Ok(())
+    }
+
+    /// The next peer of which it is known whether it has acknowledged; `None` while there is none.
+    async fn next(&mut self) -> Option<(JausId, bool)> {
+        let (peer, delivered) = self.tasks.join_next().await?.ok()?;
+        self.peers.remove(&peer);
+        Some((peer, delivered))
+    }
+}
 
 /// Sends everything; returns the first error.
-fn transmit(
-    stack: &mut Stack,
-    port: &Port,
-    unacknowledged: &mut JoinSet<Option<JausId>>,
-) -> Result<(), node::SendError> {
+fn transmit(stack: &mut Stack, port: &Port, probes: &mut Probes) -> Result<(), node::SendError> {
     let mut result = Ok(());
     while let Some(message) = stack.poll_transmit() {
         // An acknowledged probe is a sign of life.
         let is_probe = message
             .payload
             .starts_with(&QueryHeartbeatPulse::CODE.to_le_bytes());
-        if message.acknowledge && is_probe && unacknowledged.len() < MOST_UNACKNOWLEDGED {
-            let (sender, peer) = (port.sender(), message.destination);
-            unacknowledged.spawn(async move {
-                let delivered = sender.deliver(message).await;
-                delivered.ok().map(|()| peer)
-            });
-            continue;
-        }
-        let sent = port.send(message).map(|_| ());
+        let sent = match message.acknowledge && is_probe {
+            true => probes.send(port, message),
+            false => port.send(message).map(drop),
+        };
         result = result.and(sent);
     }
     result

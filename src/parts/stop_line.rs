@@ -5,10 +5,10 @@
 )]
 
 use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::sync::watch;
 
@@ -18,6 +18,9 @@ use crate::actuator::{Interlock, StopInput};
 #[derive(Debug)]
 pub(super) struct StopLine {
     pressed: watch::Receiver<Option<String>>,
+    interlock: Interlock,
+    /// When the line was read last.
+    read_at: Arc<Mutex<Instant>>,
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -25,6 +28,8 @@ pub(super) struct StopLine {
 impl StopLine {
     /// Between two readings.
     const PERIOD: Duration = Duration::from_millis(10);
+    /// A reading that takes longer counts as an open line.
+    const STUCK: Duration = Duration::from_millis(500);
 
     /// Begins to read.
     ///
@@ -35,10 +40,13 @@ impl StopLine {
         let (tell, pressed) = watch::channel(first);
         let ends = Arc::new(AtomicBool::new(false));
         let end = Arc::clone(&ends);
+        let read_at = Arc::new(Mutex::new(Instant::now()));
+        let (reading, opens) = (Arc::clone(&read_at), interlock.clone());
         let thread = std::thread::Builder::new().name("stop input".to_owned());
         let thread = thread.spawn(move || {
             while !end.load(Ordering::Relaxed) {
-                let open = read(input.as_mut(), &interlock);
+                let open = read(input.as_mut(), &opens);
+                *reading.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
                 tell.send_if_modified(|before| {
                     let is_news = *before != open;
                     *before = open;
@@ -49,6 +57,8 @@ impl StopLine {
         })?;
         Ok(Self {
             pressed,
+            interlock,
+            read_at,
             ends,
             thread: Some(thread),
         })
@@ -56,11 +66,17 @@ impl StopLine {
 
     /// Why the line is open; `None` while it is closed.
     pub(super) fn pressed(&mut self) -> Option<String> {
-        // A thread that has ended reads nothing any more.
-        if self.pressed.has_changed().is_err() {
+        // A thread that has ended, or waits for its driver, reads nothing any more.
+        if self.pressed.has_changed().is_err() || self.is_stuck() {
+            self.interlock.open();
             return Some("the stop input is not read any more".to_owned());
         }
         self.pressed.borrow_and_update().clone()
+    }
+
+    fn is_stuck(&self) -> bool {
+        let read_at = *self.read_at.lock().unwrap_or_else(PoisonError::into_inner);
+        read_at.elapsed() > Self::STUCK
     }
 
     /// Waits until the line is opened or closed.
@@ -75,7 +91,7 @@ impl StopLine {
 impl Drop for StopLine {
     fn drop(&mut self) {
         self.ends.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
+        if let Some(thread) = self.thread.take().filter(|_| !self.is_stuck()) {
             // A thread that has panicked reads nothing either.
             let _ = thread.join();
         }

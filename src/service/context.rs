@@ -19,8 +19,8 @@ pub(crate) struct News {
     pub(crate) changed: BTreeSet<u16>,
     /// The codes of commands that have come to an end, and whether to the wanted one.
     pub(crate) ended: Vec<(u16, bool)>,
-    /// A service has found out that something is broken, or that it is no more.
-    pub(crate) fault: Option<Result<(), StopCause>>,
+    /// What services have found broken, and how many have recovered, in this order.
+    pub(crate) faults: Vec<Result<(), StopCause>>,
 }
 
 /// One service's view of its component while it handles something.
@@ -67,14 +67,16 @@ impl<'a> Context<'a> {
     }
 
     /// Reports that something is broken: a component with Management goes to
-    /// [`State::Failure`](super::State::Failure), which ends control, until the service [recovers](Self::recover).
+    /// [`State::Failure`](super::State::Failure), which ends control, until each
+    /// service that has failed has [recovered](Self::recover) as often.
     pub fn fail(&mut self, cause: StopCause) {
-        self.news.fault = Some(Err(cause));
+        self.news.faults.push(Err(cause));
     }
 
-    /// Reports that what led to [`fail`](Self::fail) is no more: the component goes to standby.
+    /// Reports that what led to one [`fail`](Self::fail) is no more. The component goes to standby when
+    /// nothing is broken any more.
     pub fn recover(&mut self) {
-        self.news.fault = Some(Ok(()));
+        self.news.faults.push(Ok(()));
     }
 
     /// Sends a message to one component.

@@ -81,6 +81,8 @@ pub enum StopCause {
     ControlChanged,
     /// The component is in standby, or begins anew.
     Standby,
+    /// The application has stopped it.
+    Requested,
     /// A client or a stop input has set an emergency.
     Emergency,
     /// Something is broken.
@@ -122,6 +124,7 @@ impl fmt::Display for StopCause {
             Self::ControllerSilent(client) => write!(f, "{client} shows no life"),
             Self::ControlChanged => f.write_str("control was released, lost or taken over"),
             Self::Standby => f.write_str("the component is in standby"),
+            Self::Requested => f.write_str("the application has stopped it"),
             Self::Emergency => f.write_str("emergency"),
             Self::Failure => f.write_str("the component has failed"),
             Self::Shutdown => f.write_str("the component shuts down"),
@@ -211,7 +214,8 @@ impl MotionGuard {
         let setpoint = self.setpoint?;
         match (setpoint.validity, self.policy) {
             (Validity::UntilDone, _) => None,
-            (Validity::Brief, MotionPolicy::Expire(brief)) => Some(setpoint.since + brief),
+            // A duration that cannot be added never ends, as one that is meant to.
+            (Validity::Brief, MotionPolicy::Expire(brief)) => setpoint.since.checked_add(brief),
             (Validity::Brief, MotionPolicy::Hold) | (Validity::WhileAlive, _) => {
                 Some(setpoint.alive + Self::LIFE)
             }

@@ -110,6 +110,13 @@ impl Handlers {
         mut self,
         mut function: impl FnMut(Q) -> R + Send + 'static,
     ) -> Self {
+        const {
+            assert!(
+                !Q::NEEDS_CONTROL,
+                "this is a command of a service with Access Control, not a query: take it with \
+                 `command` or `configure`"
+            );
+        }
         self.handle::<Q>(move |received, context| {
             let query = Q::decode(&received.payload)?;
             context.reply(received, &function(query));
@@ -147,7 +154,8 @@ impl Handlers {
     }
 
     /// Takes messages of type `M` from the client in control, and ignores all others: what sets
-    /// something up. The component must offer Access Control or Management.
+    /// something up. The component must offer Access Control or Management. It is not for what moves
+    /// something: the command is obeyed in every state, and nothing stops it.
     #[must_use]
     pub fn configure<M: Message>(
         mut self,
@@ -298,6 +306,10 @@ impl Service for Handlers {
 
     fn depends_on(&self) -> Option<JausId> {
         self.guard.depends_on()
+    }
+
+    fn is_moving(&self) -> bool {
+        self.guard.is_active()
     }
 
     fn hazards(&self) -> Hazards {

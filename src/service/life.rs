@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`Life::MOVING`] | while something moves on its word: Query Heartbeat Pulse, four times a second |
 //! | [`Life::SILENCE`] | Query Heartbeat Pulse, once a second, acknowledgement wanted |
-//! | [`Life::DEATH`] | dead, if it ever answered a probe; a peer that never did is left to the timeout of control |
+//! | [`Life::DEATH`] | dead, if it ever answered or acknowledged a probe; a peer that never did is left to the timeout of control |
 //!
 //! Any message is a sign of life. A transport acknowledgement counts only for peers that have never
 //! answered a probe by a message: a node acknowledges on behalf of a component that hangs.
@@ -23,7 +23,7 @@ use crate::codec::Message;
 use crate::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse};
 use crate::wire::Priority;
 
-/// Why a peer is watched. The lesser ranks are probed within a budget, the first ones always.
+/// Why a peer is watched. The client in control is probed always, the others within a budget.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Rank {
     /// It holds subscriptions.
@@ -43,6 +43,7 @@ pub(crate) struct Life {
     /// One entry for each peer: when to look at it again.
     due: BTreeSet<(Instant, JausId)>,
     subscriber_probes: Budget,
+    setter_probes: Budget,
     dead: VecDeque<JausId>,
 }
 
@@ -55,6 +56,9 @@ struct Peer {
     acknowledges: bool,
     /// Probes since the last sign of life.
     probes: u32,
+    /// Whether it has ever been probed. A client in control is, however busy it is: only who answers
+    /// by a message is known to do so.
+    is_known: bool,
     look: Instant,
 }
 
@@ -65,15 +69,17 @@ impl Life {
     pub(crate) const MOVING: Duration = Duration::from_millis(250);
     /// A peer that answers probes and has been silent for so long is dead.
     pub(crate) const DEATH: Duration = Duration::from_secs(4);
-    /// Probes to mere subscribers: a burst of so many, then one in this time.
-    const SUBSCRIBER_BURST: u32 = 32;
-    const SUBSCRIBER_REFILL: Duration = Duration::from_millis(50);
+    /// Probes to subscribers, and those to setters of emergencies: a burst of so many, then one in this
+    /// time. Their ids may be forged.
+    const BURST: u32 = 32;
+    const REFILL: Duration = Duration::from_millis(50);
 
     pub(crate) const fn new() -> Self {
         Self {
             peers: BTreeMap::new(),
             due: BTreeSet::new(),
-            subscriber_probes: Budget::new(Self::SUBSCRIBER_BURST, Self::SUBSCRIBER_REFILL),
+            subscriber_probes: Budget::new(Self::BURST, Self::REFILL),
+            setter_probes: Budget::new(Self::BURST, Self::REFILL),
             dead: VecDeque::new(),
         }
     }
@@ -88,6 +94,7 @@ impl Life {
                 answers: false,
                 acknowledges: false,
                 probes: 0,
+                is_known: false,
                 look: now + rank.patience(),
             }
         });
@@ -152,10 +159,17 @@ impl Life {
                         self.dead.push_back(id);
                         continue;
                     }
-                    if silence >= rank.patience()
-                        && (rank > Rank::Subscriber || self.subscriber_probes.take(now))
-                    {
-                        peer.probes = peer.probes.saturating_add(1);
+                    let is_due = silence >= rank.patience() || !peer.is_known;
+                    let has_budget = match rank {
+                        Rank::Subscriber => self.subscriber_probes.take(now),
+                        Rank::EmergencySetter => self.setter_probes.take(now),
+                        Rank::Controller | Rank::MovingController => true,
+                    };
+                    if is_due && has_budget {
+                        peer.is_known = true;
+                        peer.probes = peer
+                            .probes
+                            .saturating_add(u32::from(silence >= rank.patience()));
                         out.send_acknowledged(id, Priority::High, &QueryHeartbeatPulse {});
                     }
                     peer.look = peer.next_look(now, rank);
@@ -197,7 +211,7 @@ impl Peer {
     /// The next probe, or the moment of death if that comes first.
     fn next_look(&self, now: Instant, rank: Rank) -> Instant {
         let probe = if self.probes == 0 {
-            (self.alive + rank.patience()).max(now + Duration::from_millis(1))
+            (self.alive + rank.patience()).max(now + rank.patience() / 5)
         } else {
             now + rank.patience()
         };

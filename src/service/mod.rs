@@ -119,6 +119,11 @@ pub trait Service: Send {
         None
     }
 
+    /// Whether a command that moves something is in force.
+    fn is_moving(&self) -> bool {
+        false
+    }
+
     /// Which commands this service takes, and how it stops: what it needs beside it to be safe.
     fn hazards(&self) -> Hazards {
         Hazards::default()

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
@@ -36,14 +36,22 @@ pub struct Stack {
     life: Life,
     /// The client in control whose death would go unnoticed, once that is logged.
     mute: Option<JausId>,
-    /// Whether a service has put the component into failure.
-    is_faulty: bool,
+    faults: Faults,
     news: News,
     inquiries: Inquiries,
     subscriptions: Subscriptions,
     controls: Controls,
     out: Outbox,
     events: VecDeque<Event>,
+}
+
+/// What keeps the component in failure.
+#[derive(Debug, Default)]
+struct Faults {
+    /// Faults that services have reported and not recovered from.
+    of_services: u32,
+    /// Whether the application says that it has failed.
+    of_application: bool,
 }
 
 /// What a component should know.
@@ -64,6 +72,10 @@ pub enum Event {
 }
 
 impl Stack {
+    /// A component that is called so much later than it asked for was held up, with all that steers
+    /// what it moves.
+    const HUNG: Duration = Duration::from_millis(500);
+
     /// A component with its discovery and what else it offers.
     #[must_use]
     pub fn new(discovery: Discovery, services: Vec<Box<dyn Service>>) -> Self {
@@ -76,7 +88,7 @@ impl Stack {
             standing: Standing::default(),
             life: Life::new(),
             mute: None,
-            is_faulty: false,
+            faults: Faults::default(),
             news: News::default(),
             inquiries: Inquiries::default(),
             subscriptions: Subscriptions::default(),
@@ -168,7 +180,23 @@ impl Stack {
 
     /// The application tells how the component is, which Management shows.
     pub fn set_condition(&mut self, now: Instant, condition: Condition) {
-        self.control.handle_condition(condition, &mut self.out);
+        match condition {
+            Condition::Initialized => {
+                self.faults.of_application = false;
+                if self.faults.of_services == 0 || self.control.is_initializing() {
+                    self.control.handle_condition(condition, &mut self.out);
+                }
+                if self.faults.of_services > 0 {
+                    self.control
+                        .handle_condition(Condition::Failed, &mut self.out);
+                }
+            }
+            Condition::Failed => {
+                self.faults.of_application = true;
+                self.control.handle_condition(condition, &mut self.out);
+            }
+            Condition::Safe => self.control.handle_condition(condition, &mut self.out),
+        }
         self.collect(now);
     }
 
@@ -192,8 +220,7 @@ impl Stack {
 
     /// A message for this component has arrived.
     pub fn handle_message(&mut self, now: Instant, message: &Received) {
-        // Control that has timed out is not renewed by a message that waited.
-        self.control.handle_timeout(now, &mut self.out);
+        self.end_overdue(now);
         self.life
             .hear(now, message.source, code_of(&message.payload));
         self.discovery.hear(now, message.source);
@@ -223,6 +250,21 @@ impl Stack {
             }
             None => {}
         }
+    }
+
+    /// Ends control that has timed out, and what a component that was held up has moved: messages that
+    /// have waited change nothing about that.
+    fn end_overdue(&mut self, now: Instant) {
+        let late = self
+            .poll_timeout()
+            .map_or(Duration::ZERO, |due| now.saturating_duration_since(due));
+        if late > Self::HUNG && self.services.iter().any(|service| service.is_moving()) {
+            tracing::error!(id = %self.out.source(), ?late, "stopped: the component was held up");
+            self.stop(&StopCause::Hung(late));
+            self.control.drop_controller(&mut self.out);
+        }
+        self.control.handle_timeout(now, &mut self.out);
+        self.follow_control(now);
     }
 
     fn handle_control(&mut self, now: Instant, message: &Received) -> Handled {
@@ -315,7 +357,9 @@ impl Stack {
         if discovered == Handled::No && self.handle_control(now, &message) == Handled::No {
             self.handle_by_services(now, &message);
         }
-        self.news = news;
+        let found = std::mem::replace(&mut self.news, news);
+        self.news.faults.extend(found.faults);
+        self.news.ended.extend(found.ended);
         let mut said = std::mem::replace(&mut self.out, out);
         std::iter::from_fn(|| said.pop())
             .find(|answer| answer.destination == client)
@@ -412,7 +456,12 @@ impl Stack {
     }
 
     /// Ends all subscriptions and gives back all control.
+    ///
+    /// Whatever the services move stops, and no command is obeyed any more.
     pub fn take_leave(&mut self, now: Instant) {
+        self.stop(&StopCause::Ended);
+        self.control.end(&mut self.out);
+        self.follow_control(now);
         self.subscriptions.farewell(now, &mut self.out);
         self.controls.farewell(now, &mut self.out);
     }
@@ -503,8 +552,8 @@ impl Stack {
     }
 
     fn wake(&mut self, now: Instant) {
+        self.end_overdue(now);
         self.discovery.handle_timeout(now, &mut self.out);
-        self.control.handle_timeout(now, &mut self.out);
         self.probe(now);
         self.subscribers.expire(now, &mut self.out);
         for service in &mut self.services {
@@ -546,16 +595,14 @@ impl Stack {
         let controller = self.standing.controller.map(|it| it.id);
         let mute =
             controller.filter(|&id| !self.control.has_timeout() && self.life.is_mute(now, id));
-        if let Some(client) = mute
-            && self.mute != mute
-        {
+        if let Some(client) = mute.filter(|_| self.mute != mute) {
             tracing::warn!(
                 id = %self.out.source(), %client,
                 "the client in control answers no Query Heartbeat Pulse, and control has no \
                  timeout: only standby, release or an emergency will stop what it has set in motion"
             );
-            self.mute = mute;
         }
+        self.mute = mute;
     }
 
     /// Watches the client in control, and those on whose life a motion depends.
@@ -572,20 +619,29 @@ impl Stack {
 
     /// A service has found out that something is broken, or mended.
     fn follow_faults(&mut self) {
-        let condition = match self.news.fault.take() {
-            Some(Err(cause)) => {
-                tracing::error!(id = %self.out.source(), %cause, "failure");
-                self.is_faulty = true;
-                Condition::Failed
+        for fault in std::mem::take(&mut self.news.faults) {
+            let id = self.out.source();
+            let before = self.faults.of_services;
+            match fault {
+                Err(cause) => {
+                    tracing::error!(%id, %cause, "failure");
+                    self.faults.of_services = before.saturating_add(1);
+                    // While it gets ready it counts afterwards.
+                    if !self.control.is_initializing() {
+                        self.control
+                            .handle_condition(Condition::Failed, &mut self.out);
+                    }
+                }
+                Ok(()) => {
+                    self.faults.of_services = before.saturating_sub(1);
+                    if before == 1 && !self.faults.of_application && self.control.has_failed() {
+                        tracing::warn!(%id, "the failure is over");
+                        self.control
+                            .handle_condition(Condition::Initialized, &mut self.out);
+                    }
+                }
             }
-            Some(Ok(())) if self.is_faulty => {
-                tracing::info!(id = %self.out.source(), "the failure is over");
-                self.is_faulty = false;
-                Condition::Initialized
-            }
-            Some(Ok(())) | None => return,
-        };
-        self.control.handle_condition(condition, &mut self.out);
+        }
     }
 
     fn collect(&mut self, now: Instant) {
@@ -598,6 +654,9 @@ impl Stack {
             self.news.changed.extend(Discovery::QUERIES);
             self.events.push_back(Event::Change(change));
         }
+        self.follow_faults();
+        self.follow_control(now);
+        // A stop may itself find something broken.
         self.follow_faults();
         self.follow_control(now);
         self.watch_clients(now);
@@ -642,12 +701,13 @@ impl Stack {
 
     /// Sends what clients have subscribed to and is due, or has changed.
     fn tell_subscribers(&mut self, now: Instant) {
-        let news = std::mem::take(&mut self.news);
-        for (command, successful) in news.ended {
+        let ended = std::mem::take(&mut self.news.ended);
+        let changed = std::mem::take(&mut self.news.changed);
+        for (command, successful) in ended {
             let events = &mut self.subscribers;
             events.end_command(command, successful, &mut self.out);
         }
-        for query in news.changed {
+        for query in changed {
             self.subscribers.handle_change(now, query);
         }
         while let Some(due) = self.subscribers.poll_due(now) {

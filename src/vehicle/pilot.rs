@@ -233,7 +233,7 @@ impl Pilot {
         let Motion {
             pose, sampled_at, ..
         } = self.motion();
-        if pose.x.is_nan() || pose.y.is_nan() || pose.yaw.is_nan() {
+        if ![pose.x, pose.y, pose.yaw].iter().all(|it| it.is_finite()) {
             return Some(Trouble::PoseUnknown);
         }
         let age = now.saturating_duration_since(sampled_at?);

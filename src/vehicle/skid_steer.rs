@@ -78,8 +78,9 @@ impl SkidSteer {
         let (speed, turn) = self.wheels;
         let (speed, turn) = match self.command {
             Drive::Stop => (
-                approach(speed, 0.0, limits.deceleration * seconds),
-                approach(turn, 0.0, limits.yaw_acceleration * seconds),
+                // The brakes are the platform's own, however gently a client wants to slow down.
+                approach(speed, 0.0, self.config.limits.deceleration * seconds),
+                approach(turn, 0.0, self.config.limits.yaw_acceleration * seconds),
             ),
             Drive::Velocity(wanted) => {
                 let wanted = limits.clamp(wanted);

@@ -148,7 +148,7 @@ impl Control {
     }
 
     /// Ends control and says so; what was ready falls back to standby.
-    pub(super) fn drop_controller(&mut self, out: &mut Outbox) {
+    pub(in crate::service) fn drop_controller(&mut self, out: &mut Outbox) {
         self.deadline = None;
         if let Some(controller) = self.standing.controller.take() {
             reject(controller, Rejection::CONTROL_RELEASED, out);

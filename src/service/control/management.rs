@@ -10,9 +10,9 @@ use crate::messages::core::{
 };
 use crate::service::{Handled, Outbox, State};
 
-/// The most clients whose emergencies are remembered; those of others last until these have been
-/// cleared.
-const MOST_EMERGENCIES: usize = 64;
+/// The most clients whose emergencies are remembered. One more takes the place of one that shows no life;
+/// if there is none, its emergency is cleared by the client in control.
+const MOST_EMERGENCIES: usize = 1024;
 
 impl Condition {
     const fn leads_from(self, state: State) -> State {
@@ -40,8 +40,8 @@ impl Control {
             Reset::CODE => self.reset(client, out),
             Shutdown::CODE => self.shut_down(client, out),
             // Whatever the code of the emergency is: stopping is always right.
-            SetEmergency::CODE => self.set_emergency(client),
-            ClearEmergency::CODE => self.clear_emergency(client, is_alive),
+            SetEmergency::CODE => self.set_emergency(client, is_alive),
+            ClearEmergency::CODE => self.clear_emergency(client, is_alive, out),
             _ => return Handled::No,
         }
         Handled::Yes
@@ -55,7 +55,8 @@ impl Control {
         if condition == Condition::Safe && self.standing.state == State::Emergency {
             tracing::warn!(id = %out.source(), "the emergency is cleared on the vehicle itself");
             self.emergencies.clear();
-            self.end_emergency();
+            self.more_emergencies = false;
+            self.end_emergency(out);
         }
         // Told during an emergency, the others count afterwards.
         let state = match &mut self.standing.state {
@@ -110,7 +111,14 @@ impl Control {
         }
     }
 
-    fn set_emergency(&mut self, client: JausId) {
+    fn set_emergency(&mut self, client: JausId, is_alive: impl Fn(JausId) -> bool) {
+        if self.emergencies.len() >= MOST_EMERGENCIES && !self.emergencies.contains(&client) {
+            let dead = self.emergencies.iter().find(|&&it| !is_alive(it)).copied();
+            match dead {
+                Some(dead) => _ = self.emergencies.remove(&dead),
+                None => self.more_emergencies = true,
+            }
+        }
         if self.emergencies.len() < MOST_EMERGENCIES && self.emergencies.insert(client) {
             tracing::warn!(%client, "emergency");
         }
@@ -125,22 +133,37 @@ impl Control {
     }
 
     /// Clears the emergency of a client; for the client in control also those of the dead.
-    fn clear_emergency(&mut self, client: JausId, is_alive: impl Fn(JausId) -> bool) {
+    fn clear_emergency(
+        &mut self,
+        client: JausId,
+        is_alive: impl Fn(JausId) -> bool,
+        out: &mut Outbox,
+    ) {
         let mut cleared = self.emergencies.remove(&client);
         if self.is_controller(client) {
-            for setter in self.emergencies.extract_if(.., |&setter| !is_alive(setter)) {
-                tracing::warn!(%client, %setter, "cleared the emergency of a client that shows no life");
-                cleared = true;
-            }
+            self.emergencies.retain(|&setter| {
+                let stays = is_alive(setter);
+                if !stays {
+                    tracing::warn!(%client, %setter, "cleared the emergency of a silent client");
+                    cleared = true;
+                }
+                stays
+            });
+            cleared |= self.emergencies.is_empty() && std::mem::take(&mut self.more_emergencies);
         }
-        if cleared && self.emergencies.is_empty() {
+        if cleared && self.emergencies.is_empty() && !self.more_emergencies {
             tracing::warn!(%client, "the last emergency is cleared");
-            self.end_emergency();
+            self.end_emergency(out);
         }
     }
 
-    const fn end_emergency(&mut self) {
-        if matches!(self.standing.state, State::Emergency) {
+    /// Control may have been had to clear the emergency; what cannot be controlled otherwise is not
+    /// controlled afterwards.
+    fn end_emergency(&mut self, out: &mut Outbox) {
+        if self.standing.state == State::Emergency {
+            if !matches!(self.resting, State::Standby | State::Ready) {
+                self.drop_controller(out);
+            }
             self.standing.state = self.resting;
         }
     }

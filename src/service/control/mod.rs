@@ -149,8 +149,10 @@ pub(super) struct Control {
     standing: Standing,
     /// When control ends unless it is renewed.
     deadline: Option<Instant>,
-    /// Who has set an emergency and not cleared it.
+    /// The clients that have set an emergency and not cleared it.
     emergencies: BTreeSet<JausId>,
+    /// Whether there were more than can be remembered.
+    more_emergencies: bool,
     /// Where an emergency leads back to.
     resting: State,
 }
@@ -258,6 +260,31 @@ impl Control {
     /// Whether a client has set an emergency that is not over.
     pub(super) fn has_emergency_of(&self, client: JausId) -> bool {
         self.emergencies.contains(&client)
+    }
+
+    /// Whether the application is still getting ready, also beneath an emergency.
+    pub(super) fn is_initializing(&self) -> bool {
+        self.beneath_emergency() == State::Initialize
+    }
+
+    /// Whether something is broken, also beneath an emergency.
+    pub(super) fn has_failed(&self) -> bool {
+        self.beneath_emergency() == State::Failure
+    }
+
+    const fn beneath_emergency(&self) -> State {
+        match self.standing.state {
+            State::Emergency => self.resting,
+            state => state,
+        }
+    }
+
+    /// The component ends: nobody is in control any more, and with Management nobody can be.
+    pub(super) fn end(&mut self, out: &mut Outbox) {
+        self.drop_controller(out);
+        if self.management.is_some() {
+            self.standing.state = State::Shutdown;
+        }
     }
 
     /// Begins the timeout anew.

@@ -50,9 +50,6 @@ impl Travel {
     }
 }
 
-/// A vehicle under way that is looked at only after so long was held up with all that steers it:
-/// what its client wanted before counts no more.
-const HUNG: Duration = Duration::from_millis(500);
 /// Between two looks at a vehicle in trouble.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -92,16 +89,16 @@ impl Cockpit {
     /// Moves on to `now`, and stops at the end of the setpoint in force, or in trouble.
     pub(super) fn advance(&mut self, now: Instant, context: &mut Context<'_>) {
         self.guard.note_life(|owner| context.last_sign(owner));
-        let gap = now.saturating_duration_since(self.looked.unwrap_or(now));
-        let is_hung = gap > HUNG && self.pilot.is_under_way();
         self.advance_within(now);
         if let Some(cause) = self.guard.expire(now) {
             self.halt(&cause);
         }
         self.pilot.handle_time(now);
         self.looked = Some(now);
-        let hung = is_hung.then_some(StopCause::Hung(gap));
-        self.follow_trouble(hung, now, context);
+        if self.pilot.is_there() && self.travel.active.is_none() {
+            self.guard.finish();
+        }
+        self.follow_trouble(now, context);
     }
 
     /// Moves on to `now`, but not beyond the end of the setpoint in force.
@@ -120,9 +117,9 @@ impl Cockpit {
     }
 
     /// A vehicle in trouble puts its component into failure, until the trouble is gone.
-    fn follow_trouble(&mut self, hung: Option<StopCause>, now: Instant, context: &mut Context<'_>) {
+    fn follow_trouble(&mut self, now: Instant, context: &mut Context<'_>) {
         let trouble = self.pilot.take_trouble().or_else(|| self.pilot.fault());
-        if let Some(cause) = hung.or_else(|| trouble.map(StopCause::from)) {
+        if let Some(cause) = trouble.map(StopCause::from) {
             if self.trouble.is_none() {
                 self.halt(&cause);
                 context.fail(cause.clone());
@@ -130,7 +127,7 @@ impl Cockpit {
             }
         } else if let Some(cause) = &self.trouble {
             let is_gone = match cause {
-                StopCause::Fault(_) | StopCause::Hung(_) => true,
+                StopCause::Fault(_) => true,
                 _ => self.pilot.pose_trouble(now).is_none(),
             };
             if is_gone {
@@ -328,8 +325,11 @@ impl Cockpit {
         }
     }
 
-    /// Forgets the journey, but not the place.
+    /// Gives the journey up and forgets it, but not the place.
     pub(super) fn abandon(&mut self, context: &mut Context<'_>) {
+        if let Some(ticket) = self.travel.ticket {
+            self.pilot.give_up(ticket);
+        }
         self.finish(false, context);
         let place = self.travel.place;
         let is_reset = context.standing().state == State::Initialize;

@@ -67,7 +67,7 @@ impl Vehicle {
 
     /// Stops, whatever it was commanded to do.
     pub fn stop(&self) {
-        self.lock().halt(&StopCause::Standby);
+        self.lock().halt(&StopCause::Requested);
     }
 
     /// Whether it has something to do that is not done.
@@ -214,7 +214,7 @@ impl Vehicle {
             behaviour: Box::new(behaviour),
             only_newest: false,
             steps: 0,
-            stops: 0,
+            stops: self.lock().stops,
         }
     }
 
@@ -331,6 +331,10 @@ impl Service for OnVehicle {
 
     fn depends_on(&self) -> Option<JausId> {
         self.vehicle.lock().guard.depends_on()
+    }
+
+    fn is_moving(&self) -> bool {
+        self.vehicle.lock().guard.is_active()
     }
 
     fn hazards(&self) -> Hazards {
