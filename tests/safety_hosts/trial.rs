@@ -169,9 +169,10 @@ impl<'a> Trial<'a> {
         let at = wall_clock();
         self.happen(fault);
         let free = self.watch(at);
-        let back = wall_clock();
-        self.undo(fault);
-        while self.look().at < back + BACK {}
+        if self.undo(fault) {
+            let back = wall_clock();
+            while self.look().at < back + BACK {}
+        }
         self.row(fault, at, free)
     }
 
@@ -187,13 +188,18 @@ impl<'a> Trial<'a> {
         }
     }
 
-    fn undo(&self, fault: Fault) {
+    /// Lets the controller go on, if it can.
+    fn undo(&self, fault: Fault) -> bool {
         match fault {
             Fault::Suspended | Fault::SuspendedBehindNode => self.controller.signal("CONT"),
             Fault::CutAtController => self.bed.cable(Host::Controller, true),
             Fault::CutAtVehicle => self.bed.cable(Host::Vehicle, true),
-            _ => {}
+            Fault::Killed
+            | Fault::KilledBehindNode
+            | Fault::NodeKilled
+            | Fault::KilledAmongStrangers => return false,
         }
+        true
     }
 
     /// Watches until the vehicle is quiet and free, or for long enough; says when it was free.
