@@ -221,3 +221,70 @@ impl Peer {
         }
     }
 }
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "an arbitrary beginning of virtual time"
+)]
+mod tests {
+    use super::*;
+    use crate::messages::core::QueryStatus;
+
+    const US: JausId = JausId::new(101, 1, 1);
+    const CLIENT: JausId = JausId::new(102, 1, 2);
+    const STEP: Duration = Duration::from_millis(50);
+
+    /// What the client does; its node acknowledges in any case.
+    #[derive(Clone, Copy, PartialEq)]
+    enum Client {
+        /// Sends, and answers probes.
+        Lively,
+        /// Sends, and does not answer.
+        Mute,
+        Suspended,
+    }
+
+    /// Lets time pass for a client on whose life a motion depends; counts the probes.
+    fn pass(life: &mut Life, now: &mut Instant, time: Duration, client: Client) -> usize {
+        let mut out = Outbox::new(US);
+        let mut probes = 0;
+        let end = *now + time;
+        while *now < end {
+            *now += STEP;
+            life.watch(*now, CLIENT, Rank::MovingController);
+            if client != Client::Suspended {
+                life.hear(*now, CLIENT, Some(QueryStatus::CODE));
+            }
+            life.handle_timeout(*now, |_| Some(Rank::MovingController), &mut out);
+            while out.pop().is_some() {
+                probes += 1;
+                life.acknowledged(*now, CLIENT);
+                if client == Client::Lively {
+                    life.hear(*now, CLIENT, Some(ReportHeartbeatPulse::CODE));
+                }
+            }
+        }
+        probes
+    }
+
+    #[test]
+    fn a_client_that_is_not_silent_is_probed_once() {
+        let mut now = Instant::now();
+        let time = Duration::from_secs(3);
+        assert_eq!(pass(&mut Life::new(), &mut now, time, Client::Lively), 1);
+        assert_eq!(pass(&mut Life::new(), &mut now, time, Client::Mute), 1);
+    }
+
+    #[test]
+    fn a_node_does_not_vouch_for_a_suspended_client_that_was_never_silent_before() {
+        let (mut life, mut now) = (Life::new(), Instant::now());
+        pass(&mut life, &mut now, Life::SILENCE, Client::Lively);
+        let last = now;
+        assert_ne!(
+            pass(&mut life, &mut now, Life::SILENCE, Client::Suspended),
+            0
+        );
+        assert_eq!(life.last_sign(CLIENT), Some(last));
+    }
+}

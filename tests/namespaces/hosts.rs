@@ -1,4 +1,4 @@
-//! Two hosts to test on, and nodes in processes of their own on them.
+//! Hosts to test on, and nodes in processes of their own on them.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -35,24 +35,14 @@ impl TwoHosts {
 
     fn set_up(&self) -> Result<(), String> {
         for name in &self.names {
-            ip(&["netns", "add", name])?;
-            ip(&["-n", name, "link", "set", "lo", "up"])?;
+            add_host(name)?;
         }
         self.connect("jaus0", "10.213.77")
     }
 
     /// Lays a cable between the hosts, with addresses .1 and .2 of the network.
     pub(crate) fn connect(&self, cable: &str, network: &str) -> Result<(), String> {
-        let [a, b] = &self.names;
-        ip(&[
-            "link", "add", cable, "netns", a, "type", "veth", "peer", cable, "netns", b,
-        ])?;
-        for (number, name) in (1..).zip(&self.names) {
-            let address = format!("{network}.{number}/24");
-            ip(&["-n", name, "address", "add", &address, "dev", cable])?;
-            ip(&["-n", name, "link", "set", cable, "up"])?;
-        }
-        Ok(())
+        lay_cable(&self.names, cable, network)
     }
 
     /// The link-local IPv6 address of an interface, as the other end of the cable writes it.
@@ -105,8 +95,55 @@ impl TwoHosts {
 
     /// The same with settings, such as `ip=6 group=off`.
     pub(crate) fn start_with(&self, host: usize, role: &str, settings: &str) -> Process {
+        Process::start(&self.names[host], role, settings)
+    }
+}
+
+impl Drop for TwoHosts {
+    fn drop(&mut self) {
+        for name in &self.names {
+            // Not there if setting up failed half-way.
+            let _ = ip(&["netns", "delete", name]);
+        }
+    }
+}
+
+/// Makes a host: a network namespace of this name.
+pub(crate) fn add_host(name: &str) -> Result<(), String> {
+    ip(&["netns", "add", name])?;
+    ip(&["-n", name, "link", "set", "lo", "up"])
+}
+
+/// Lays a cable between two hosts, with addresses .1 and .2 of the network.
+pub(crate) fn lay_cable(hosts: &[String; 2], cable: &str, network: &str) -> Result<(), String> {
+    let [a, b] = hosts;
+    ip(&[
+        "link", "add", cable, "netns", a, "type", "veth", "peer", cable, "netns", b,
+    ])?;
+    for (number, name) in (1..).zip(hosts) {
+        let address = format!("{network}.{number}/24");
+        ip(&["-n", name, "address", "add", &address, "dev", cable])?;
+        ip(&["-n", name, "link", "set", cable, "up"])?;
+    }
+    Ok(())
+}
+
+/// Runs a test's body on two hosts, or says loudly that it cannot.
+pub(crate) fn on_two_hosts(test: &str, body: impl FnOnce(&TwoHosts)) {
+    on_hosts(test, TwoHosts::new, body);
+}
+
+/// A node in a process of its own; killed when dropped.
+pub(crate) struct Process {
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Process {
+    /// Starts this test binary in a role on a host, with settings for it.
+    pub(crate) fn start(host: &str, role: &str, settings: &str) -> Self {
         let mut child = Command::new("ip")
-            .args(["netns", "exec", &self.names[host]])
+            .args(["netns", "exec", host])
             .arg(std::env::current_exe().unwrap())
             .args([
                 "--exact",
@@ -128,31 +165,17 @@ impl TwoHosts {
                 }
             }
         });
-        Process { child, lines }
+        Self { child, lines }
     }
-}
 
-impl Drop for TwoHosts {
-    fn drop(&mut self) {
-        for name in &self.names {
-            // Not there if setting up failed half-way.
-            let _ = ip(&["netns", "delete", name]);
-        }
+    /// Sends the process a signal, by its name.
+    #[allow(dead_code, reason = "shared with tests that do less")]
+    pub(crate) fn signal(&self, name: &str) {
+        let (signal, id) = (format!("-{name}"), self.child.id().to_string());
+        let sent = Command::new("kill").args([&signal, &id]).status();
+        assert!(sent.unwrap().success(), "{name} to {id}");
     }
-}
 
-/// Runs a test's body on two hosts, or says loudly that it cannot.
-pub(crate) fn on_two_hosts(test: &str, body: impl FnOnce(&TwoHosts)) {
-    on_hosts(test, TwoHosts::new, body);
-}
-
-/// A node in a process of its own; killed when dropped.
-pub(crate) struct Process {
-    child: Child,
-    lines: Receiver<String>,
-}
-
-impl Process {
     /// Waits until the process prints a line that begins so, and gives the rest of it.
     pub(crate) fn says(&self, beginning: &str) -> String {
         let deadline = Instant::now() + LIMIT;

@@ -19,8 +19,8 @@ use jaus::component::{
     TimeOfDay,
 };
 use jaus::node::Node;
-use jaus::service::MotionPolicy;
 use jaus::service::mobility::Vehicle;
+use jaus::service::{MotionPolicy, StopCause};
 use jaus::vehicle::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
 use tokio::time::{MissedTickBehavior, interval};
 
@@ -156,6 +156,9 @@ impl VehicleCommand {
             let outcome = self.watch(&driver, &vehicle, &mut output).await;
             drop((manager, driver));
             node.shutdown().await;
+            if let Some(cause @ StopCause::Ended) = vehicle.last_stop() {
+                output.line(format_args!("stopped: {cause}"))?;
+            }
             outcome
         })
     }
