@@ -19,9 +19,9 @@ use crate::actuator::{
 };
 use crate::component::{Component, Condition, State};
 use crate::messages::ground::QueryStage;
-use crate::service::MotionPolicy;
 use crate::service::ground::{StageBoard, StageReport, StageState, WheelOdometry};
 use crate::service::mobility::Vehicle;
+use crate::service::{MotionPolicy, StopCause};
 use crate::vehicle::{Frame, Pilot};
 
 /// Drives the wheels of a vehicle as it is told, and stops them when it is not told any more. While a
@@ -317,6 +317,9 @@ impl Running {
         }
         if let Some(reason) = watchman.emergency() {
             return told(StageState::Blocked, reason.to_owned());
+        }
+        if let Some(StopCause::Fault(fault)) = self.vehicle.last_stop() {
+            return told(StageState::Blocked, fault);
         }
         if let Some(cause) = self.vehicle.last_stop() {
             let reason = format!("stopped: {cause}");

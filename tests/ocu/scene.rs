@@ -4,7 +4,7 @@ use std::future::Future;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use crate::group::own_group;
 use futures_util::{SinkExt, StreamExt};
@@ -65,7 +65,7 @@ impl Scene {
         let node = Node::start(Config::loopback(101, 1).group(group)).unwrap();
         let platform = SkidSteer::new(SkidSteerConfig::default());
         let vehicle = Vehicle::new(Pilot::new(platform, Frame::at(52.5, 13.4)))
-            .with_clock(TimeOfDay::new(|| Duration::ZERO));
+            .with_clock(TimeOfDay::new(|| UNIX_EPOCH.elapsed().unwrap()));
         let rover = rover(&vehicle, &node, timeout, frozen.as_ref());
         let station = Station {
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),

@@ -1,7 +1,7 @@
 //! What a vehicle under Management may do, concluded from nothing but what it hears and says: for
 //! whom it acts, in which state it is, and who is in control.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
@@ -21,6 +21,9 @@ pub(crate) struct Rules {
     /// When it asked for it last.
     asked: Instant,
     emergencies: BTreeSet<JausId>,
+    /// When each client was heard last: an emergency whose setter is silent for long is the
+    /// controller's to clear.
+    heard: BTreeMap<JausId, Instant>,
     /// Whether the client in control has said Resume, and nothing has stopped the vehicle since.
     resumed: bool,
     /// For whom it should act now.
@@ -42,6 +45,7 @@ impl Rules {
             told: None,
             asked: now,
             emergencies: BTreeSet::new(),
+            heard: BTreeMap::new(),
             resumed: false,
             acts_for: Vec::new(),
         }
@@ -50,15 +54,24 @@ impl Rules {
     /// The vehicle is about to hear something.
     pub(crate) fn hear(&mut self, now: Instant, message: &Received) {
         let client = message.source;
+        self.heard.insert(client, now);
         let commands = self.told == Some(client) && self.emergencies.is_empty();
         match code_of(&message.payload) {
             Some(SetEmergency::CODE) => {
                 self.emergencies.insert(client);
                 self.resumed = false;
             }
-            Some(ClearEmergency::CODE) if self.emergencies.remove(&client) => {
-                // It takes no control away, and the time begins anew.
-                self.asked = now;
+            Some(ClearEmergency::CODE) => {
+                let mut is_cleared = self.emergencies.remove(&client);
+                if self.told == Some(client) {
+                    let (heard, before) = (&self.heard, self.emergencies.len());
+                    self.emergencies.retain(|id| !is_silent(heard, now, *id));
+                    is_cleared |= self.emergencies.len() < before;
+                }
+                if is_cleared {
+                    // It takes no control away, and the time begins anew.
+                    self.asked = now;
+                }
             }
             Some(Resume::CODE) if commands => self.resumed = true,
             Some(Standby::CODE | Reset::CODE) if commands => self.resumed = false,
@@ -75,7 +88,12 @@ impl Rules {
             if confirm.response_code != confirm_control::ResponseCode::CONTROL_ACCEPTED {
                 return Ok(());
             }
-            if !self.emergencies.is_empty() {
+            let heard = &self.heard;
+            if self
+                .emergencies
+                .iter()
+                .any(|&id| !is_silent(heard, now, id))
+            {
                 return Err(format!("{client} is granted control in an emergency"));
             }
             if let Some(told) = self.told.filter(|&told| told != client) {
@@ -131,4 +149,10 @@ impl Rules {
             Err(format!("{controller:?} has not asked again for {idle:?}"))
         }
     }
+}
+
+/// Whether a client has shown no life for so long that the client in control may clear its emergency.
+fn is_silent(heard: &BTreeMap<JausId, Instant>, now: Instant, client: JausId) -> bool {
+    let since = heard.get(&client);
+    since.is_none_or(|&at| now.saturating_duration_since(at) >= Duration::from_secs(4))
 }

@@ -559,11 +559,39 @@ fn a_flood_of_emergencies_is_bounded_and_can_be_cleared() {
     for i in 0..1000 {
         rig.hear(client(i), &STOP);
     }
-    for i in 0..64 {
+    for i in 0..1000 {
         assert_eq!(rig.state(), State::Emergency);
         rig.hear(client(i), &CLEAR);
     }
     assert_eq!(rig.state(), State::Standby);
+}
+
+#[test]
+fn a_flood_of_forged_emergencies_hides_no_real_one_and_is_cleared_by_the_client_in_control() {
+    let mut rig = lasting();
+    for i in 0..5000 {
+        let forged = JausId::new(1000 + i, 1, 1);
+        rig.dead.push(forged);
+        rig.hear(forged, &STOP);
+    }
+    rig.run(Duration::from_secs(5));
+    rig.hear(THIRD, &STOP);
+    rig.hear(FIRST, &CLEAR);
+    assert_eq!(rig.state(), State::Emergency, "THIRD is alive");
+    rig.hear(THIRD, &CLEAR);
+    assert_eq!(rig.state(), State::Standby);
+}
+
+#[test]
+fn a_failed_component_is_failed_after_an_emergency_that_its_controller_cleared() {
+    let mut rig = Rig::managed();
+    rig.stack.set_condition(rig.now, Condition::Failed);
+    rig.dead.push(THIRD);
+    rig.hear(THIRD, &STOP);
+    rig.run(Duration::from_secs(5));
+    rig.request(FIRST, 100);
+    rig.hear(FIRST, &CLEAR);
+    assert_eq!((rig.controller(), rig.state()), (None, State::Failure));
 }
 
 #[test]
