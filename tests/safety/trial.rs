@@ -227,13 +227,16 @@ impl Trial {
         for &(from, to) in directions {
             self.world.network.set_cut_one_way(from, to, true);
         }
-        // A client that goes on although it has lost control.
-        if self.insists && self.random.happens(500) {
+        // A client that goes on although it has lost control. One that only hears nothing any more is
+        // still in control, as far as the vehicle can know, until its last request has timed out.
+        let is_deaf = self.cell.fault == Fault::CutToController;
+        if self.insists && self.random.happens(500) && !is_deaf {
             let controller = self.world.controller;
             self.world
                 .with_client(controller, |_, client| client.insist());
         }
-        self.run_between(6500, 15_000);
+        let shortest = if is_deaf { 10_500 } else { 6500 };
+        self.run_between(shortest, 16_000);
         if self.random.happens(800) {
             self.world.witness().stop_counting();
             for &(from, to) in directions {
