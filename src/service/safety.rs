@@ -83,3 +83,75 @@ pub(super) fn check(
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::codec::Message;
+    use crate::messages::core::{Reset, SetTime, list_manager};
+    use crate::service::{AccessControl, Handlers, Management, Stack};
+
+    const SERVICE: ServiceId = list_manager::LATEST;
+
+    /// Why a component with these settings cannot offer these handlers.
+    fn refused(
+        handlers: Handlers,
+        settings: impl FnOnce(Stack) -> Stack,
+    ) -> Result<(), UnsafeService> {
+        let rig = crate::service::stack_rig::StackRig::new(vec![Box::new(handlers)], settings);
+        rig.stack.check()
+    }
+
+    #[test]
+    fn a_command_needs_management_and_a_stop_action() {
+        let command = Reset::NAME;
+        let service = SERVICE;
+        let handlers = || Handlers::new(SERVICE).command(|_: Reset, _, _| {});
+        let managed = |stack: Stack| stack.management(Management::new());
+        let controlled = |stack: Stack| stack.access_control(AccessControl::new());
+        assert_eq!(
+            refused(handlers().on_stop(|_| {}), |stack| stack),
+            Err(UnsafeService::NoManagement { service, command })
+        );
+        assert_eq!(
+            refused(handlers().on_stop(|_| {}), controlled),
+            Err(UnsafeService::NoManagement { service, command })
+        );
+        assert_eq!(
+            refused(handlers(), managed),
+            Err(UnsafeService::NoStop { service, command })
+        );
+        assert_eq!(refused(handlers().on_stop(|_| {}), managed), Ok(()));
+    }
+
+    #[test]
+    fn what_clients_set_up_needs_access_control() {
+        let handlers = || Handlers::new(SERVICE).configure(|_: SetTime, _, _| {});
+        let (service, command) = (SERVICE, SetTime::NAME);
+        assert_eq!(
+            refused(handlers(), |stack| stack),
+            Err(UnsafeService::NoAccessControl { service, command })
+        );
+        let controlled = |stack: Stack| stack.access_control(AccessControl::new());
+        assert_eq!(refused(handlers(), controlled), Ok(()));
+    }
+
+    #[cfg(feature = "mobility")]
+    #[test]
+    fn a_driver_of_a_vehicle_needs_management_and_its_sensors_do_not() {
+        use crate::service::mobility::Vehicle;
+        use crate::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+        let rover = SkidSteer::new(SkidSteerConfig::default());
+        let vehicle = Vehicle::new(Pilot::new(rover, Frame::default()));
+        let check = |service| check(&service, false, &Standing::default());
+        assert!(matches!(
+            check(vehicle.primitive_driver()),
+            Err(UnsafeService::NoManagement { .. })
+        ));
+        assert!(matches!(
+            check(vehicle.local_path_segment_driver()),
+            Err(UnsafeService::NoManagement { .. })
+        ));
+        assert_eq!(check(vehicle.velocity_state_sensor()), Ok(()));
+    }
+}

@@ -1,5 +1,7 @@
 //! Each row of Access Control and Management, with a whole component and under virtual time.
 
+mod stopping;
+
 use std::time::Duration;
 
 use super::{AccessControl, Condition, Management};

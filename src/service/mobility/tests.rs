@@ -16,7 +16,7 @@ use crate::messages::core::set_element::{ElementDataFormat, ElementRec, RequestI
 use crate::messages::core::{ConfirmElementRequest, RejectElementRequest, SetElement};
 use crate::messages::mobility::{ExecuteList, SetLocalWaypoint};
 use crate::service::rig::{CLIENT, Rig, STRANGER};
-use crate::service::{MotionPolicy, Service, State, Time, TimeOfDay};
+use crate::service::{MotionPolicy, Service, State, StopCause, Time, TimeOfDay};
 use crate::vehicle::{Frame, Motion, Observed, Pilot, SkidSteer, SkidSteerConfig};
 
 /// Berlin, where the vehicle of the tests stands.

@@ -21,7 +21,7 @@ fn lease() -> (Lease, Instant) {
         timeout: Duration::from_secs(4),
     };
     let halt = Halt {
-        command: Some(STOP.clone()),
+        command: Some(STOP),
     };
     (Lease::new(OWN, RA, Some(halt), terms), now)
 }

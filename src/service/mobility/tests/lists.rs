@@ -198,3 +198,21 @@ fn elements_that_cannot_be_driven_to_are_refused() {
         vec![element(1, 0, 0, &QueryHeartbeatPulse)]
     ));
 }
+
+#[test]
+fn an_active_element_whose_data_are_replaced_is_driven_to_at_its_new_place() {
+    let (mut rig, vehicle) = rig();
+    assert!(set_elements(
+        &mut rig,
+        vec![element(1, 0, 0, &local_waypoint(20.0, 0.0))]
+    ));
+    rig.send(CLIENT, &execute(Some(1), 2.0));
+    rig.run(seconds(3.0));
+    assert!(set_elements(
+        &mut rig,
+        vec![element(1, 0, 0, &local_waypoint(0.0, 15.0))]
+    ));
+    rig.run(seconds(30.0));
+    let pose = vehicle.motion().pose;
+    assert!(pose.distance(0.0, 15.0) <= 0.5, "{pose:?}");
+}

@@ -150,3 +150,72 @@ fn a_global_vector_is_measured_from_north_however_the_local_frame_lies() {
     let report: ReportGlobalVector = rig.ask(&QueryGlobalVector { presence_vector }).unwrap();
     assert!(report.speed == vector.speed && report.heading == vector.heading);
 }
+
+#[test]
+fn a_global_vector_keeps_its_heading_when_the_local_frame_is_set_anew_on_the_way() {
+    let (mut rig, vehicle) = rig();
+    let mut vector = SetGlobalVector::default();
+    vector.set_speed_m_per_s(1.0).unwrap();
+    vector.set_heading_rad(-1.0).unwrap();
+    rig.send(CLIENT, &vector);
+    rig.run(seconds(5.0));
+    let mut turned = SetLocalPose::default();
+    turned.set_yaw_rad(2.0).unwrap();
+    rig.send(CLIENT, &turned);
+    rig.run(seconds(5.0));
+    assert!((vehicle.global_pose().yaw + 1.0).abs() < 0.01);
+}
+
+#[test]
+fn a_global_vector_without_a_speed_takes_none_from_before_another_driver_replaced_it() {
+    let (mut rig, vehicle) = rig();
+    let mut vector = SetGlobalVector::default();
+    vector.set_speed_m_per_s(1.0).unwrap();
+    rig.send(CLIENT, &vector);
+    rig.run(seconds(2.0));
+    rig.send(
+        CLIENT,
+        &velocity(CommandType::SET_CURRENT_COMMAND, 0.0, 0.0),
+    );
+    rig.run(seconds(2.0));
+    let mut heading = SetGlobalVector::default();
+    heading.set_heading_rad(0.5).unwrap();
+    rig.send(CLIENT, &heading);
+    rig.run(seconds(2.0));
+    assert!(vehicle.motion().velocity.x.abs() < 0.01);
+}
+
+#[test]
+fn a_vector_ends_when_its_client_has_shown_no_life_for_a_second_and_stays_ended() {
+    let (mut rig, vehicle) = rig();
+    let mut vector = SetLocalVector::default();
+    vector.set_speed_m_per_s(1.0).unwrap();
+    rig.send(CLIENT, &vector);
+    rig.run(seconds(10.0));
+    assert!(vehicle.motion().velocity.x > 0.9);
+    rig.client_lives = false;
+    rig.run(seconds(1.0));
+    assert_eq!(
+        vehicle.last_stop(),
+        Some(StopCause::ControllerSilent(CLIENT))
+    );
+    rig.client_lives = true;
+    rig.run(seconds(5.0));
+    assert!(vehicle.motion().velocity.is_rest());
+}
+
+#[test]
+fn a_velocity_ends_half_a_second_after_it_unless_it_is_repeated() {
+    let (mut rig, vehicle) = rig();
+    let vehicle = vehicle.motion_policy(MotionPolicy::default());
+    let ahead = velocity(CommandType::SET_CURRENT_COMMAND, 1.0, 0.0);
+    for _ in 0..10 {
+        rig.send(CLIENT, &ahead);
+        rig.run(seconds(0.4));
+    }
+    assert!(vehicle.motion().velocity.x > 0.9 && vehicle.last_stop().is_none());
+    rig.run(seconds(0.1));
+    assert_eq!(vehicle.last_stop(), Some(StopCause::Expired(CLIENT)));
+    rig.run(seconds(2.0));
+    assert!(vehicle.motion().velocity.is_rest());
+}
