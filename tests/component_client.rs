@@ -27,9 +27,10 @@ use jaus::endpoint::{Outgoing, Received};
 use jaus::messages::core::{
     CancelEvent, ConfirmControl, ConfirmEventRequest, CreateEvent, Event, QueryStatus,
     RejectControl, RejectEventRequest, ReleaseControl, ReportStatus, RequestControl, Resume,
-    discovery, management,
+    SetEmergency, discovery, management,
 };
 use jaus::node::{Config, Node, Port};
+use jaus::wire::Priority;
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);
@@ -439,4 +440,64 @@ async fn a_version_that_nobody_offers_is_told_with_the_versions_that_are_there()
             .await
             .is_ok()
     );
+}
+
+#[tokio::test]
+async fn commands_are_refused_once_the_peer_is_known_to_be_no_longer_ready() {
+    let mut scene = Scene::new();
+    let control = scene.controlled().await;
+    let peer = &mut scene.peer;
+    let answering = async {
+        loop {
+            peer.expect::<QueryStatus>().await;
+            peer.say(&status(1));
+        }
+    };
+    within_limit(async {
+        tokio::select! {
+            resumed = control.resume() => resumed.unwrap(),
+            () = answering => unreachable!(),
+        }
+    })
+    .await;
+    assert_eq!(control.send(&Resume {}), Ok(()));
+    // It was started again, or is in an emergency; the lease asks, and nobody else does.
+    let refused = within_limit(async {
+        loop {
+            peer.expect::<QueryStatus>().await;
+            peer.say(&status(5));
+            tokio::time::sleep(Duration::from_millis(20)).await;
+            if let Err(refused) = control.send(&Resume {}) {
+                return refused;
+            }
+        }
+    });
+    let (peer, state) = (control.peer(), 5);
+    assert_eq!(refused.await, ControlError::NotReady { peer, state });
+    assert!(control.is_held());
+}
+
+#[tokio::test]
+async fn control_can_be_asked_for_again_as_soon_as_it_is_dropped() {
+    let mut scene = Scene::new();
+    for _ in 0..50 {
+        // The peer need not have confirmed the release.
+        drop(scene.controlled().await);
+    }
+}
+
+#[tokio::test]
+async fn an_emergency_is_sent_with_safety_critical_priority() {
+    let mut scene = Scene::new();
+    let (operator, id) = (scene.operator.clone(), scene.peer.id());
+    tokio::spawn(async move { operator.set_emergency(id).await });
+    let received = within_limit(async {
+        loop {
+            let message = scene.peer.0.recv().await.expect("a running node");
+            if SetEmergency::decode(&message.payload).is_ok() {
+                return message;
+            }
+        }
+    });
+    assert_eq!(received.await.priority, Priority::SafetyCritical);
 }

@@ -23,7 +23,7 @@ use jaus::actuator::{Actuator, MotorConfig, SimulatedMotor, SimulatedStop};
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Kind, State};
 use jaus::link::Group;
-use jaus::messages::core::{QueryStatus, ReportStatus};
+use jaus::messages::core::{QueryStatus, ReportStatus, Shutdown};
 use jaus::messages::ground::{QueryStage, QueryWheelOdometry, ReportStage, ReportWheelOdometry};
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{
@@ -32,7 +32,7 @@ use jaus::messages::mobility::{
 };
 use jaus::node::{Config, Node};
 use jaus::parts::{
-    Hardware, Part, PoseSensor, PrimitiveDriver, Seat, VectorDriver, VelocitySensor,
+    Hardware, Part, PartError, PoseSensor, PrimitiveDriver, Seat, VectorDriver, VelocitySensor,
 };
 use jaus::service::ground::{StageReport, StageState};
 use tokio::task::JoinHandle;
@@ -76,9 +76,7 @@ impl Scene {
 
     fn start<F>(&self, id: JausId, run: impl FnOnce(Seat) -> F) -> Running
     where
-        F: Future<Output = Result<std::convert::Infallible, jaus::parts::PartError>>
-            + Send
-            + 'static,
+        F: Future<Output = Result<std::convert::Infallible, PartError>> + Send + 'static,
     {
         let config = Config::loopback(id.subsystem(), id.node()).group(self.group);
         let node = Node::start(config).unwrap();
@@ -89,8 +87,10 @@ impl Scene {
             name: "Rover".to_owned(),
         });
         let task = tokio::spawn(async move {
-            let Err(error) = part.await;
-            panic!("{id} cannot go on: {error}");
+            match part.await {
+                Err(PartError::ShutDown) => {}
+                Err(error) => panic!("{id} cannot go on: {error}"),
+            }
         });
         Running(node, task)
     }
@@ -417,4 +417,15 @@ async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_st
     pose.stop().await;
     wheels.stop().await;
     std::fs::remove_dir_all(&directory).unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_part_ends_when_the_client_in_control_shuts_it_down() {
+    let scene = Scene::new();
+    let running = scene.start(PRIMITIVE, |seat| PrimitiveDriver::default().run(seat));
+    let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    control.send(&Shutdown {}).unwrap();
+    let Running(_node, task) = running;
+    let ended = tokio::time::timeout(LIMIT, task).await;
+    assert!(ended.expect("it ends").is_ok());
 }
