@@ -39,6 +39,8 @@ pub struct Stack {
     /// The client in control whose death would go unnoticed, once that is logged.
     mute: Option<JausId>,
     faults: Faults,
+    /// When it was called last.
+    called: Option<Instant>,
     news: News,
     inquiries: Inquiries,
     subscriptions: Subscriptions,
@@ -78,6 +80,7 @@ impl Stack {
             life: Life::new(),
             mute: None,
             faults: Faults::default(),
+            called: None,
             news: News::default(),
             inquiries: Inquiries::default(),
             subscriptions: Subscriptions::default(),
@@ -474,6 +477,7 @@ impl Stack {
             .chain(self.discovery.poll_timeout())
             .chain(self.control.poll_timeout())
             .chain(self.life.poll_timeout())
+            .chain(self.next_beat())
             .chain(self.subscribers.poll_timeout())
             .chain(self.inquiries.poll_timeout())
             .chain(self.subscriptions.poll_timeout())

@@ -20,9 +20,10 @@ pub(super) struct Faults {
 }
 
 impl Stack {
-    /// A component that is called so much later than it asked for was held up, with all that steers
+    /// A component that moves something and is not called for so long was held up, with all that steers
     /// what it moves.
     const HUNG: Duration = Duration::from_millis(500);
+    const BEAT: Duration = Duration::from_millis(100);
 
     /// Checks that each service has beside it what makes it safe.
     ///
@@ -68,15 +69,24 @@ impl Stack {
         }
     }
 
+    fn is_moving(&self) -> bool {
+        self.services.iter().any(|service| service.is_moving())
+    }
+
+    /// While something moves the component is called this often, if only to know that it can be.
+    pub(super) fn next_beat(&self) -> Option<Instant> {
+        let last = self.called.filter(|_| self.is_moving())?;
+        Some(last + Self::BEAT)
+    }
+
     /// Ends control that has timed out, and what a component that was held up has moved: messages that
     /// have waited change nothing about that.
     pub(super) fn end_overdue(&mut self, now: Instant) {
-        let late = self
-            .poll_timeout()
-            .map_or(Duration::ZERO, |due| now.saturating_duration_since(due));
-        if late > Self::HUNG && self.services.iter().any(|service| service.is_moving()) {
-            tracing::error!(id = %self.out.source(), ?late, "stopped: the component was held up");
-            self.stop(&StopCause::Hung(late));
+        let last = self.called.replace(now).unwrap_or(now);
+        let gap = now.saturating_duration_since(last);
+        if gap > Self::HUNG && self.is_moving() {
+            tracing::error!(id = %self.out.source(), ?gap, "stopped: the component was held up");
+            self.stop(&StopCause::Hung(gap));
             self.control.drop_controller(&mut self.out);
         }
         self.control.handle_timeout(now, &mut self.out);
