@@ -107,7 +107,7 @@ impl Control {
         } else if self.is_controller(client) {
             self.drop_controller(out);
         } else if self.standing.controller.is_none() {
-            // Whoever asks again, because the answer got lost, gets it again.
+            // A client that asks again, because the answer was lost, gets it again.
             out.reply(message, &answer(Rejection::CONTROL_RELEASED));
         }
     }

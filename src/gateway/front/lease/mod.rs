@@ -196,7 +196,7 @@ impl Lease {
                 self.let_go(now);
                 self.reject(client, Rejection::CONTROL_RELEASED);
             }
-            // Whoever asks again, because the answer got lost, gets it again.
+            // A client that asks again, because the answer was lost, gets it again.
             State::Free => self.reject(client, Rejection::CONTROL_RELEASED),
             State::Held { .. } | State::Asking { .. } => {}
         }
