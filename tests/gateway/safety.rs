@@ -156,17 +156,22 @@ fn a_restarted_gateway_stops_and_releases_what_it_finds_held_in_its_name() {
 }
 
 #[test]
-fn a_restarted_gateway_stops_a_waypoint_driver_that_drives_on_without_a_controller() {
-    let mut drive = Drive::of(45);
-    drive.rover().controller = Some((COMMANDER, 127));
-    drive.rover().speeds.push(bytes("0d00"));
-    assert!(drive.drives());
-    drive.world.power = Power::Killed;
-    drive.world.run(millis(4000));
-    drive.world.restart_gateway();
-    drive.world.run(millis(3000));
-    assert!(!drive.drives());
-    drive.control_within(millis(2000));
+fn a_restarted_gateway_stops_a_driver_that_drives_on_without_a_controller() {
+    for part in [44, 45] {
+        let mut drive = Drive::of(part);
+        drive.rover().controller = Some((COMMANDER, 127));
+        match part {
+            44 => drive.rover().vectors.push(bytes("661b0d8073e1")),
+            _ => drive.rover().speeds.push(bytes("0d00")),
+        }
+        assert!(drive.drives());
+        drive.world.power = Power::Killed;
+        drive.world.run(millis(4000));
+        drive.world.restart_gateway();
+        drive.world.run(millis(3000));
+        assert!(!drive.drives(), "component {part}");
+        drive.control_within(millis(2000));
+    }
 }
 
 #[test]
@@ -480,6 +485,20 @@ fn an_ra_client_whose_component_is_dead_while_its_node_lives_does_not_drive_on()
     remote.watch(millis(6000));
     assert!(!remote.is_controlled());
     assert_eq!(remote.watch(millis(5000)), None);
+}
+
+#[test]
+fn a_gateway_that_restarts_at_once_does_not_keep_alive_what_its_ra_client_had_set() {
+    let mut remote = Remote::new(true);
+    remote.take_control();
+    remote.says(RA_VECTORS, 0x0408, "661b0d8073e1");
+    assert_eq!(remote.watch(millis(2000)), Some(millis(2000)));
+    remote.world.power = Power::Killed;
+    remote.watch(millis(200));
+    remote.world.restart_gateway();
+    let stopped = remote.watch(millis(6000));
+    assert!(stopped <= Some(millis(2000)), "{stopped:?}");
+    assert!(!remote.is_controlled());
 }
 
 #[test]

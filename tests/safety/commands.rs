@@ -32,10 +32,21 @@ pub(crate) fn motion(driver: Driver) -> Vec<Bytes> {
             vec![encode(&list(elements)), encode(&execute())]
         }
         Driver::Path => {
-            let elements = [0.0, FAR / 2.0].map(segment);
+            let elements = [0.0, FAR / 2.0].map(|x| set_segment(&segment(x)));
             vec![encode(&list(elements)), encode(&execute())]
         }
     }
+}
+
+/// The same for a client that knows no lists: the places one by one, and then a speed. A segment is a
+/// report here, which has the layout of the command.
+pub(crate) fn places_and_speed(driver: Driver) -> Vec<Bytes> {
+    let [first, second] = match driver {
+        Driver::List => [FAR / 2.0, FAR].map(|x| encode(&waypoint(x))),
+        Driver::Path => [0.0, FAR / 2.0].map(|x| encode(&segment(x))),
+        _ => return motion(driver),
+    };
+    vec![first, second, encode(&travel_speed())]
 }
 
 /// Set Time, by the sender's wall clock.
@@ -102,14 +113,19 @@ fn execute() -> ExecuteList {
 }
 
 /// A path segment along the X axis, from `x` on.
-fn segment(x: f64) -> Bytes {
+fn segment(x: f64) -> ReportLocalPathSegment {
     let mut path = ReportLocalPathSegment::default();
     path.set_p1_x_m(x + FAR / 4.0).expect("in range");
     path.set_p1_y_m(0.0).expect("in range");
     path.set_p2_x_m(x + FAR / 2.0).expect("in range");
     path.set_p2_y_m(0.0).expect("in range");
     path.set_weighting_factor_value(1.0).expect("in range");
-    let body = encode(&path).slice(2..);
+    path
+}
+
+/// Set Local Path Segment.
+fn set_segment(segment: &ReportLocalPathSegment) -> Bytes {
+    let body = encode(segment).slice(2..);
     [&SET_LOCAL_PATH_SEGMENT.to_le_bytes(), &body[..]]
         .concat()
         .into()

@@ -25,6 +25,7 @@
 mod cell;
 mod client;
 mod commands;
+mod gateway;
 mod plant;
 #[path = "../sim/mod.rs"]
 mod sim;

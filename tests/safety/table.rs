@@ -46,9 +46,6 @@ impl Table {
             "fault", "driver", "runs", "moved", "moved again", "stop/s", "way/m"
         ));
         for fault in Fault::ALL {
-            if let Some(elsewhere) = fault.elsewhere() {
-                seeds::announce(&format!("{fault:28}{elsewhere}"));
-            }
             for driver in Driver::ALL {
                 if let Some(row) = rows.get(&Cell { driver, fault }) {
                     seeds::announce(&format!("{fault:28}{driver:16}{}", row.line()));

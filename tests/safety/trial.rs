@@ -86,7 +86,7 @@ impl Trial {
     fn new(cell: Cell, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let conditions = conditions(&mut random);
-        let world = World::new(&mut random, cell.driver, conditions);
+        let world = World::new(&mut random, cell, conditions);
         Self {
             cell,
             fault: world.network.now(),
@@ -123,9 +123,14 @@ impl Trial {
             self.world.network.kill(self.world.crowd);
             self.run_between(0, 4000);
         }
-        let controller = self.world.controller;
-        self.world
-            .with_client(controller, |now, client| client.begin(now));
+        if self.cell.fault == Fault::Gateway {
+            self.world.run_for(Self::START);
+            self.world.with_operator(|_, operator| operator.begin());
+        } else {
+            let controller = self.world.controller;
+            self.world
+                .with_client(controller, |now, client| client.begin(now));
+        }
         let end = self.world.network.now() + Self::START;
         while !self.has_moved(0.4, 0.4) {
             if self.world.network.now() > end {
@@ -133,6 +138,10 @@ impl Trial {
                 return false;
             }
             self.world.run_for(Duration::from_millis(100));
+        }
+        if self.cell.fault == Fault::Gateway {
+            self.world
+                .with_operator(|_, operator| operator.note_motion());
         }
         self.run_between(0, 2000);
         self.outcome.moved = self.has_moved(0.2, 0.1);
@@ -167,9 +176,8 @@ impl Trial {
     fn run_fault(&mut self) {
         let (vehicle, controller) = (self.world.vehicle, self.world.controller);
         match self.cell.fault {
-            Fault::Killed | Fault::DeadIdsBefore | Fault::Gateway => {
-                self.world.network.kill(controller);
-            }
+            Fault::Killed | Fault::DeadIdsBefore => self.world.network.kill(controller),
+            Fault::Gateway => self.restart_gateway(),
             Fault::DeadIdsDuring => self.flood(),
             Fault::Suspended => {
                 self.world.network.suspend(controller);
@@ -221,6 +229,26 @@ impl Trial {
                 client.take_control_again(now);
             }
         });
+    }
+
+    /// The gateway dies, and its operator lives on. It may insist on its commands when the gateway is
+    /// there again, and request control when it has lost it. It does not send Resume.
+    fn restart_gateway(&mut self) {
+        self.world.network.kill(self.world.controller);
+        self.run_between(100, 8000);
+        if self.random.happens(200) {
+            return;
+        }
+        self.world.witness().stop_counting();
+        self.world.restart_gateway();
+        if self.insists {
+            self.world.with_operator(|_, operator| operator.insist());
+        }
+        if self.random.happens(300) {
+            self.world.run_for(Self::CONTROL);
+            self.world
+                .with_operator(|now, operator| operator.request_control(now));
+        }
     }
 
     fn cut(&mut self, directions: &[(crate::sim::Host, crate::sim::Host)]) {

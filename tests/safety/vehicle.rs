@@ -12,7 +12,7 @@ use jaus::service::{
 };
 use jaus::vehicle::{Drive, Effort, Frame, Limits, Motion, Pilot, Platform, Pose};
 
-use crate::cell::Driver;
+use crate::cell::{Cell, Driver, Fault};
 use crate::plant::{SharedPlant, Wheels};
 use crate::sim::WallClock;
 
@@ -32,18 +32,18 @@ impl Program {
 
     pub(crate) fn new(
         now: Instant,
-        driver: Driver,
+        cell: Cell,
         plant: &SharedPlant,
         clock: WallClock,
         seed: u64,
     ) -> Self {
-        let is_own = driver == Driver::Own;
+        let is_own = cell.driver == Driver::Own;
         let time = TimeOfDay::new(move || clock.since_1970());
         let mut services: Vec<Box<dyn Service>> = vec![Box::new(Liveness::new())];
         if is_own {
             services.push(Box::new(own_service(plant)));
         } else {
-            services.extend(drivers(plant, &time, driver.is_held()));
+            services.extend(drivers(plant, &time, cell));
         }
         services.push(Box::new(Time::new(time)));
         let profile = Profile::new(Kind::Vehicle, "Rover");
@@ -106,27 +106,31 @@ impl Program {
     }
 }
 
-/// All drivers on one vehicle.
-fn drivers(plant: &SharedPlant, time: &TimeOfDay, holds: bool) -> Vec<Box<dyn Service>> {
+/// All drivers on one vehicle. A gateway turns an RA client's waypoints into a list where it can, so
+/// that a vehicle that is to be driven to a single waypoint offers it no lists.
+fn drivers(plant: &SharedPlant, time: &TimeOfDay, cell: Cell) -> Vec<Box<dyn Service>> {
     let pilot = Pilot::new(Wheels(plant.clone()), Frame::at(52.5, 13.4));
-    let policy = match holds {
+    let policy = match cell.driver.is_held() {
         true => MotionPolicy::Hold,
         false => MotionPolicy::default(),
     };
     let vehicle = mobility::Vehicle::new(pilot)
         .motion_policy(policy)
         .with_clock(time.clone());
-    vec![
+    let mut services: Vec<Box<dyn Service>> = vec![
         Box::new(vehicle.velocity_state_sensor()),
         Box::new(vehicle.local_pose_sensor()),
         Box::new(vehicle.primitive_driver()),
         Box::new(vehicle.velocity_state_driver()),
         Box::new(vehicle.local_vector_driver()),
         Box::new(vehicle.local_waypoint_driver()),
-        Box::new(vehicle.list_manager()),
-        Box::new(vehicle.local_waypoint_list_driver()),
-        Box::new(vehicle.local_path_segment_driver()),
-    ]
+    ];
+    if (cell.fault, cell.driver) != (Fault::Gateway, Driver::Waypoint) {
+        services.push(Box::new(vehicle.list_manager()));
+        services.push(Box::new(vehicle.local_waypoint_list_driver()));
+        services.push(Box::new(vehicle.local_path_segment_driver()));
+    }
+    services
 }
 
 /// A driver made of functions, as an application writes it.

@@ -9,11 +9,12 @@ use jaus::messages::core::RequestControl;
 
 use crate::cell::Driver;
 use crate::commands;
-use crate::world::{CONTROLLER, SUPERVISOR};
+use crate::world::SUPERVISOR;
 
 /// Looks at the vehicle's messages and its controller.
 #[derive(Clone, Debug)]
 pub(crate) struct Witness {
+    controller: JausId,
     /// The first two octets of a setpoint.
     setpoint: [u8; 2],
     /// Whether the controller's messages still count: not those that it sends after a fault is over.
@@ -33,9 +34,10 @@ pub(crate) struct Witness {
 }
 
 impl Witness {
-    pub(crate) fn new(driver: Driver) -> Self {
+    pub(crate) fn new(driver: Driver, controller: JausId) -> Self {
         let last = commands::motion(driver).pop().expect("at least one");
         Self {
+            controller,
             setpoint: [last[0], last[1]],
             counts: true,
             last_message: None,
@@ -53,7 +55,7 @@ impl Witness {
     }
 
     pub(crate) fn note_message(&mut self, now: Instant, message: &Received) {
-        if !self.counts || message.source != CONTROLLER {
+        if !self.counts || message.source != self.controller {
             return;
         }
         self.last_message = Some(now);
@@ -67,7 +69,7 @@ impl Witness {
     }
 
     pub(crate) fn note_controller(&mut self, now: Instant, controller: Option<JausId>) {
-        let holds = controller == Some(CONTROLLER);
+        let holds = controller == Some(self.controller);
         if self.is_held && !holds {
             self.freed.get_or_insert(now);
         }

@@ -10,9 +10,10 @@ use jaus::messages::core::{
 };
 use jaus::service::{Discovery, Kind, Liveness, Profile, Scope, Stack, Timing};
 
-use crate::cell::Driver;
+use crate::cell::{Cell, Fault};
 use crate::client::Client;
 use crate::commands::encode;
+use crate::gateway::{Crossing, OPERATOR_BEHIND_GATEWAY, Operator};
 use crate::plant::SharedPlant;
 use crate::sim::{Conditions, Host, Network, Owner, Random, WallClock, seeds};
 use crate::vehicle::{Program, VEHICLE};
@@ -27,6 +28,7 @@ pub(crate) const CROWD: usize = 1000;
 pub(crate) enum Party {
     Vehicle(Box<Vehicle>),
     Client(Box<Client>),
+    Gateway(Box<Crossing>),
     Peer(Box<Stack>),
     Crowd,
 }
@@ -41,8 +43,9 @@ pub(crate) struct Vehicle {
 pub(crate) struct World {
     pub(crate) network: Network<Party>,
     pub(crate) plant: SharedPlant,
-    pub(crate) driver: Driver,
+    cell: Cell,
     pub(crate) vehicle: Host,
+    /// The controller; in the row "gateway restarted" the gateway with the operator behind it.
     pub(crate) controller: Host,
     pub(crate) supervisor: Host,
     pub(crate) crowd: Host,
@@ -74,6 +77,7 @@ impl Owner for Party {
     fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
         match (self, event) {
             (Self::Client(client), event) => client.handle_event(now, endpoint, event),
+            (Self::Gateway(crossing), event) => crossing.handle_event(now, endpoint, event),
             (Self::Vehicle(vehicle), EndpointEvent::Received(message)) => {
                 vehicle.plant.lock().advance(now);
                 vehicle.witness.note_message(now, &message);
@@ -93,6 +97,7 @@ impl Owner for Party {
     fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
         match self {
             Self::Client(client) => client.handle_timeout(now, endpoint),
+            Self::Gateway(crossing) => crossing.handle_timeout(now, endpoint),
             Self::Vehicle(vehicle) => {
                 vehicle.plant.lock().advance(now);
                 if let Some(program) = &mut vehicle.program {
@@ -111,6 +116,7 @@ impl Owner for Party {
     fn poll_timeout(&self) -> Option<Instant> {
         match self {
             Self::Client(client) => client.poll_timeout(),
+            Self::Gateway(crossing) => crossing.poll_timeout(),
             Self::Vehicle(vehicle) => vehicle.program.as_ref()?.poll_timeout(),
             Self::Peer(stack) => stack.poll_timeout(),
             Self::Crowd => None,
@@ -160,7 +166,7 @@ fn peer(now: Instant, id: JausId) -> Party {
 impl World {
     const SLICE: Duration = Duration::from_millis(20);
 
-    pub(crate) fn new(random: &mut Random, driver: Driver, conditions: Conditions) -> Self {
+    pub(crate) fn new(random: &mut Random, cell: Cell, conditions: Conditions) -> Self {
         let seed = random.number();
         let mut network = Network::new(seed, conditions);
         if seeds::is_traced() {
@@ -169,12 +175,26 @@ impl World {
         let now = network.now();
         let plant = SharedPlant::new(now);
         let vehicle = network.join_with(endpoint(VEHICLE), |clock| {
-            vehicle(now, driver, &plant, clock, seed)
+            vehicle(now, cell, &plant, clock, seed)
         });
         let scope = random.choose(&[Scope::System, Scope::Nobody]);
-        let client =
-            |id, authority| Party::Client(Box::new(Client::new(now, id, driver, authority, scope)));
-        let controller = network.join(endpoint(CONTROLLER), client(CONTROLLER, 100));
+        let client = |id, authority| {
+            Party::Client(Box::new(Client::new(
+                now,
+                id,
+                cell.driver,
+                authority,
+                scope,
+            )))
+        };
+        let controller = match cell.fault {
+            Fault::Gateway => {
+                let crossing = Crossing::new(now, cell.driver);
+                let nobody = Endpoint::new(Config::default());
+                network.join(nobody, Party::Gateway(Box::new(crossing)))
+            }
+            _ => network.join(endpoint(CONTROLLER), client(CONTROLLER, 100)),
+        };
         let supervisor = network.join(endpoint(SUPERVISOR), client(SUPERVISOR, 200));
         let crowd = network.join(crowd(), Party::Crowd);
         for place in 0..random.below(4) {
@@ -184,7 +204,7 @@ impl World {
         Self {
             network,
             plant,
-            driver,
+            cell,
             vehicle,
             controller,
             supervisor,
@@ -242,7 +262,7 @@ impl World {
     pub(crate) fn restart_vehicle(&mut self) {
         let (now, clock) = (self.network.now(), self.network.clock(self.vehicle));
         let witness = self.witness().clone();
-        let mut party = vehicle(now, self.driver, &self.plant, clock, self.seed);
+        let mut party = vehicle(now, self.cell, &self.plant, clock, self.seed);
         if let Party::Vehicle(vehicle) = &mut party {
             vehicle.witness = witness;
         }
@@ -252,13 +272,36 @@ impl World {
     /// Starts another controller with the same id.
     pub(crate) fn restart_controller(&mut self, insists: bool) {
         let now = self.network.now();
-        let mut client = Client::new(now, CONTROLLER, self.driver, 100, Scope::System);
+        let mut client = Client::new(now, CONTROLLER, self.cell.driver, 100, Scope::System);
         if insists {
             client.insist();
         }
         let party = Party::Client(Box::new(client));
         self.network
             .restart(self.controller, endpoint(CONTROLLER), party);
+    }
+
+    /// Lets the operator behind the gateway do something.
+    pub(crate) fn with_operator(&mut self, act: impl FnOnce(Instant, &mut Operator)) {
+        self.network.act(self.controller, |now, party, endpoint| {
+            let Party::Gateway(crossing) = party else {
+                panic!("the gateway is meant");
+            };
+            act(now, crossing.operator());
+            crossing.settle(now, endpoint);
+        });
+    }
+
+    /// Starts the gateway again; the operator behind it has lived on.
+    pub(crate) fn restart_gateway(&mut self) {
+        let party = std::mem::replace(self.network.owner(self.controller), Party::Crowd);
+        let Party::Gateway(crossing) = party else {
+            panic!("the gateway is meant");
+        };
+        let crossing = crossing.restart(self.network.now());
+        let nobody = Endpoint::new(Config::default());
+        let party = Party::Gateway(Box::new(crossing));
+        self.network.restart(self.controller, nobody, party);
     }
 
     /// So many more ids of the crowd say one thing each.
@@ -283,16 +326,14 @@ impl World {
     }
 }
 
-fn vehicle(
-    now: Instant,
-    driver: Driver,
-    plant: &SharedPlant,
-    clock: WallClock,
-    seed: u64,
-) -> Party {
+fn vehicle(now: Instant, cell: Cell, plant: &SharedPlant, clock: WallClock, seed: u64) -> Party {
+    let controller = match cell.fault {
+        Fault::Gateway => OPERATOR_BEHIND_GATEWAY,
+        _ => CONTROLLER,
+    };
     Party::Vehicle(Box::new(Vehicle {
-        program: Some(Program::new(now, driver, plant, clock, seed)),
+        program: Some(Program::new(now, cell, plant, clock, seed)),
         plant: plant.clone(),
-        witness: Witness::new(driver),
+        witness: Witness::new(cell.driver, controller),
     }))
 }

@@ -59,7 +59,8 @@ use crate::address::JausId;
 use crate::codec::Message as _;
 use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::{
-    self, CreateEvent, ReleaseControl, RequestControl, SetAuthority, UpdateEvent,
+    self, CreateEvent, QueryHeartbeatPulse, ReleaseControl, RequestControl, SetAuthority,
+    UpdateEvent,
 };
 use crate::ra::connection::{self, Connections, ResponseCode};
 use crate::ra::ids::RaComponent;
@@ -212,6 +213,10 @@ impl Front {
                 }
             }
             Some(ReleaseControl::CODE) => self.lease.release(now, client),
+            Some(QueryHeartbeatPulse::CODE) => {
+                self.voice.handle_probe(now, client, &mut self.stack);
+                self.stack.handle_message(now, message);
+            }
             Some(CreateEvent::CODE) => {
                 let created = CreateEvent::decode(&message.payload);
                 let wanted = created.map(|it| (hz_of(&it), it.query_message));

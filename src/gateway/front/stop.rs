@@ -21,6 +21,7 @@ pub(super) fn command(part: RaComponent) -> Option<(u16, Bytes)> {
     match part {
         RaComponent::PRIMITIVE_DRIVER => encoded(&no_effort().ok()?),
         RaComponent::GLOBAL_VECTOR_DRIVER => encoded(&no_global_speed().ok()?),
+        RaComponent::LOCAL_VECTOR_DRIVER => encoded(&no_local_speed().ok()?),
         RaComponent::GLOBAL_WAYPOINT_DRIVER
         | RaComponent::LOCAL_WAYPOINT_DRIVER
         | RaComponent::GLOBAL_PATH_SEGMENT_DRIVER
@@ -62,6 +63,15 @@ fn no_effort() -> Result<SetWrenchEffort, OutOfRange> {
 fn no_global_speed() -> Result<SetGlobalVector, OutOfRange> {
     let mut vector = SetGlobalVector::default();
     vector.set_speed_m_per_s(0.0)?;
+    Ok(vector)
+}
+
+/// The heading cannot be left out. That of the vector that is to end is not known here, and standing
+/// still matters more than which way.
+fn no_local_speed() -> Result<SetLocalVector, OutOfRange> {
+    let mut vector = SetLocalVector::default();
+    vector.set_speed_m_per_s(0.0)?;
+    vector.set_heading_rad(0.0)?;
     Ok(vector)
 }
 

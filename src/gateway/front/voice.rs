@@ -26,6 +26,7 @@ use super::ra_event::RaEvent;
 use super::target::{Target, element_query, place_report, places};
 use crate::address::JausId;
 use crate::codec::Message as _;
+use crate::messages::core::ReleaseControl;
 use crate::messages::ra33::CreateServiceConnection;
 use crate::ra::connection::{ConnectionId, Connections, Request, ResponseCode};
 use crate::ra::convert::Refusal;
@@ -55,6 +56,9 @@ pub(in crate::gateway) struct Voice {
     pub(super) life: ClientLife,
     /// When it was last told that it commands without control.
     pub(super) rejected: Option<Instant>,
+    /// When a JAUS component probed it for the first time, and when control was disowned last.
+    probed: Option<Instant>,
+    disowned: Option<Instant>,
     /// Whether the gateway stops, and requests control for nobody any more.
     pub(super) is_closed: bool,
 }
@@ -90,6 +94,10 @@ impl Voice {
     const MOST_TOLD: usize = 64;
     /// The most components under control.
     const MOST_GRIPS: usize = 32;
+    /// By then control from before a restart has timed out everywhere.
+    const LEFTOVER: Duration = Duration::from_secs(6);
+    /// Between two releases of control that the component does not have.
+    const DISOWNING: Duration = Duration::from_millis(100);
 
     pub(super) fn new(patience: Duration, ids: Ids) -> Self {
         const TRIES: u32 = 3;
@@ -108,6 +116,8 @@ impl Voice {
             said: Vec::new(),
             life: ClientLife::default(),
             rejected: None,
+            probed: None,
+            disowned: None,
             is_closed: false,
         }
     }
@@ -380,6 +390,23 @@ impl Voice {
             self.grips.remove(&id);
             stack.release_control(now, id);
         }
+    }
+
+    /// A JAUS component probes the RA component. If that has no control of it and requests none, this
+    /// may be a gateway that was started again, and the component may still obey the RA component,
+    /// which the answer would show to be alive. Such control is released at once, instead of by its
+    /// timeout. The release is repeated with the probes, because it may be lost.
+    pub(super) fn handle_probe(&mut self, now: Instant, peer: JausId, stack: &mut Stack) {
+        let begun = *self.probed.get_or_insert(now);
+        let is_recent = |at: Instant| now < at + Self::DISOWNING;
+        if now >= begun + Self::LEFTOVER
+            || self.disowned.is_some_and(is_recent)
+            || self.grips.values().any(|it| it.peer == peer)
+        {
+            return;
+        }
+        self.disowned = Some(now);
+        stack.send(peer, &ReleaseControl {});
     }
 
     /// Something has become of control.
