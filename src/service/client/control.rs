@@ -275,6 +275,9 @@ impl Control {
     /// A peer without Management does not report its status, and is asked no more after so many
     /// queries.
     const STATUS_TRIES: u32 = 10;
+    /// A renewal that is not confirmed is repeated after this time, so that a few lost confirmations
+    /// in a row do not cost control.
+    const RETRY: Duration = Duration::from_millis(250);
     /// Between renewals while it is not known how long control lasts.
     const HASTE: Duration = Duration::from_millis(200);
     /// How often the peer is asked how long control lasts.
@@ -325,7 +328,7 @@ impl Control {
         self.asked = self.asked.saturating_add(1);
         self.next = now
             + match self.state {
-                State::Held => self.renewal(),
+                State::Held => self.renewal().min(Self::RETRY),
                 _ => self.patience.interval,
             };
     }

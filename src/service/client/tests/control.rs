@@ -134,6 +134,25 @@ fn control_is_renewed_at_least_four_times_in_its_lifetime() {
 }
 
 #[test]
+fn confirmations_that_get_lost_in_a_row_do_not_cost_control() {
+    let (mut bench, _) = held(4);
+    renew_for(&mut bench, Duration::from_secs(2));
+    let end = bench.now + Duration::from_secs(5);
+    let mut renewals = 0;
+    while bench.now < end {
+        bench.run_ms(10);
+        for _ in bench.sent::<RequestControl>() {
+            renewals += 1;
+            // One out of five arrives.
+            if renewals % 5 == 0 {
+                bench.hear(PEER, &confirm(0));
+            }
+        }
+    }
+    assert_eq!(news(&mut bench), []);
+}
+
+#[test]
 fn a_peer_that_does_not_say_how_long_control_lasts_is_not_asked_for_ever() {
     let mut bench = Bench::new();
     request(&mut bench);
@@ -243,7 +262,7 @@ fn control_that_is_refused_and_not_ours_any_more_is_lost() {
 #[test]
 fn a_lost_reject_is_noticed_with_the_next_renewal() {
     let (mut bench, _) = held(5);
-    bench.run_ms(1000);
+    bench.run_ms(300);
     assert_eq!(bench.sent::<RequestControl>().len(), 1);
     bench.hear(PEER, &confirm(2));
     assert_eq!(
@@ -344,7 +363,7 @@ fn a_peer_that_has_no_status_is_asked_for_it_ten_times_at_most() {
 #[test]
 fn a_peer_that_was_started_again_is_lost_and_the_control_that_it_grants_anew_given_back() {
     let (mut bench, _) = held(5);
-    bench.run_ms(1000);
+    bench.run_ms(300);
     assert_eq!(bench.sent::<QueryControl>().len(), 1, "before the renewal");
     // It has just begun, is in control of nobody, and grants the renewal as a new request.
     bench.hear(PEER, &ReportControl::default());
