@@ -30,7 +30,7 @@ impl Endpoint {
     /// The most urgent datagram. What waits in the queue goes before what is cut from large
     /// messages and before what a window holds back.
     pub(super) fn take_transmit(&mut self) -> Option<Transmit> {
-        if let Some(held) = self.held.take() {
+        if let Some(held) = self.held.pop() {
             return Some(held);
         }
         Priority::ALL.into_iter().rev().find_map(|priority| {
@@ -53,7 +53,7 @@ impl Endpoint {
         if (next.link, next.to) == (first.link, first.to) && fits(&next) {
             return Some(next);
         }
-        self.held = Some(next);
+        self.held.push(next);
         None
     }
 

@@ -189,10 +189,11 @@ impl Pacer {
     }
 
     fn forget_empty(&mut self, now: Instant) {
-        if let Some(pacing) = &self.pacing {
-            self.buckets
-                .values_mut()
-                .for_each(|bucket| bucket.empty_by(now, pacing));
+        for bucket in self.buckets.values_mut() {
+            match &self.pacing {
+                Some(pacing) => bucket.empty_by(now, pacing),
+                None => bucket.filled = 0,
+            }
         }
         self.buckets
             .retain(|_, bucket| bucket.state != State::Nothing || bucket.filled > 0);

@@ -10,7 +10,6 @@ use super::{
     Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To, Transmit,
 };
 use crate::address::JausId;
-use crate::peer::LargeStyle;
 use crate::wire::{
     Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version,
 };
@@ -194,8 +193,9 @@ impl Endpoint {
         let length = message.payload.len();
         self.check_length(length, destination, version)?;
         let cut = self.cutting(destination, version).cut(length);
-        // What is large goes to everybody only until the address is known.
-        let seeks = scope == Broadcast::None && route.is_none();
+        // What is large goes to everybody only until the address is known, and nowhere else than to
+        // whoever acknowledges the beginning.
+        let seeks = scope == Broadcast::None && self.seeks_proof(destination, length);
         if message.acknowledge || cut.count() > 1 && seeks {
             return self.deliver_reliably(now, handle, message, scope);
         }
@@ -209,6 +209,17 @@ impl Endpoint {
             ..Frame::new(message.source, message.destination, message.payload.clone())
         };
         let transmits = self.transmits_of(&frame)?;
+        if scope == Broadcast::None {
+            match route {
+                None => self.calls.insert(now, &frame),
+                Some((path, _)) => {
+                    let octets = transmits.iter().map(|it| it.payload.len()).sum();
+                    if !self.may_send(now, destination, path, octets) {
+                        return Ok(());
+                    }
+                }
+            }
+        }
         if !self.transmits.has_room(message.priority, transmits.len()) {
             self.counters.add(Counter::TransmitQueueFull);
             return Err(SendError::QueueFull { limit });
@@ -217,6 +228,16 @@ impl Endpoint {
             self.transmit(transmit);
         }
         Ok(())
+    }
+
+    /// Whether the address of a destination is unknown, or not proven and the message too long to
+    /// go there unasked.
+    fn seeks_proof(&self, destination: JausId, length: usize) -> bool {
+        let much = length > self.config.unverified_address.burst as usize / 2;
+        self.route(destination).is_none_or(|(path, _)| {
+            let needs_proof = much || self.peers.awaits_proof(destination);
+            needs_proof && !self.is_free(path)
+        })
     }
 
     /// Takes in a large message that wants no acknowledgement.
@@ -263,9 +284,19 @@ impl Endpoint {
                 version: frame.version,
             };
             match self.transmit_of(&way, &frame) {
+                Ok(transmit) if !self.may_leave(now, &frame, &transmit) => {}
                 Ok(transmit) => return self.remember_echo(now, &frame, vec![transmit]).pop(),
                 Err(error) => debug!(destination = %frame.destination, %error, "cannot be sent"),
             }
+        }
+    }
+
+    /// Whether a datagram may go to an address, or goes to the group.
+    fn may_leave(&mut self, now: Instant, frame: &Frame, transmit: &Transmit) -> bool {
+        let (link, octets) = (transmit.link, transmit.payload.len());
+        match transmit.to {
+            To::Peer(peer) => self.may_send(now, frame.destination, Path { link, peer }, octets),
+            To::Group => true,
         }
     }
 
@@ -276,8 +307,7 @@ impl Endpoint {
         let presumed = self.peers.presumed(destination);
         Cutting {
             limit: longest.map_or(limit, |longest| longest.min(limit)),
-            repeat_code: version != Version::As5669a
-                || self.peers.large_style(destination) == Some(LargeStyle::RepeatedCode),
+            repeat_code: version != Version::As5669a || self.peers.wants_repeated_code(destination),
             kept: presumed.fragments_kept().zip(presumed.payload_limit()),
         }
     }

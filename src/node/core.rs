@@ -5,6 +5,7 @@
 //! queued in between. Receiving and waiting is the [driver](super::driver)'s.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::hash::{BuildHasher, RandomState};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant, SystemTime};
@@ -21,7 +22,7 @@ use super::resident::Residents;
 use super::tap::Taps;
 use crate::address::JausId;
 use crate::endpoint::{
-    AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, first_sequence_at,
+    self, AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, first_sequence_at,
 };
 use crate::link::Slab;
 use crate::link::local::Process;
@@ -55,7 +56,11 @@ pub(super) struct Shared {
 
 impl Shared {
     pub(super) fn new(config: &Config, links: Links) -> Self {
-        let endpoint = Endpoint::new(config.endpoint(first_sequence()));
+        let endpoint = Endpoint::new(endpoint::Config {
+            // Its keys come from the operating system.
+            challenge_key: RandomState::new().hash_one(0),
+            ..config.endpoint(first_sequence())
+        });
         let core = Core::new(endpoint, links, config.mailbox);
         Self {
             core: Mutex::new(core),

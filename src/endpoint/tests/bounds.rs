@@ -41,7 +41,8 @@ fn a_forgotten_peer_is_told_and_reached_through_the_group() {
         max_peers: 1,
         ..Config::default()
     });
-    rig.meet_peer();
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    rig.events();
     rig.hear(&Frame {
         source: id("42.1.2"),
         ..from_peer(QUERY_HEARTBEAT)

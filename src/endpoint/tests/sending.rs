@@ -54,7 +54,8 @@ fn a_message_goes_to_the_group_of_every_link() {
 #[test]
 fn a_peer_that_moves_is_answered_where_it_is() {
     let mut rig = Rig::new();
-    rig.meet_peer();
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    rig.events();
     rig.hear_from(9, &from_peer(QUERY_IDENTIFICATION));
     let moved = Event::PeerMoved {
         id: PEER,

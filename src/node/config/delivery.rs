@@ -113,7 +113,6 @@ impl Delivery {
         let profiles = to.profiles.into_iter().chain(repeating).collect();
         endpoint::Config {
             acknowledge_patience: self.patience,
-            retransmission_window: self.patience + Duration::from_millis(500),
             max_window: self.window,
             max_unacknowledged_octets: self.waiting,
             packing: self.packing,
