@@ -96,7 +96,7 @@ counters! {
     /// Dropped: a part of a large message of which the rest did not come in time, or for which
     /// there is no room.
     FragmentsForgotten = "dropped: unfinished large message",
-    /// Dropped: a received message, because too many wait to be delivered.
+    /// Dropped, or refused when a component sent it: a message, because too many wait to be delivered.
     DeliveryQueueFull = "dropped: delivery queue full",
     /// Dropped: a datagram to send, because too many wait to be sent.
     TransmitQueueFull = "dropped: transmit queue full",

@@ -159,6 +159,12 @@ impl Pacer {
         }
     }
 
+    /// How many other ends are remembered.
+    #[cfg(test)]
+    pub(super) fn len(&self) -> usize {
+        self.buckets.len()
+    }
+
     /// Whether a message of that length fits; a single one always does.
     pub(super) fn has_room(&self, length: usize) -> bool {
         self.octets == 0 || self.octets + length <= self.limit

@@ -192,7 +192,7 @@ impl Endpoint {
                     return self.receive_acknowledgement(now, path, frame);
                 }
                 Acknowledgement::Request => {
-                    if receivers.iter().any(|id| self.components.is_busy(id)) {
+                    if frame.destination.is_unicast() && !self.has_room_for(frame, &receivers) {
                         return Err(Counter::ReceiverBusy);
                     }
                     self.acknowledge(now, path, frame);
@@ -320,6 +320,14 @@ impl Endpoint {
         } else {
             self.gate.admit_new_id(now, from)
         }
+    }
+
+    /// Whether a message can be handed to its receivers, and need not be dropped after it was
+    /// acknowledged.
+    fn has_room_for(&self, frame: &Frame, receivers: &[JausId]) -> bool {
+        let priority = frame.flags.priority();
+        !receivers.iter().any(|id| self.components.is_busy(id))
+            && self.messages.has_room(priority, receivers.len())
     }
 
     /// The local components that a message is for, or why there are none.

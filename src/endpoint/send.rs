@@ -104,8 +104,16 @@ impl Endpoint {
         if self.components.contains(message.destination) {
             self.send_to_sibling(handle, message)?;
         } else {
+            let siblings = self.siblings(&message, scope);
+            if !self.messages.has_room(message.priority, siblings.len()) {
+                self.counters.add(Counter::DeliveryQueueFull);
+                let limit = self.config.queue_limit;
+                return Err(SendError::QueueFull { limit });
+            }
             self.send_away(now, handle, &message, scope)?;
-            self.send_to_siblings(&message, scope);
+            for to in siblings {
+                self.enqueue(received_locally(message.clone(), scope, to));
+            }
         }
         self.counters.add(Counter::MessagesSent);
         self.peers.note_sent(destination, length);
@@ -167,14 +175,15 @@ impl Endpoint {
         Ok(())
     }
 
-    fn send_to_siblings(&mut self, message: &Outgoing, scope: Broadcast) {
-        for to in self.components.matching(message.destination) {
-            let in_scope =
-                scope != Broadcast::Local || to.subsystem() == message.source.subsystem();
-            if to != message.source && in_scope {
-                self.enqueue(received_locally(message.clone(), scope, to));
-            }
-        }
+    /// The components of this node that get a message for many, but for its sender.
+    fn siblings(&self, message: &Outgoing, scope: Broadcast) -> Vec<JausId> {
+        let source = message.source;
+        let mut siblings = self.components.matching(message.destination);
+        siblings.retain(|to| {
+            let in_scope = scope != Broadcast::Local || to.subsystem() == source.subsystem();
+            *to != source && in_scope
+        });
+        siblings
     }
 
     fn send_away(

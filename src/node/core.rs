@@ -207,7 +207,12 @@ impl Core {
         }
         let (source, deadline) = (message.source, self.deadline());
         let urgent = message.priority > Priority::Standard;
-        let result = self.endpoint.send(now(), message);
+        let mut result = self.endpoint.send(now(), message.clone());
+        if let Err(endpoint::SendError::QueueFull { .. }) = result {
+            // What was gathered so far may be all that is in the way.
+            self.pump();
+            result = self.endpoint.send(now(), message);
+        }
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
             self.awaiting.insert(*handle, source, waiter);
         }
@@ -283,6 +288,12 @@ impl Core {
             }
             transmitted = true;
         }
+        self.deliver_all();
+        transmitted
+    }
+
+    /// Hands on messages to mailboxes, and news to those who wait for them.
+    fn deliver_all(&mut self) {
         while let Some(event) = self.endpoint.poll_event() {
             match event {
                 Event::Received(message) => {
@@ -295,7 +306,6 @@ impl Core {
                 }
             }
         }
-        transmitted
     }
 
     fn deliver(&mut self, message: Received) {
@@ -331,9 +341,14 @@ impl Core {
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
         self.look_after_the_busy();
         let mut more = false;
-        for (id, link) in self.links.iter_mut() {
-            let into = (&mut self.endpoint, &mut self.taps);
-            more |= link.receive(cx, now, id, &mut self.slab, into);
+        let links: Vec<_> = self.links.iter().map(|(id, _)| id).collect();
+        for id in links {
+            if let Some(link) = self.links.get_mut(id) {
+                let into = (&mut self.endpoint, &mut self.taps);
+                more |= link.receive(cx, now, id, &mut self.slab, into);
+            }
+            // Before the next: all of them together may bring more than waits at a time.
+            self.deliver_all();
         }
         more
     }

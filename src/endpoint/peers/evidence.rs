@@ -10,12 +10,12 @@ use crate::peer::{self, Assignment, LargeStyle, Recogniser};
 
 impl Peers {
     /// What a peer is: what was configured, or what it was recognised as for sure.
-    pub(super) fn profile(&self, id: JausId) -> peer::Peer {
+    pub(in crate::endpoint) fn profile(&self, id: JausId) -> peer::Peer {
         self.assigned_or(id, Recogniser::certain)
     }
 
     /// The same, or what it may be taken for where it does little harm if it is something else.
-    pub(super) fn presumed(&self, id: JausId) -> peer::Peer {
+    pub(in crate::endpoint) fn presumed(&self, id: JausId) -> peer::Peer {
         self.assigned_or(id, Recogniser::presumed)
     }
 
@@ -27,7 +27,7 @@ impl Peers {
 
     /// Whether a peer is better not answered on the TCP connections that it opened: for sure, or by
     /// the habit that makes it so.
-    pub(super) fn is_deaf_on_its_connections(&self, id: JausId) -> bool {
+    pub(in crate::endpoint) fn is_deaf_on_its_connections(&self, id: JausId) -> bool {
         let is_by_habit = || {
             let state = self.states.get(&id);
             state.is_some_and(|state| state.recogniser.repeats_version())
@@ -38,7 +38,7 @@ impl Peers {
 
     /// How a peer cuts large messages, if that is known. Who is configured to be no particular peer
     /// keeps to the standard.
-    pub(super) fn large_style(&self, id: JausId) -> Option<LargeStyle> {
+    pub(in crate::endpoint) fn large_style(&self, id: JausId) -> Option<LargeStyle> {
         let style = self.profile(id).large_style();
         let assigned = || Assignment::find(&self.assigned, id);
         style.or_else(|| assigned().map(|_| LargeStyle::Standard))
@@ -46,12 +46,12 @@ impl Peers {
 
     /// Whether large messages to a peer repeat their code in each fragment. Anybody can make a
     /// peer look as if it wanted that, so it is done only where the peer's address is proven.
-    pub(super) fn wants_repeated_code(&self, id: JausId) -> bool {
+    pub(in crate::endpoint) fn wants_repeated_code(&self, id: JausId) -> bool {
         self.large_style(id) == Some(LargeStyle::RepeatedCode) && self.trusts_evidence(id)
     }
 
     /// Whether a peer's large messages must wait until it is known how to cut them.
-    pub(super) fn awaits_proof(&self, id: JausId) -> bool {
+    pub(in crate::endpoint) fn awaits_proof(&self, id: JausId) -> bool {
         self.large_style(id) == Some(LargeStyle::RepeatedCode) && !self.trusts_evidence(id)
     }
 
@@ -63,7 +63,12 @@ impl Peers {
 
     /// Something else about a peer than a frame that was taken, and that came along `from`, may
     /// tell who it is.
-    pub(super) fn recognise(&mut self, id: JausId, from: Path, by: impl FnOnce(&mut Recogniser)) {
+    pub(in crate::endpoint) fn recognise(
+        &mut self,
+        id: JausId,
+        from: Path,
+        by: impl FnOnce(&mut Recogniser),
+    ) {
         if let Some(state) = self.states.get_mut(&id)
             && state.peer.path == from
         {

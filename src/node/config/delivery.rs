@@ -216,6 +216,17 @@ mod tests {
         assert_eq!(unpaced.apply(endpoint::Config::default()).pacing, None);
     }
 
+    #[test]
+    fn what_is_taken_for_a_repetition_does_not_depend_on_our_own_patience() {
+        let usual = endpoint::Config::default();
+        let patient = Delivery {
+            patience: Duration::from_secs(60),
+            ..Delivery::default()
+        };
+        let window = patient.apply(usual.clone()).retransmission_window;
+        assert_eq!(window, usual.retransmission_window);
+    }
+
     #[cfg(feature = "cli")]
     #[test]
     fn a_file_says_times_and_sizes_with_their_units() {
