@@ -33,12 +33,14 @@ impl Endpoint {
         if let Some(held) = self.held.pop() {
             return Some(held);
         }
-        Priority::ALL.into_iter().rev().find_map(|priority| {
+        let next = Priority::ALL.into_iter().rev().find_map(|priority| {
             let queued = self.transmits.pop_at(priority);
             queued
                 .or_else(|| self.next_delivery(priority))
                 .or_else(|| self.next_paced(priority))
-        })
+        });
+        // What may not leave before its address is proven has queued a challenge instead.
+        next.or_else(|| self.transmits.pop())
     }
 
     /// The next datagram to the same place, if it comes next and `fits`; what does not is held back

@@ -156,7 +156,10 @@ fn counters_are_listed_by_name_and_only_if_something_happened() {
 
 #[test]
 fn what_there_is_no_room_for_is_not_acknowledged_and_taken_when_it_comes_again() {
-    let mut rig = Rig::with(small());
+    let mut rig = Rig::with(Config {
+        queue_limit: 4,
+        ..Config::default()
+    });
     let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
     let requests = (1..=6).map(|sequence| Frame {
         flags: ask,

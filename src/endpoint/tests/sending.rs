@@ -64,7 +64,7 @@ fn a_peer_that_moves_is_answered_where_it_is() {
     };
     assert_eq!(rig.events()[0], moved);
     rig.send(to_peer()).unwrap();
-    assert_eq!(rig.sent()[0].0, To::Peer(path(9).peer));
+    assert_eq!(rig.sent().pop().unwrap().0, To::Peer(path(9).peer));
 }
 
 #[test]
