@@ -17,6 +17,8 @@
 #![cfg(feature = "view")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests")]
 
+#[path = "support/challenged.rs"]
+mod challenged;
 #[path = "support/shared.rs"]
 mod shared;
 
@@ -125,7 +127,10 @@ impl Party {
     fn drain(&mut self) {
         while self.endpoint.poll_event().is_some() {}
         while let Some(transmit) = self.endpoint.poll_transmit() {
-            self.sent.push(transmit.payload);
+            match challenged::acknowledgement(&transmit) {
+                Some((path, answer)) => self.endpoint.handle_datagram(self.now, path, answer),
+                None => self.sent.push(transmit.payload),
+            }
         }
     }
 

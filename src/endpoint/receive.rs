@@ -7,7 +7,7 @@ use bytes::Bytes;
 use tracing::{debug, trace, warn};
 
 use super::recent::{Class, Fingerprint};
-use super::verify::Warning;
+use super::verify::{Warning, is_challenge};
 use super::{Counter, Endpoint, Event, Path, Received};
 use crate::address::JausId;
 use crate::peer;
@@ -192,7 +192,8 @@ impl Endpoint {
                     return self.receive_acknowledgement(now, path, frame);
                 }
                 Acknowledgement::Request => {
-                    if frame.destination.is_unicast() && !self.has_room_for(frame, &receivers) {
+                    let may_be_refused = frame.destination.is_unicast() && !is_challenge(frame);
+                    if may_be_refused && !self.has_room_for(frame, &receivers) {
                         return Err(Counter::ReceiverBusy);
                     }
                     self.acknowledge(now, path, frame);
@@ -273,7 +274,7 @@ impl Endpoint {
         receivers: &[JausId],
     ) -> Result<(), Counter> {
         let from = arrival.path;
-        if receivers.is_empty() {
+        if receivers.is_empty() || is_challenge(frame) {
             return Ok(());
         }
         let payload = match frame.flags.data() {

@@ -16,14 +16,17 @@ use super::peers::{Answer, Challenge, Doubt, Finding, Heard, Probe, Sighting};
 use super::rate::{Bucket, Buckets, Origin};
 use super::{Config, Counter, Endpoint, Event, Path, Rate};
 use crate::address::JausId;
-use crate::codec::Message;
-use crate::messages::core::QueryHeartbeatPulse;
-use crate::wire::{Acknowledgement, Flags, Frame, Framing};
+use crate::wire::{Acknowledgement, Flags, Frame, Framing, Priority};
 
 /// A challenge has a number that was used before, at least so many and at most twice as many
 /// numbers ago: none that a message waits for, and none that a peer's memory of numbers would
 /// confuse with those of messages to come.
 const NUMBERS_AGO: u16 = 1 << 14;
+/// A challenge is a Query Heartbeat Pulse, which every peer understands and which changes nothing.
+/// Its priority tells an endpoint that the query is not for the component, which never sees it.
+const CHALLENGE: &[u8] = b"\x02\x22";
+const CHALLENGE_FLAGS: Flags =
+    Flags::new(Priority::High).with_acknowledgement(Acknowledgement::Request);
 /// The shortest time between two warnings of a kind.
 const WARNING_INTERVAL: Duration = Duration::from_secs(10);
 
@@ -81,6 +84,11 @@ impl Warnings {
         }
         due
     }
+}
+
+/// Whether a message is a challenge, and not for the component that it is addressed to.
+pub(super) fn is_challenge(frame: &Frame) -> bool {
+    frame.flags == CHALLENGE_FLAGS && frame.payload == CHALLENGE && frame.destination.is_unicast()
 }
 
 impl Endpoint {
@@ -217,13 +225,9 @@ impl Endpoint {
         for Probe { path, number } in probes.into_iter().flatten() {
             let frame = Frame {
                 version,
-                flags: Flags::default().with_acknowledgement(Acknowledgement::Request),
+                flags: CHALLENGE_FLAGS,
                 sequence: number,
-                ..Frame::new(
-                    local,
-                    id,
-                    Bytes::copy_from_slice(&QueryHeartbeatPulse::CODE.to_le_bytes()),
-                )
+                ..Frame::new(local, id, Bytes::from_static(CHALLENGE))
             };
             if let Ok(transmit) = self.transmit_along(path, &frame)
                 && self.is_within_budget(now, path, transmit.payload.len())

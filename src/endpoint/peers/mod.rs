@@ -193,7 +193,9 @@ impl Peers {
             RouteState::Verified => return Heard::Contested { incumbent: from },
         };
         state.peer.version = frame.version;
-        if !contested {
+        if is_near {
+            state.hear_on_route(frame, number, silence);
+        } else if !contested {
             state.begin_anew(frame, number);
         }
         self.set_route(frame.source, path, route);
@@ -383,7 +385,9 @@ impl Peers {
         let before = challenge.incumbent.path;
         let (path, route) = match (finding, challenge.rival) {
             (Finding::Moves { verified }, Some(rival)) => {
-                state.recogniser = Recogniser::new();
+                if Origin::from(rival.path) != Origin::from(before) {
+                    state.recogniser = Recogniser::new();
+                }
                 (rival.path, RouteState::of(verified))
             }
             (Finding::Stays, _) => (before, RouteState::Verified),
