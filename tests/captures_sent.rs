@@ -27,7 +27,7 @@ use std::path::Path as FilePath;
 use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
-use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path};
+use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path, Rate};
 use jaus::view::{Capture, Network};
 use jaus::wire::{Acknowledgement, Broadcast, DataControl, Frame, judp};
 
@@ -82,6 +82,9 @@ impl Party {
         let mut endpoint = Endpoint::new(Config {
             payload_limit: 4079,
             first_sequence: first.wrapping_sub(1),
+            // A recording answers no challenges, and the octets are all that matters here.
+            unverified_address: Rate::new(1 << 20, 1 << 20),
+            unverified_total: Rate::new(1 << 20, 1 << 20),
             ..Config::default()
         });
         endpoint.add_link(LINK, LinkProfile::judp([address]));

@@ -118,11 +118,12 @@ fn jauspp_is_answered_by_udp_once_it_has_registered_and_called() {
         .iter()
         .find(|(_, frames)| frames[0].source == peer)
         .unwrap();
+    let connection = SocketAddr::new(its_address.ip(), connection.port());
     let (mut registered, mut answered) = (false, 0);
     for frame in frames {
         let code = frame.code().unwrap();
         let before = seat.said.len();
-        seat.hear_frame(*connection, frame);
+        seat.hear_frame(connection, frame);
         let wanted = answers_to(code);
         let answer = seat.said[before..]
             .iter()

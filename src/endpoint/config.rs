@@ -43,12 +43,13 @@ pub const fn first_sequence_at(since_1970: Duration) -> u16 {
 pub struct Config {
     /// The most components that can be attached.
     pub max_components: usize,
-    /// The most peers whose address is remembered. When there is one more, somebody whom we have
-    /// not spoken to is forgotten, else whoever was heard longest ago; messages to it go to the
-    /// group again until it is heard. Addresses of static peers do not count and are never
+    /// The most peers whose address is remembered. When there is one more, a peer of the network
+    /// address that holds most is forgotten, else somebody whom we have not spoken to, else whoever
+    /// was heard longest ago; messages to it go to the group again until it is heard. Addresses of static peers do not count and are never
     /// forgotten.
     pub max_peers: usize,
-    /// Peers whose address is known beforehand and not learned.
+    /// Peers whose address is known beforehand and not learned. Messages with their ids from another
+    /// network address are refused.
     pub static_peers: Vec<StaticPeer>,
     /// The longest payload, in octets, that is sent in one packet: 64 to 4079, which is Junior's
     /// most; what is outside is taken for the nearest of these. The default fits one Ethernet
@@ -77,7 +78,8 @@ pub struct Config {
     /// message.
     pub duplicate_window: Duration,
     /// The same for messages that want an acknowledgement, which a peer repeats when ours got lost:
-    /// Junior for 0.42 s, an endpoint for [`acknowledge_patience`](Self::acknowledge_patience).
+    /// Junior for 0.42 s, an endpoint every 2 s at the latest. Each repetition begins it anew, so it
+    /// does not depend on how long the sender goes on.
     pub retransmission_window: Duration,
     /// The same for those that went to everybody because our address was not known: shorter,
     /// because a peer that was restarted begins like that, with the numbers that it began with
@@ -125,6 +127,13 @@ pub struct Config {
     pub access: Access,
     /// How much is taken from one source.
     pub rates: Rates,
+    /// How many octets of datagrams may go to one network address while nobody there has acknowledged
+    /// anything or is configured.
+    pub unverified_address: Rate,
+    /// The same for all such addresses together.
+    pub unverified_total: Rate,
+    /// Something that nobody can guess, such as a random number: numbers of challenges come from it.
+    pub challenge_key: u64,
     /// The shortest time between two [`Event::IdConflict`](super::Event::IdConflict) about one id.
     pub conflict_interval: Duration,
     /// The number before the first sequence number. A node should take
@@ -165,6 +174,9 @@ impl Default for Config {
             forwarded_broadcasts: Rate::new(500, 1000),
             access: Access::default(),
             rates: Rates::default(),
+            unverified_address: Rate::new(1 << 10, 4 << 10),
+            unverified_total: Rate::new(64 << 10, 64 << 10),
+            challenge_key: 0,
             conflict_interval: Duration::from_secs(5),
             first_sequence: 0,
         }
@@ -177,7 +189,7 @@ pub struct StaticPeer {
     /// Its id. With wildcards: everyone who matches and has no address of their own lives behind
     /// this address.
     pub id: JausId,
-    /// Its address. What is heard from elsewhere does not change it.
+    /// Its address. What is heard from elsewhere does not change it, and is dropped.
     pub path: Path,
     /// Whether multicast does not reach it, so that it gets a copy of every matching broadcast.
     pub gets_broadcasts: bool,

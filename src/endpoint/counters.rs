@@ -75,8 +75,14 @@ counters! {
     /// Dropped, and not acknowledged: a message for a component that has no room for it, which its
     /// sender will repeat.
     ReceiverBusy = "dropped: receiver busy, not acknowledged",
-    /// Not sent: an acknowledgement to a stranger who asked for more octets than it sent.
-    AcknowledgementsWithheld = "acknowledgements withheld from strangers",
+    /// Challenges sent to paths that are to be proven.
+    ChallengesSent = "challenges sent",
+    /// Challenges that have shown an id on two paths to be where it was.
+    PeerConflicts = "ids heard at two addresses",
+    /// Not sent: a datagram to an address that is not proven and had its share.
+    UnverifiedBudget = "not sent: too much for an unproven address",
+    /// Dropped: a message with the id of a configured peer from another network address.
+    PinnedElsewhere = "dropped: id configured to be elsewhere",
     /// Not forwarded: a broadcast that did not come by the way that leads to its sender.
     NotTheWayBack = "not forwarded: did not come from where its sender is",
     /// Not forwarded: more broadcasts than are allowed to go on.
@@ -90,7 +96,7 @@ counters! {
     /// Dropped: a part of a large message of which the rest did not come in time, or for which
     /// there is no room.
     FragmentsForgotten = "dropped: unfinished large message",
-    /// Dropped: a received message, because too many wait to be delivered.
+    /// Dropped, or refused when a component sent it: a message, because too many wait to be delivered.
     DeliveryQueueFull = "dropped: delivery queue full",
     /// Dropped: a datagram to send, because too many wait to be sent.
     TransmitQueueFull = "dropped: transmit queue full",

@@ -79,7 +79,7 @@ pub enum Event {
         /// The header that it writes.
         version: Version,
     },
-    /// A peer was heard from another address than before; messages to it go there from now on.
+    /// A peer is at another address than before; messages to it go there from now on.
     PeerMoved {
         /// Who.
         id: JausId,
@@ -87,6 +87,15 @@ pub enum Event {
         from: Path,
         /// Where it is.
         to: Path,
+    },
+    /// An id was heard at two addresses, and a challenge has shown which of them stays its peer's.
+    PeerConflict {
+        /// The id that both have.
+        id: JausId,
+        /// Where messages to it go.
+        path: Path,
+        /// Where the other is.
+        other: Path,
     },
     /// A peer was forgotten because more were heard than
     /// [`Config::max_peers`](super::Config::max_peers).

@@ -36,6 +36,7 @@ mod config;
 mod counters;
 mod delivery;
 mod event;
+mod forward;
 mod large;
 mod link;
 mod local;
@@ -48,10 +49,10 @@ mod queue;
 mod rate;
 mod receive;
 mod recent;
-mod route;
 mod send;
 #[cfg(test)]
 mod tests;
+mod verify;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::hash::RandomState;
@@ -67,13 +68,14 @@ pub use local::AttachError;
 pub use occupancy::Occupancy;
 pub use pacing::Pacing;
 pub use packing::Packing;
-pub use peers::{Peer, Traffic};
+pub use peers::{Peer, RouteState, Traffic};
 #[cfg(feature = "ra33")]
 pub(crate) use rate::Buckets;
 pub use rate::{Rate, Rates};
 pub use send::SendError;
 
 use crate::address::JausId;
+use acknowledge::Calls;
 use delivery::Deliveries;
 use large::{Numbers, Reassembly};
 use local::Components;
@@ -83,6 +85,7 @@ use peers::Peers;
 use queue::PriorityQueue;
 use rate::{Bucket, Gate};
 use recent::Recent;
+use verify::{Budget, Warnings};
 
 /// The protocol core of a node. See the [module](self).
 #[derive(Debug)]
@@ -93,22 +96,22 @@ pub struct Endpoint {
     peers: Peers,
     numbers: Numbers,
     gate: Gate,
-    /// Octets of acknowledgements that a stranger may have for what is being received.
-    credit: usize,
-    /// Octets of memory that a payload of what is being received holds on to.
-    held_by_payload: usize,
-    /// Whether what is being received went to everybody.
-    to_all: bool,
+    /// What may be sent to whom nobody vouches for.
+    budget: Budget,
+    warnings: Warnings,
+    /// Challenges that were made so far.
+    probes: u64,
     /// For what is passed on to many.
     broadcasts: Bucket,
     heard: Recent,
     sent_to_group: Recent,
+    calls: Calls,
     reassembly: Reassembly,
     deliveries: Deliveries,
     conflicts: BTreeMap<JausId, Instant>,
     transmits: PriorityQueue<Transmit>,
-    /// Taken out, but it did not go with the one before.
-    held: Option<Transmit>,
+    /// Taken out, but they did not go with the one before; the last comes next.
+    held: Vec<Transmit>,
     pacer: Pacer,
     gathering: Gathering,
     messages: PriorityQueue<Received>,
@@ -135,17 +138,18 @@ impl Endpoint {
             peers: Peers::new(&config),
             numbers: Numbers::after(config.first_sequence),
             gate: Gate::new(&config.rates, config.max_peers),
-            credit: 0,
-            held_by_payload: 0,
-            to_all: false,
+            budget: Budget::new(&config),
+            warnings: Warnings::default(),
+            probes: 0,
             broadcasts: Bucket::default(),
             heard: Recent::new(config.max_recent, longest, keys.clone()),
+            calls: Calls::default(),
             sent_to_group: Recent::new(config.max_recent, config.echo_window, keys),
             reassembly: Reassembly::new(&config),
             deliveries: Deliveries::new(&config),
             conflicts: BTreeMap::new(),
             transmits: PriorityQueue::new(config.queue_limit),
-            held: None,
+            held: Vec::new(),
             pacer: Pacer::new(&config),
             gathering: Gathering::default(),
             messages: PriorityQueue::new(config.queue_limit),
@@ -197,7 +201,7 @@ impl Endpoint {
         self.links.remove(&link);
         self.peers.forget_link(link);
         self.transmits.retain(|transmit| transmit.link != link);
-        self.held.take_if(|transmit| transmit.link == link);
+        self.held.retain(|transmit| transmit.link != link);
         self.pacer.forget_link(link);
         self.gathering.forget_link(link);
     }
@@ -232,6 +236,7 @@ impl Endpoint {
     pub fn handle_timeout(&mut self, now: Instant) {
         self.latest = Some(now);
         self.retry_unacknowledged(now);
+        self.handle_challenges(now);
         self.pacer.handle_timeout(now);
         self.send_gathered(now);
         self.reassembly.expire(now, &mut self.counters);
@@ -258,6 +263,7 @@ impl Endpoint {
     pub fn poll_timeout(&self) -> Option<Instant> {
         [
             self.deliveries.next_deadline(),
+            self.peers.next_deadline(),
             self.pacer.next_deadline(),
             self.gathering.next_deadline(),
             self.reassembly.next_expiry(),

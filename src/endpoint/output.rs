@@ -30,15 +30,17 @@ impl Endpoint {
     /// The most urgent datagram. What waits in the queue goes before what is cut from large
     /// messages and before what a window holds back.
     pub(super) fn take_transmit(&mut self) -> Option<Transmit> {
-        if let Some(held) = self.held.take() {
+        if let Some(held) = self.held.pop() {
             return Some(held);
         }
-        Priority::ALL.into_iter().rev().find_map(|priority| {
+        let next = Priority::ALL.into_iter().rev().find_map(|priority| {
             let queued = self.transmits.pop_at(priority);
             queued
                 .or_else(|| self.next_delivery(priority))
                 .or_else(|| self.next_paced(priority))
-        })
+        });
+        // What may not leave before its address is proven has queued a challenge instead.
+        next.or_else(|| self.transmits.pop())
     }
 
     /// The next datagram to the same place, if it comes next and `fits`; what does not is held back
@@ -53,7 +55,7 @@ impl Endpoint {
         if (next.link, next.to) == (first.link, first.to) && fits(&next) {
             return Some(next);
         }
-        self.held = Some(next);
+        self.held.push(next);
         None
     }
 

@@ -159,6 +159,12 @@ impl Pacer {
         }
     }
 
+    /// How many other ends are remembered.
+    #[cfg(test)]
+    pub(super) fn len(&self) -> usize {
+        self.buckets.len()
+    }
+
     /// Whether a message of that length fits; a single one always does.
     pub(super) fn has_room(&self, length: usize) -> bool {
         self.octets == 0 || self.octets + length <= self.limit
@@ -189,10 +195,11 @@ impl Pacer {
     }
 
     fn forget_empty(&mut self, now: Instant) {
-        if let Some(pacing) = &self.pacing {
-            self.buckets
-                .values_mut()
-                .for_each(|bucket| bucket.empty_by(now, pacing));
+        for bucket in self.buckets.values_mut() {
+            match &self.pacing {
+                Some(pacing) => bucket.empty_by(now, pacing),
+                None => bucket.filled = 0,
+            }
         }
         self.buckets
             .retain(|_, bucket| bucket.state != State::Nothing || bucket.filled > 0);

@@ -67,14 +67,30 @@ pub(super) struct Bucket {
 impl Bucket {
     /// Takes a token, if there is one.
     pub(super) fn take(&mut self, now: Instant, rate: Rate) -> bool {
+        self.take_many(now, rate, 1)
+    }
+
+    /// Takes so many tokens, if they are there.
+    pub(super) fn take_many(&mut self, now: Instant, rate: Rate, tokens: u32) -> bool {
         let interval = rate.interval();
         let full = self.full.map_or(now, |full| full.max(now));
         let debt = full.saturating_duration_since(now);
-        if debt > interval * (rate.burst.max(1) - 1) {
+        let Some(rest) = rate.burst.max(1).checked_sub(tokens) else {
+            return false;
+        };
+        if debt > interval * rest {
             return false;
         }
-        self.full = Some(full + interval);
+        self.full = Some(full + interval * tokens);
         true
+    }
+
+    /// How many tokens are missing.
+    fn owed(self, now: Instant, rate: Rate) -> u32 {
+        let debt = self.full.map(|full| full.saturating_duration_since(now));
+        let interval = rate.interval().as_nanos().max(1);
+        let owed = debt.unwrap_or_default().as_nanos() / interval;
+        u32::try_from(owed).unwrap_or(u32::MAX)
     }
 
     fn is_full(self, now: Instant) -> bool {
@@ -109,13 +125,30 @@ impl<K: Eq + Hash> Buckets<K> {
 
     /// Takes a token of a source, if there is one.
     pub(crate) fn take(&mut self, now: Instant, source: K) -> bool {
+        self.take_many(now, source, 1)
+    }
+
+    /// How much each source may take.
+    pub(super) const fn rate(&self) -> Rate {
+        self.rate
+    }
+
+    /// How many tokens a source has taken that have not come back yet.
+    pub(super) fn owed(&self, now: Instant, source: K) -> u32 {
+        let bucket = self.own.get(&source).copied();
+        bucket.unwrap_or(self.shared).owed(now, self.rate)
+    }
+
+    /// Takes so many tokens of a source, if they are there.
+    pub(super) fn take_many(&mut self, now: Instant, source: K, tokens: u32) -> bool {
         if self.own.len() >= self.limit && !self.own.contains_key(&source) {
             self.sweep(now);
             if self.own.len() >= self.limit {
-                return self.shared.take(now, self.rate);
+                return self.shared.take_many(now, self.rate, tokens);
             }
         }
-        self.own.entry(source).or_default().take(now, self.rate)
+        let own = self.own.entry(source).or_default();
+        own.take_many(now, self.rate, tokens)
     }
 
     /// Gives up full buckets: an absent one is as good.
@@ -129,8 +162,8 @@ impl<K: Eq + Hash> Buckets<K> {
 }
 
 /// Where something comes from, as far as the network tells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-enum Origin {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Origin {
     Address(IpAddr),
     Line(LinkId),
 }

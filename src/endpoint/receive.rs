@@ -4,23 +4,30 @@
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use tracing::{debug, trace};
+use tracing::{debug, trace, warn};
 
-use super::peers::Learned;
 use super::recent::{Class, Fingerprint};
+use super::verify::{Warning, is_challenge};
 use super::{Counter, Endpoint, Event, Path, Received};
 use crate::address::JausId;
 use crate::peer;
-use crate::wire::{
-    Acknowledgement, Broadcast, DataControl, Flags, Frame, Framing, Version, as5669a, judp,
-};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Framing, Version, judp};
 
-/// Octets of IPv4 and UDP around a datagram.
-const DATAGRAM_OVERHEAD: usize = 28;
+/// How a message came.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Arrival {
+    pub(super) now: Instant,
+    pub(super) path: Path,
+    /// Whether it went to everybody.
+    to_all: bool,
+    /// Octets of memory that its payload holds on to.
+    pub(super) held: usize,
+}
+
 /// The same message again within this time is a copy made on the way: nobody repeats so fast.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(1);
 
-/// How a message stands to what was heard lately.
+/// Result of the duplicate check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Novelty {
     /// Not heard lately.
@@ -48,14 +55,17 @@ impl Endpoint {
     }
 
     fn receive_datagram(&mut self, now: Instant, from: Path, data: Bytes, to_all: bool) {
-        self.to_all = to_all;
         self.latest = Some(now);
         self.counters.add(Counter::DatagramsReceived);
         if let Err(reason) = self.check_path(from) {
             return self.counters.add(reason);
         }
-        self.credit = data.len() + DATAGRAM_OVERHEAD;
-        self.held_by_payload = data.len();
+        let arrival = Arrival {
+            now,
+            path: from,
+            to_all,
+            held: data.len(),
+        };
         let mut frames = match judp::frames(data) {
             Ok(frames) => frames,
             Err(error) => {
@@ -67,7 +77,7 @@ impl Endpoint {
         for frame in &mut frames {
             match frame {
                 Ok(frame) => {
-                    self.receive(now, from, &frame);
+                    self.receive(arrival, &frame);
                     latest = Some(frame.source);
                 }
                 Err(error) => {
@@ -82,7 +92,7 @@ impl Endpoint {
                 .add_many(Counter::StaleOctets, frames.remaining() as u64);
             if let Some(source) = latest {
                 self.peers
-                    .recognise(source, peer::Recogniser::handle_stale_octets);
+                    .recognise(source, from, peer::Recogniser::handle_stale_octets);
             }
         }
     }
@@ -95,18 +105,22 @@ impl Endpoint {
             self.counters.add(Counter::MessagesReceived);
             return self.counters.add(reason);
         }
-        self.to_all = false;
-        // Whoever is at the other end has shown that it is there.
-        self.credit = usize::MAX;
-        self.held_by_payload = usize::MAX;
-        self.receive(now, from, frame);
+        let arrival = Arrival {
+            now,
+            path: from,
+            to_all: false,
+            held: usize::MAX,
+        };
+        self.receive(arrival, frame);
     }
 
     /// Takes note that a version octet stands before the next frame of `source` in the middle of a
     /// TCP stream, which tells something of who it is and where it is to be answered.
     pub fn handle_repeated_version(&mut self, source: JausId) {
-        self.peers
-            .recognise(source, peer::Recogniser::handle_repeated_version);
+        if let Some((path, _)) = self.peers.last_heard(source) {
+            self.peers
+                .recognise(source, path, peer::Recogniser::handle_repeated_version);
+        }
     }
 
     /// Whether anything may come by a path.
@@ -121,15 +135,15 @@ impl Endpoint {
         Ok(())
     }
 
-    fn receive(&mut self, now: Instant, from: Path, frame: &Frame) {
+    fn receive(&mut self, arrival: Arrival, frame: &Frame) {
         self.counters.add(Counter::MessagesReceived);
         let (source, destination) = (frame.source, frame.destination);
         let accepted = match self.with_wildcards_for_zeros(frame) {
-            Some(meant) => self.accept(now, from, &meant),
-            None => self.accept(now, from, frame),
+            Some(meant) => self.accept(arrival, &meant),
+            None => self.accept(arrival, frame),
         };
         if let Err(reason) = accepted {
-            trace!(%source, %destination, peer = %from.peer, %reason);
+            trace!(%source, %destination, peer = %arrival.path.peer, %reason);
             self.counters.add(reason);
         }
     }
@@ -145,80 +159,122 @@ impl Endpoint {
     }
 
     /// Does all that a message causes, or tells why it is dropped.
-    fn accept(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
+    fn accept(&mut self, arrival: Arrival, frame: &Frame) -> Result<(), Counter> {
+        let Arrival { now, path, .. } = arrival;
         let broadcast = check_header(frame).inspect_err(|reason| {
             if *reason == Counter::PriorityFault {
                 self.peers
-                    .recognise(frame.source, |it| it.handle_frame(frame, 0));
+                    .recognise(frame.source, path, |it| it.handle_frame(frame, 0));
             }
         })?;
         let seen = self.heard.fingerprint(frame);
-        self.refuse_own(now, from, frame.source, seen)?;
-        self.config.access.check_source(frame.source)?;
+        self.refuse_own(now, path, frame.source, seen)?;
+        self.refuse_misplaced(now, path, frame.source)?;
         let passes = self.is_passed_on(frame);
         let receivers = match self.receivers(frame, broadcast) {
             Err(_) if passes => Vec::new(),
             receivers => receivers?,
         };
-        self.admit(now, from, frame.source)?;
+        self.admit(now, path, frame.source)?;
         // Before acknowledging: what is dropped must not be taken for delivered.
-        if !self.peers.has_room_for(now, frame.source) {
+        if !self.peers.has_room_for(now, frame.source, path) {
+            if self.warnings.is_due(now, Warning::TableFull) {
+                warn!(
+                    id = %frame.source, from = %path.peer,
+                    "no room for another peer: raise limits.max_peers, or see who invents ids"
+                );
+            }
             return Err(Counter::PeersFull);
         }
         if !receivers.is_empty() {
             match frame.flags.acknowledgement() {
                 Acknowledgement::Positive | Acknowledgement::Negative => {
-                    self.learn(now, from, frame)?;
-                    self.receive_answer(now, frame)?;
-                    self.peers.note_answer(frame.source);
-                    return Ok(());
+                    return self.receive_acknowledgement(now, path, frame);
                 }
                 Acknowledgement::Request => {
-                    if receivers.iter().any(|id| self.components.is_busy(id)) {
+                    let may_be_refused = frame.destination.is_unicast() && !is_challenge(frame);
+                    if may_be_refused && !self.has_room_for(frame, &receivers) {
                         return Err(Counter::ReceiverBusy);
                     }
-                    self.acknowledge_within_limits(from, frame);
+                    self.acknowledge(now, path, frame);
                 }
                 Acknowledgement::None => {}
             }
         }
         // Before learning: a copy that came another way must not move the peer there and back.
-        let novelty = match self.recall(now, from, frame, seen) {
+        let novelty = match self.recall(arrival, frame, seen) {
             Novelty::Repeated if self.reassembly.awaits(frame) => Novelty::New,
             novelty => novelty,
         };
         if novelty != Novelty::New {
-            self.peers.note_duplicate(frame.source);
+            self.peers.note(frame.source, |peer| peer.duplicates += 1);
             if passes && novelty == Novelty::Repeated {
-                self.pass_on(now, from, frame);
+                self.pass_on(now, path, frame);
             }
             return Err(Counter::Duplicate);
         }
-        if passes && self.is_astray(now, from, frame) {
+        if passes && self.is_astray(now, path, frame) {
             self.counters.add(Counter::NotTheWayBack);
         } else {
-            self.learn(now, from, frame)?;
-            if self.to_all {
+            self.learn(now, path, frame)?;
+            if arrival.to_all {
                 self.peers
-                    .recognise(frame.source, |it| it.handle_frame_to_all(frame));
+                    .recognise(frame.source, path, |it| it.handle_frame_to_all(frame));
             }
             if passes {
-                self.pass_on(now, from, frame);
+                self.pass_on(now, path, frame);
             }
         }
-        self.put_together(now, from, frame, broadcast, &receivers)
+        self.put_together(arrival, frame, broadcast, &receivers)
+    }
+
+    /// Takes an acknowledgement. One that nobody waits for teaches nothing and moves nobody.
+    fn receive_acknowledgement(
+        &mut self,
+        now: Instant,
+        from: Path,
+        frame: &Frame,
+    ) -> Result<(), Counter> {
+        let (peer, local, number) = (frame.source, frame.destination, frame.sequence);
+        if self.calls.take(now, peer, local, number) {
+            return self.learn(now, from, frame);
+        }
+        if self.awaits_answer(peer, local, number) {
+            self.learn(now, from, frame)?;
+            self.receive_answer(now, frame)?;
+            let from = self.where_it_reads(peer, from);
+            self.peers.verify(peer, from);
+            return Ok(());
+        }
+        if self.receive_challenge_answer(now, from, frame) {
+            return self.learn(now, from, frame);
+        }
+        Err(Counter::UnawaitedAcknowledgement)
+    }
+
+    /// Refuses what may not come from there: from an id that is denied or configured to be
+    /// elsewhere.
+    fn refuse_misplaced(&mut self, now: Instant, from: Path, id: JausId) -> Result<(), Counter> {
+        self.config.access.check_source(id)?;
+        if !self.peers.is_pinned_elsewhere(id, from) {
+            return Ok(());
+        }
+        if self.warnings.is_due(now, Warning::PinnedElsewhere) {
+            warn!(%id, from = %from.peer, "refused: peers says that this id is at another address");
+        }
+        Err(Counter::PinnedElsewhere)
     }
 
     /// Delivers a message to components of ours when it is whole.
     fn put_together(
         &mut self,
-        now: Instant,
-        from: Path,
+        arrival: Arrival,
         frame: &Frame,
         broadcast: Broadcast,
         receivers: &[JausId],
     ) -> Result<(), Counter> {
-        if receivers.is_empty() {
+        let from = arrival.path;
+        if receivers.is_empty() || is_challenge(frame) {
             return Ok(());
         }
         let payload = match frame.flags.data() {
@@ -228,16 +284,12 @@ impl Endpoint {
             }
             _ => {
                 let style = self.peers.large_style(frame.source);
-                let whole = self.reassembly.insert(
-                    now,
-                    frame,
-                    self.held_by_payload,
-                    style,
-                    &mut self.counters,
-                )?;
+                let whole = self
+                    .reassembly
+                    .insert(arrival, frame, style, &mut self.counters)?;
                 let Some(whole) = whole else { return Ok(()) };
                 self.peers
-                    .recognise(frame.source, |it| it.handle_large(whole.style));
+                    .recognise(frame.source, from, |it| it.handle_large(whole.style));
                 whole.payload
             }
         };
@@ -252,7 +304,7 @@ impl Endpoint {
             return;
         };
         self.peers
-            .recognise(next.source, |it| it.handle_large(whole.style));
+            .recognise(next.source, from, |it| it.handle_large(whole.style));
         let large = Frame {
             flags: Flags::new(priority),
             ..Frame::new(next.source, destination, Bytes::new())
@@ -271,17 +323,12 @@ impl Endpoint {
         }
     }
 
-    /// Acknowledges a message. Strangers get no more octets of acknowledgements for a datagram than
-    /// it had, or others could be flooded through us in their name.
-    fn acknowledge_within_limits(&mut self, from: Path, request: &Frame) {
-        if self.peers.is_stranger(request.source) {
-            const COST: usize = 1 + as5669a::MIN_LEN + DATAGRAM_OVERHEAD;
-            let Some(rest) = self.credit.checked_sub(COST) else {
-                return self.counters.add(Counter::AcknowledgementsWithheld);
-            };
-            self.credit = rest;
-        }
-        self.acknowledge(from, request);
+    /// Whether a message can be handed to its receivers, and need not be dropped after it was
+    /// acknowledged.
+    fn has_room_for(&self, frame: &Frame, receivers: &[JausId]) -> bool {
+        let priority = frame.flags.priority();
+        !receivers.iter().any(|id| self.components.is_busy(id))
+            && self.messages.has_room(priority, receivers.len())
     }
 
     /// The local components that a message is for, or why there are none.
@@ -336,44 +383,16 @@ impl Endpoint {
         {
             self.conflicts.insert(id, now);
             debug!(%id, ?from, "id conflict");
+            if self.warnings.is_due(now, Warning::IdConflict) {
+                warn!(%id, from = %from.peer, "somebody else uses an id of this node: change one of the two");
+            }
             self.announce(Event::IdConflict { id, path: from });
         }
     }
 
-    /// Learns where a sender is, if there is room for it.
-    fn learn(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
-        let (id, version) = (frame.source, frame.version);
-        let from = self.where_it_reads(id, from);
-        match self.peers.learn(now, from, frame) {
-            Learned::Known => {}
-            Learned::New { evicted } => {
-                if let Some(id) = evicted {
-                    self.counters.add(Counter::PeersEvicted);
-                    self.announce(Event::PeerForgotten { id });
-                }
-                debug!(%id, ?from, %version, "peer learned");
-                self.announce(Event::PeerLearned {
-                    id,
-                    path: from,
-                    version,
-                });
-            }
-            Learned::Moved { from: before } => {
-                debug!(%id, ?before, ?from, "peer moved");
-                self.announce(Event::PeerMoved {
-                    id,
-                    from: before,
-                    to: from,
-                });
-            }
-            Learned::NoRoom => return Err(Counter::PeersFull),
-        }
-        Ok(())
-    }
-
     /// Where a sender is to be answered: where it was heard, unless it does not read there. Then
     /// where it was heard before by datagram, if it was.
-    fn where_it_reads(&self, id: JausId, from: Path) -> Path {
+    pub(super) fn where_it_reads(&self, id: JausId, from: Path) -> Path {
         let is_datagram = |path: &Path| self.framing(path.link) == Framing::Judp;
         if is_datagram(&from) || !self.peers.is_deaf_on_its_connections(id) {
             return from;
@@ -386,7 +405,8 @@ impl Endpoint {
     ///
     /// The older headers' peers leave the sequence number at 0, so there only a message that wants
     /// an acknowledgement, and hence may be repeated, can be told from another.
-    fn recall(&mut self, now: Instant, from: Path, frame: &Frame, seen: Fingerprint) -> Novelty {
+    fn recall(&mut self, arrival: Arrival, frame: &Frame, seen: Fingerprint) -> Novelty {
+        let now = arrival.now;
         let forwarding = self.config.forwarding;
         let repeats = frame.flags.acknowledgement() != Acknowledgement::None;
         let numbered = repeats || frame.version == Version::As5669a;
@@ -394,7 +414,7 @@ impl Endpoint {
             return Novelty::New;
         }
         let seen = seen.in_round(self.peers.round(frame));
-        let way = self.heard.way(forwarding.then_some(from));
+        let way = self.heard.way(forwarding.then_some(arrival.path));
         let novelty = match self.heard.sighting(seen) {
             None => Novelty::New,
             Some(before) => {
@@ -402,7 +422,7 @@ impl Endpoint {
                 let elsewhere = before.way != way;
                 if elsewhere && age < self.config.retransmission_window {
                     Novelty::Copy
-                } else if numbered && age < self.duplicate_window(frame) {
+                } else if numbered && age < self.duplicate_window(arrival, frame) {
                     if repeats && age >= REPEAT_INTERVAL {
                         Novelty::Repeated
                     } else {
@@ -422,12 +442,12 @@ impl Endpoint {
     }
 
     /// For how long the same message is taken for a duplicate.
-    fn duplicate_window(&self, frame: &Frame) -> Duration {
+    fn duplicate_window(&self, arrival: Arrival, frame: &Frame) -> Duration {
         if frame.flags.acknowledgement() == Acknowledgement::None {
             return self.config.duplicate_window;
         }
         let is_call = frame.flags.broadcast() != Some(Broadcast::None);
-        let is_unmarked_call = self.to_all && peer::Recogniser::is_unmarked_call(frame);
+        let is_unmarked_call = arrival.to_all && peer::Recogniser::is_unmarked_call(frame);
         if is_call || is_unmarked_call || self.repeats_soon(frame.source) {
             self.config.first_contact_window
         } else {

@@ -10,7 +10,6 @@ use super::{
     Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To, Transmit,
 };
 use crate::address::JausId;
-use crate::peer::LargeStyle;
 use crate::wire::{
     Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version,
 };
@@ -105,8 +104,16 @@ impl Endpoint {
         if self.components.contains(message.destination) {
             self.send_to_sibling(handle, message)?;
         } else {
+            let siblings = self.siblings(&message, scope);
+            if !self.messages.has_room(message.priority, siblings.len()) {
+                self.counters.add(Counter::DeliveryQueueFull);
+                let limit = self.config.queue_limit;
+                return Err(SendError::QueueFull { limit });
+            }
             self.send_away(now, handle, &message, scope)?;
-            self.send_to_siblings(&message, scope);
+            for to in siblings {
+                self.enqueue(received_locally(message.clone(), scope, to));
+            }
         }
         self.counters.add(Counter::MessagesSent);
         self.peers.note_sent(destination, length);
@@ -168,14 +175,15 @@ impl Endpoint {
         Ok(())
     }
 
-    fn send_to_siblings(&mut self, message: &Outgoing, scope: Broadcast) {
-        for to in self.components.matching(message.destination) {
-            let in_scope =
-                scope != Broadcast::Local || to.subsystem() == message.source.subsystem();
-            if to != message.source && in_scope {
-                self.enqueue(received_locally(message.clone(), scope, to));
-            }
-        }
+    /// The components of this node that get a message for many, but for its sender.
+    fn siblings(&self, message: &Outgoing, scope: Broadcast) -> Vec<JausId> {
+        let source = message.source;
+        let mut siblings = self.components.matching(message.destination);
+        siblings.retain(|to| {
+            let in_scope = scope != Broadcast::Local || to.subsystem() == source.subsystem();
+            *to != source && in_scope
+        });
+        siblings
     }
 
     fn send_away(
@@ -194,8 +202,9 @@ impl Endpoint {
         let length = message.payload.len();
         self.check_length(length, destination, version)?;
         let cut = self.cutting(destination, version).cut(length);
-        // What is large goes to everybody only until the address is known.
-        let seeks = scope == Broadcast::None && route.is_none();
+        // What is large goes to everybody only until the address is known, and nowhere else than to
+        // whoever acknowledges the beginning.
+        let seeks = scope == Broadcast::None && self.seeks_proof(destination, length);
         if message.acknowledge || cut.count() > 1 && seeks {
             return self.deliver_reliably(now, handle, message, scope);
         }
@@ -209,6 +218,17 @@ impl Endpoint {
             ..Frame::new(message.source, message.destination, message.payload.clone())
         };
         let transmits = self.transmits_of(&frame)?;
+        if scope == Broadcast::None {
+            match route {
+                None => self.calls.insert(now, &frame),
+                Some((path, _)) => {
+                    let octets = transmits.iter().map(|it| it.payload.len()).sum();
+                    if !self.may_send(now, destination, path, octets) {
+                        return Ok(());
+                    }
+                }
+            }
+        }
         if !self.transmits.has_room(message.priority, transmits.len()) {
             self.counters.add(Counter::TransmitQueueFull);
             return Err(SendError::QueueFull { limit });
@@ -217,6 +237,16 @@ impl Endpoint {
             self.transmit(transmit);
         }
         Ok(())
+    }
+
+    /// Whether the address of a destination is unknown, or not proven and the message too long to
+    /// go there unasked.
+    fn seeks_proof(&self, destination: JausId, length: usize) -> bool {
+        let much = length > self.config.unverified_address.burst as usize / 2;
+        self.route(destination).is_none_or(|(path, _)| {
+            let needs_proof = much || self.peers.awaits_proof(destination);
+            needs_proof && !self.is_free(path)
+        })
     }
 
     /// Takes in a large message that wants no acknowledgement.
@@ -263,9 +293,19 @@ impl Endpoint {
                 version: frame.version,
             };
             match self.transmit_of(&way, &frame) {
+                Ok(transmit) if !self.may_leave(now, &frame, &transmit) => {}
                 Ok(transmit) => return self.remember_echo(now, &frame, vec![transmit]).pop(),
                 Err(error) => debug!(destination = %frame.destination, %error, "cannot be sent"),
             }
+        }
+    }
+
+    /// Whether a datagram may go to an address, or goes to the group.
+    fn may_leave(&mut self, now: Instant, frame: &Frame, transmit: &Transmit) -> bool {
+        let (link, octets) = (transmit.link, transmit.payload.len());
+        match transmit.to {
+            To::Peer(peer) => self.may_send(now, frame.destination, Path { link, peer }, octets),
+            To::Group => true,
         }
     }
 
@@ -276,8 +316,7 @@ impl Endpoint {
         let presumed = self.peers.presumed(destination);
         Cutting {
             limit: longest.map_or(limit, |longest| longest.min(limit)),
-            repeat_code: version != Version::As5669a
-                || self.peers.large_style(destination) == Some(LargeStyle::RepeatedCode),
+            repeat_code: version != Version::As5669a || self.peers.wants_repeated_code(destination),
             kept: presumed.fragments_kept().zip(presumed.payload_limit()),
         }
     }

@@ -5,6 +5,7 @@
 //! queued in between. Receiving and waiting is the [driver](super::driver)'s.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::hash::{BuildHasher, RandomState};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant, SystemTime};
@@ -21,7 +22,7 @@ use super::resident::Residents;
 use super::tap::Taps;
 use crate::address::JausId;
 use crate::endpoint::{
-    AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, first_sequence_at,
+    self, AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, first_sequence_at,
 };
 use crate::link::Slab;
 use crate::link::local::Process;
@@ -55,7 +56,11 @@ pub(super) struct Shared {
 
 impl Shared {
     pub(super) fn new(config: &Config, links: Links) -> Self {
-        let endpoint = Endpoint::new(config.endpoint(first_sequence()));
+        let endpoint = Endpoint::new(endpoint::Config {
+            // Its keys come from the operating system.
+            challenge_key: RandomState::new().hash_one(0),
+            ..config.endpoint(first_sequence())
+        });
         let core = Core::new(endpoint, links, config.mailbox);
         Self {
             core: Mutex::new(core),
@@ -202,7 +207,12 @@ impl Core {
         }
         let (source, deadline) = (message.source, self.deadline());
         let urgent = message.priority > Priority::Standard;
-        let result = self.endpoint.send(now(), message);
+        let mut result = self.endpoint.send(now(), message.clone());
+        if let Err(endpoint::SendError::QueueFull { .. }) = result {
+            // What was gathered so far may be all that is in the way.
+            self.pump();
+            result = self.endpoint.send(now(), message);
+        }
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
             self.awaiting.insert(*handle, source, waiter);
         }
@@ -278,6 +288,12 @@ impl Core {
             }
             transmitted = true;
         }
+        self.deliver_all();
+        transmitted
+    }
+
+    /// Hands on messages to mailboxes, and news to those who wait for them.
+    fn deliver_all(&mut self) {
         while let Some(event) = self.endpoint.poll_event() {
             match event {
                 Event::Received(message) => {
@@ -290,7 +306,6 @@ impl Core {
                 }
             }
         }
-        transmitted
     }
 
     fn deliver(&mut self, message: Received) {
@@ -326,9 +341,14 @@ impl Core {
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
         self.look_after_the_busy();
         let mut more = false;
-        for (id, link) in self.links.iter_mut() {
-            let into = (&mut self.endpoint, &mut self.taps);
-            more |= link.receive(cx, now, id, &mut self.slab, into);
+        let links: Vec<_> = self.links.iter().map(|(id, _)| id).collect();
+        for id in links {
+            if let Some(link) = self.links.get_mut(id) {
+                let into = (&mut self.endpoint, &mut self.taps);
+                more |= link.receive(cx, now, id, &mut self.slab, into);
+            }
+            // Before the next: all of them together may bring more than waits at a time.
+            self.deliver_all();
         }
         more
     }

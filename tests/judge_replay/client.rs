@@ -12,7 +12,7 @@ use jaus::messages::core::{
     QueryEvents, RejectControl, RejectEventRequest, ReleaseControl, RequestControl, Reset,
     SetElement, UpdateEvent, query_events::QueryEventsVar,
 };
-use jaus::wire::{Frame, judp};
+use jaus::wire::{Acknowledgement, Flags, Frame, judp};
 
 use crate::capture::Said;
 use crate::vehicle::{VEHICLE, Vehicle};
@@ -44,6 +44,14 @@ struct Stream {
     is_running: bool,
 }
 
+fn acknowledgement_of(query: &Frame) -> Frame {
+    Frame {
+        flags: Flags::default().with_acknowledgement(Acknowledgement::Positive),
+        sequence: query.sequence,
+        ..Frame::new(query.destination, query.source, Bytes::new())
+    }
+}
+
 /// The client, and what it knows about event streams.
 pub(crate) struct Client {
     socket: UdpSocket,
@@ -52,6 +60,8 @@ pub(crate) struct Client {
     /// The sequence numbers of the events that came, by stream.
     events: BTreeMap<u8, Vec<u8>>,
     heard: VecDeque<Frame>,
+    /// Whether it acknowledges what asks for that, as JAUS++ does and the judging tool does not.
+    pub(crate) acknowledges: bool,
 }
 
 impl Client {
@@ -65,6 +75,7 @@ impl Client {
             streams: Vec::new(),
             events: BTreeMap::new(),
             heard: VecDeque::new(),
+            acknowledges: false,
         }
     }
 
@@ -128,9 +139,16 @@ impl Client {
             let left = deadline.checked_duration_since(Instant::now())?;
             let left = left.max(Duration::from_millis(1));
             self.socket.set_read_timeout(Some(left)).unwrap();
-            if let Ok(length) = self.socket.recv(&mut buffer) {
+            if let Ok((length, from)) = self.socket.recv_from(&mut buffer) {
                 let frames = judp::frames(Bytes::copy_from_slice(&buffer[..length])).unwrap();
-                let of_vehicle = frames.map_while(Result::ok);
+                let of_vehicle: Vec<_> = frames.map_while(Result::ok).collect();
+                for query in of_vehicle.iter().filter(|_| self.acknowledges) {
+                    if query.flags.acknowledgement() == Acknowledgement::Request {
+                        let answer = judp::encode(&acknowledgement_of(query)).unwrap();
+                        self.socket.send_to(&answer, from).unwrap();
+                    }
+                }
+                let of_vehicle = of_vehicle.into_iter();
                 let of_vehicle = of_vehicle.filter(|frame| frame.source == VEHICLE);
                 self.heard
                     .extend(of_vehicle.filter(|frame| frame.code().is_some()));

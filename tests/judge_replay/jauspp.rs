@@ -79,6 +79,7 @@ fn events_do_not_multiply(capture: &str, vehicle: u16) {
     let cancellation = said.iter().position(|one| one.code() == CancelEvent::CODE);
     let (before, after) = said.split_at(cancellation.expect("it cancels"));
     let mut client = Client::new(Vehicle::start());
+    client.acknowledges = true;
     let mut exchanges = client.replay(before, SHORT);
     let rates = one_stream_for_each_subscription(&exchanges);
     assert_eq!(rates.len(), 2, "two things are subscribed to");
@@ -119,5 +120,6 @@ fn a_jauspp_console_with_waypoints_gets_every_answer() {
         return;
     };
     let mut client = Client::new(Vehicle::start());
+    client.acknowledges = true;
     all_answered(&client.replay(&said, SHORT));
 }

@@ -1,11 +1,15 @@
 //! A node of ours in the place of a party of a capture, in virtual time: its endpoint, its
 //! components, and everything that it says.
 
+#[path = "challenged.rs"]
+mod challenged;
+
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use challenged::acknowledgement;
 use jaus::address::JausId;
 use jaus::endpoint::{
     Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path, Received, Remote, To, Transmit,
@@ -169,7 +173,11 @@ impl Seat {
             }
         }
         while let Some(transmit) = self.endpoint.poll_transmit() {
-            self.note(&transmit);
+            let challenged = (transmit.link == UDP).then(|| acknowledgement(&transmit));
+            match challenged.flatten() {
+                Some((path, answer)) => self.endpoint.handle_datagram(self.now, path, answer),
+                None => self.note(&transmit),
+            }
         }
     }
 

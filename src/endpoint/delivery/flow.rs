@@ -178,6 +178,13 @@ impl Flow {
         })
     }
 
+    /// Whether the message that begins next has more octets than that.
+    pub(super) fn begins_more_than(&self, octets: usize) -> bool {
+        let next = self.waiting.iter().rev().find_map(VecDeque::front);
+        let parcel = next.and_then(|message| self.parcels.get(message));
+        parcel.is_some_and(|parcel| parcel.started.is_none() && parcel.payload.len() > octets)
+    }
+
     /// The next packet to send, of that priority or, if that must wait for numbers, of a lower one;
     /// without its destination. How a message of that length is cut, and for which header, is asked
     /// when its first packet is due.

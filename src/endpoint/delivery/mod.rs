@@ -25,7 +25,8 @@ use std::time::{Duration, Instant};
 use tracing::debug;
 
 use super::{
-    Config, Counter, Endpoint, Event, MessageHandle, Outgoing, SendError, Transmit, Unacknowledged,
+    Config, Counter, Endpoint, Event, MessageHandle, Outgoing, Path, SendError, Transmit,
+    Unacknowledged,
 };
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, Priority, Version};
@@ -145,7 +146,7 @@ impl Deliveries {
     }
 
     /// Sees to it that a flow in which something has changed has its turn and its timer.
-    fn touch(&mut self, destination: JausId) {
+    pub(super) fn touch(&mut self, destination: JausId) {
         let Some(flow) = self.flows.get_mut(&destination) else {
             return;
         };
@@ -296,15 +297,26 @@ impl Endpoint {
         let version = route.map_or(Version::As5669a, |(_, version)| version);
         let cutting = self.cutting(destination, version);
         let connected = route.is_some_and(|(path, _)| self.framing(path.link) == Framing::Jtcp);
+        let is_proven = route.is_some_and(|(path, _)| self.is_free(path));
+        let much = self.config.unverified_address.burst as usize / 2;
+        let flow = self.deliveries.flows.get(&destination)?;
+        let is_too_much = route.is_some() && !is_proven && flow.begins_more_than(much);
+        if is_too_much || self.peers.awaits_proof(destination) {
+            self.challenge(now, destination);
+            if self.peers.is_challenged(destination) {
+                return None;
+            }
+        }
         let flow = self.deliveries.flows.get_mut(&destination)?;
-        flow.known = route.is_some();
+        flow.known = is_proven;
         flow.connected = connected;
         let begin = |length| (cutting.cut(length), version);
         let (mut frame, tries) = flow.take(now, priority, &mut self.numbers, begin)?;
         frame.destination = destination;
         if tries > 1 {
             self.counters.add(Counter::Retransmissions);
-            self.peers.note_retransmission(destination);
+            self.peers
+                .note(destination, |peer| peer.retransmissions += 1);
         }
         if frame.flags.data() == DataControl::Single {
             frame.version = version;
@@ -312,7 +324,10 @@ impl Endpoint {
         let sent = match route {
             Some((path, _)) if frame.flags.broadcast() == Some(Broadcast::None) => self
                 .transmit_along(path, &frame)
-                .map(Some)
+                .map(|it| {
+                    let may = self.may_send(now, destination, path, it.payload.len());
+                    may.then_some(it)
+                })
                 .map_err(SendError::Header),
             _ => self.transmit_to_all(now, &frame),
         };
@@ -335,6 +350,24 @@ impl Endpoint {
             self.transmit(other);
         }
         Ok(first)
+    }
+
+    /// Whether a message, or a part of it, waits for an acknowledgement of `peer` with this number.
+    pub(super) fn awaits_answer(&self, peer: JausId, local: JausId, number: u16) -> bool {
+        let flow = self.deliveries.flows.get(&peer);
+        flow.is_some_and(|flow| flow.owner_of(local, number).is_some())
+    }
+
+    /// A message was given up: who was not heard meanwhile is not where it was, and is called for.
+    fn lose(&mut self, now: Instant, destination: JausId) {
+        let is_datagram = |path: Path| self.framing(path.link) == Framing::Judp;
+        if let Some(since) = now.checked_sub(self.config.acknowledge_patience)
+            && self
+                .route(destination)
+                .is_some_and(|(path, _)| is_datagram(path))
+        {
+            self.peers.lose(destination, since);
+        }
     }
 
     /// Takes the answer to a message of ours.
@@ -398,7 +431,7 @@ impl Endpoint {
             } = undelivered;
             self.deliveries.settle(length);
             self.counters.add(Counter::MessagesGivenUp);
-            self.peers.note_lost(destination);
+            self.peers.note(destination, |peer| peer.lost += 1);
             if !awaited {
                 continue;
             }
@@ -419,6 +452,9 @@ impl Endpoint {
                 continue;
             };
             let given_up = flow.handle_timeout(now);
+            if !given_up.is_empty() {
+                self.lose(now, destination);
+            }
             self.tell_undelivered(destination, given_up);
             self.deliveries.touch(destination);
         }

@@ -15,6 +15,8 @@ use bytes::Bytes;
 
 use super::style::{self, Whole};
 use crate::address::JausId;
+use crate::endpoint::rate::Origin;
+use crate::endpoint::receive::Arrival;
 use crate::endpoint::{Config, Counter, Counters};
 use crate::peer::LargeStyle;
 use crate::wire::{Acknowledgement, DataControl, Frame, Priority, Version, ra};
@@ -25,6 +27,8 @@ const PIECE_COST: usize = 64;
 const RUN_COST: usize = 256;
 /// The most runs of one sender; one that loses every second fragment has so many in 2048.
 const MAX_RUNS: usize = 1024;
+/// The most runs of one sender that are looked at because a number follows their last.
+const MOST_ENDING: usize = 8;
 /// What has not grown while the sender took so many numbers is stale.
 const STALE: u64 = 1 << 14;
 
@@ -112,6 +116,12 @@ type Place = (JausId, u16);
 #[derive(Debug)]
 struct Sender {
     runs: BTreeMap<Place, Run>,
+    /// The same by age.
+    ages: BTreeSet<(Instant, Place)>,
+    /// The same by their last numbers.
+    ends: BTreeSet<(u16, Place)>,
+    /// Where it is.
+    origin: Origin,
     cost: usize,
     /// When none of its runs was older, the last time that somebody looked.
     listed: Instant,
@@ -121,9 +131,12 @@ struct Sender {
 }
 
 impl Sender {
-    fn new(now: Instant, sequence: u16) -> Self {
+    fn new(now: Instant, sequence: u16, origin: Origin) -> Self {
         Self {
             runs: BTreeMap::new(),
+            ages: BTreeSet::new(),
+            ends: BTreeSet::new(),
+            origin,
             cost: 0,
             listed: now,
             latest: sequence,
@@ -152,18 +165,21 @@ impl Sender {
 
     fn take(&mut self, place: Place) -> Option<Run> {
         let run = self.runs.remove(&place)?;
+        self.ages.remove(&(run.updated, place));
+        self.ends.remove(&(run.last, place));
         self.cost -= run.cost();
         Some(run)
     }
 
     fn put(&mut self, place: Place, run: Run) {
         self.cost += run.cost();
+        self.ages.insert((run.updated, place));
+        self.ends.insert((run.last, place));
         self.runs.insert(place, run);
     }
 
     fn oldest(&self) -> Option<(Instant, Place)> {
-        let times = self.runs.iter().map(|(&place, run)| (run.updated, place));
-        times.min()
+        self.ages.first().copied()
     }
 
     /// Puts a new fragment to its neighbours; gives the place of the run that it is in then.
@@ -198,6 +214,14 @@ impl Sender {
     }
 }
 
+/// What is kept of the senders at one network address.
+#[derive(Debug, Default)]
+struct Share {
+    cost: usize,
+    /// As in [`Reassembly::listed`].
+    listed: BTreeSet<(Instant, JausId)>,
+}
+
 /// The unfinished large messages.
 #[derive(Debug)]
 pub(in crate::endpoint) struct Reassembly {
@@ -205,6 +229,9 @@ pub(in crate::endpoint) struct Reassembly {
     /// The senders by the time of their oldest run, or earlier.
     listed: BTreeSet<(Instant, JausId)>,
     cost: usize,
+    /// The share of each network address, and the addresses in the order of their shares.
+    shares: HashMap<Origin, Share>,
+    ranking: BTreeSet<(usize, Origin)>,
     max_message: usize,
     max_sender: usize,
     max_octets: usize,
@@ -217,6 +244,8 @@ impl Reassembly {
             senders: HashMap::new(),
             listed: BTreeSet::new(),
             cost: 0,
+            shares: HashMap::new(),
+            ranking: BTreeSet::new(),
             max_message: config.max_message,
             max_sender: config.max_reassembly_per_sender,
             max_octets: config.max_reassembly,
@@ -229,21 +258,23 @@ impl Reassembly {
     /// is counted.
     pub(in crate::endpoint) fn insert(
         &mut self,
-        now: Instant,
+        Arrival {
+            now, path, held, ..
+        }: Arrival,
         frame: &Frame,
-        held: usize,
         style: Option<LargeStyle>,
         counters: &mut Counters,
     ) -> Result<Option<Whole>, Counter> {
         let source = frame.source;
-        let sender = self.senders.entry(source).or_insert_with(|| {
-            self.listed.insert((now, source));
-            Sender::new(now, frame.sequence)
-        });
+        if !self.senders.contains_key(&source) {
+            self.enlist(path.into(), now, source);
+        }
+        let new = || Sender::new(now, frame.sequence, path.into());
+        let sender = self.senders.entry(source).or_insert_with(new);
         let before = sender.cost;
         let inserted = sender.take_in(now, frame, held, self.max_message, counters);
-        let (cost, runs) = (sender.cost, sender.runs.len());
-        self.cost = self.cost + cost - before;
+        let (after, runs, origin) = (sender.cost, sender.runs.len(), sender.origin);
+        self.account(origin, before, after);
         match inserted {
             Ok(Some(run)) => {
                 self.drop_if_empty(source);
@@ -282,15 +313,19 @@ impl Reassembly {
         number: u16,
     ) -> Option<(JausId, Priority, Whole)> {
         let sender = self.senders.get_mut(&source)?;
-        let ended = |(_, run): &(&Place, &Run)| {
-            run.last == number
-                && run.begins
-                && !run.ends
-                && style::may_lack_the_mark(run.kind.version, &run.pieces)
+        let from = (number, (JausId::from_u32(0), 0));
+        let ending = sender.ends.range(from..).map_while(|&(last, place)| {
+            let run = sender.runs.get(&place)?;
+            (last == number).then_some((place, run))
+        });
+        let is_whole = |(_, run): &(Place, &Run)| {
+            run.begins && !run.ends && style::may_lack_the_mark(run.kind.version, &run.pieces)
         };
-        let place = *sender.runs.iter().find(ended)?.0;
+        let (place, _) = ending.take(MOST_ENDING).find(is_whole)?;
+        let (before, origin) = (sender.cost, sender.origin);
         let run = sender.take(place)?;
-        self.cost -= run.cost();
+        let after = sender.cost;
+        self.account(origin, before, after);
         self.drop_if_empty(source);
         let style = Some(LargeStyle::RepeatedCode);
         let whole = style::join(run.kind.version, &run.pieces, style);
@@ -301,7 +336,7 @@ impl Reassembly {
         if let Some(sender) = self.senders.get(&source)
             && sender.runs.is_empty()
         {
-            self.listed.remove(&(sender.listed, source));
+            self.strike(sender.origin, sender.listed, source);
             self.senders.remove(&source);
         }
     }
@@ -317,7 +352,7 @@ impl Reassembly {
             self.forget_oldest_of(source, counters);
         }
         while self.cost > self.max_octets
-            && let Some(&(listed, source)) = self.listed.first()
+            && let Some((listed, source)) = self.oldest_of_most()
         {
             let oldest = self.senders.get(&source).and_then(Sender::oldest);
             match oldest {
@@ -327,11 +362,45 @@ impl Reassembly {
         }
     }
 
+    /// Of the network address that holds most, the sender with the oldest run.
+    fn oldest_of_most(&self) -> Option<(Instant, JausId)> {
+        let (_, origin) = self.ranking.last()?;
+        self.shares.get(origin)?.listed.first().copied()
+    }
+
+    /// What is kept of a sender has changed.
+    fn account(&mut self, origin: Origin, before: usize, after: usize) {
+        self.cost = self.cost + after - before;
+        let share = self.shares.entry(origin).or_default();
+        self.ranking.remove(&(share.cost, origin));
+        share.cost = share.cost + after - before;
+        self.ranking.insert((share.cost, origin));
+    }
+
+    fn enlist(&mut self, origin: Origin, listed: Instant, source: JausId) {
+        self.listed.insert((listed, source));
+        let share = self.shares.entry(origin).or_default();
+        share.listed.insert((listed, source));
+    }
+
+    /// Takes a sender off the lists, and forgets the share of an address that is on none.
+    fn strike(&mut self, origin: Origin, listed: Instant, source: JausId) {
+        self.listed.remove(&(listed, source));
+        if let Some(share) = self.shares.get_mut(&origin) {
+            share.listed.remove(&(listed, source));
+            if share.listed.is_empty() && share.cost == 0 {
+                self.shares.remove(&origin);
+                self.ranking.remove(&(0, origin));
+            }
+        }
+    }
+
     fn forget_oldest_of(&mut self, source: JausId, counters: &mut Counters) {
         if let Some(sender) = self.senders.get_mut(&source) {
-            let oldest = sender.oldest();
-            if let Some(run) = oldest.and_then(|(_, place)| sender.take(place)) {
-                self.cost -= run.cost();
+            let (oldest, before, origin) = (sender.oldest(), sender.cost, sender.origin);
+            if oldest.and_then(|(_, place)| sender.take(place)).is_some() {
+                let after = sender.cost;
+                self.account(origin, before, after);
                 counters.add(Counter::FragmentsForgotten);
             }
         }
@@ -343,15 +412,15 @@ impl Reassembly {
         let Some(sender) = self.senders.get_mut(&source) else {
             return;
         };
-        self.listed.remove(&(sender.listed, source));
-        match sender.oldest() {
-            Some((updated, _)) => {
-                sender.listed = updated;
-                self.listed.insert((updated, source));
-            }
-            None => {
-                self.senders.remove(&source);
-            }
+        let (origin, before, oldest) = (sender.origin, sender.listed, sender.oldest());
+        if let Some((updated, _)) = oldest {
+            sender.listed = updated;
+            self.enlist(origin, updated, source);
+        } else {
+            self.senders.remove(&source);
+        }
+        if oldest.is_none_or(|(updated, _)| updated != before) {
+            self.strike(origin, before, source);
         }
     }
 

@@ -41,7 +41,8 @@ fn a_forgotten_peer_is_told_and_reached_through_the_group() {
         max_peers: 1,
         ..Config::default()
     });
-    rig.meet_peer();
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    rig.events();
     rig.hear(&Frame {
         source: id("42.1.2"),
         ..from_peer(QUERY_HEARTBEAT)
@@ -151,4 +152,85 @@ fn counters_are_listed_by_name_and_only_if_something_happened() {
         "         1  datagrams received\n         1  messages received\n         1  messages delivered\n"
     );
     assert_eq!(rig.endpoint.counters().iter().count(), Counter::ALL.len());
+}
+
+#[test]
+fn what_there_is_no_room_for_is_not_acknowledged_and_taken_when_it_comes_again() {
+    let mut rig = Rig::with(Config {
+        queue_limit: 4,
+        ..Config::default()
+    });
+    let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    let requests = (1..=6).map(|sequence| Frame {
+        flags: ask,
+        sequence,
+        ..from_peer(QUERY_HEARTBEAT)
+    });
+    let mut acknowledged = 0;
+    let mut delivered = 0;
+    for _try in 0..2 {
+        for request in requests.clone() {
+            rig.hear(&request);
+            acknowledged += rig.sent().len();
+        }
+        delivered += rig.received().len();
+        rig.pass(Duration::from_millis(100));
+    }
+    assert_eq!(rig.count(Counter::ReceiverBusy), 2);
+    assert_eq!((acknowledged, delivered), (4 + 6, 6));
+}
+
+#[test]
+fn a_broadcast_that_asks_for_an_acknowledgement_reaches_those_who_have_room() {
+    let mut rig = Rig::new();
+    rig.endpoint.attach(SIBLING).unwrap();
+    rig.endpoint.set_busy(SIBLING, true);
+    let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    rig.hear(&Frame {
+        flags: ask,
+        destination: JausId::EVERYONE,
+        ..from_peer(QUERY_HEARTBEAT)
+    });
+    assert!(rig.received().iter().any(|message| message.to == US));
+    assert_eq!(rig.transmits(), []);
+}
+
+#[test]
+fn a_broadcast_that_siblings_have_no_room_for_is_refused_and_not_half_delivered() {
+    let mut rig = Rig::with(small());
+    for component in 2..=4 {
+        rig.endpoint.attach(JausId::new(101, 1, component)).unwrap();
+    }
+    let broadcast = Outgoing {
+        destination: JausId::EVERYONE,
+        ..to_peer()
+    };
+    rig.send(broadcast.clone()).unwrap();
+    let refused = rig.send(broadcast.clone());
+    assert_eq!(refused, Err(SendError::QueueFull { limit: 4 }));
+    assert_eq!((rig.received().len(), rig.transmits().len()), (3, 1));
+    assert!(rig.send(broadcast).is_ok());
+}
+
+#[test]
+fn without_pacing_destinations_are_forgotten_too() {
+    let mut rig = Rig::with(Config {
+        pacing: None,
+        ..Config::default()
+    });
+    for number in 1..=200_u8 {
+        let source = JausId::new(300, 1, number);
+        rig.hear_from(
+            number,
+            &Frame {
+                source,
+                ..from_peer(QUERY_HEARTBEAT)
+            },
+        );
+        rig.vouch_for(source);
+        rig.send(Outgoing::new(US, source, vec![1; 5000].into()))
+            .unwrap();
+        assert_eq!(rig.transmits().len(), 4);
+    }
+    assert!(rig.endpoint.pacer.len() <= 64);
 }

@@ -241,6 +241,7 @@ fn a_message_whose_numbers_are_still_under_way_waits_and_holds_up_nobody() {
             ..from_peer(QUERY_HEARTBEAT)
         },
     );
+    rig.vouch_for(id("42.1.2"));
     rig.events();
     let first = rig.send(reliable(large(2000))).unwrap();
     assert_eq!(rig.transmits().len(), 2);

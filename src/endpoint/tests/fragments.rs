@@ -434,6 +434,7 @@ fn large_messages_go_to_older_headers_with_the_code_in_each_fragment_and_come_ba
                 version,
                 ..from_peer(QUERY_HEARTBEAT)
             });
+            rig.vouch_for(PEER);
             rig.events();
             let message = large(5000);
             rig.send(Outgoing {

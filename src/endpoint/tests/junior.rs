@@ -233,6 +233,7 @@ fn who_calls_without_the_flag_and_begins_with_1_gets_fragments_as_junior_does() 
             ..from_peer(QUERY_HEARTBEAT)
         };
         hear_as_sent(&mut rig, &call, to_all);
+        rig.vouch_for(PEER);
         rig.sent();
         rig.send(Outgoing {
             payload: message(102_400),

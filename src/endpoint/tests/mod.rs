@@ -12,6 +12,7 @@ mod junior;
 mod output;
 mod profiles;
 mod receiving;
+mod routes;
 mod routing;
 mod sending;
 mod wire;
@@ -92,12 +93,19 @@ impl Rig {
             .handle_datagram(self.now, path(host), datagram);
     }
 
-    /// Lets [`PEER`] be known.
+    /// Lets a peer have acknowledged something, where it was heard.
+    fn vouch_for(&mut self, id: JausId) {
+        let (path, _) = self.endpoint.route(id).unwrap();
+        self.endpoint.peers.verify(id, path);
+    }
+
+    /// Lets [`PEER`] be known, and have acknowledged something.
     fn meet_peer(&mut self) {
         self.hear(&Frame {
             sequence: 900,
             ..from_peer(QUERY_HEARTBEAT)
         });
+        self.vouch_for(PEER);
         self.events();
     }
 

@@ -262,6 +262,7 @@ fn two_large_messages_to_two_places_take_turns_without_tearing_the_trains() {
             ..from_peer(QUERY_HEARTBEAT)
         },
     );
+    rig.vouch_for(OTHER);
     rig.endpoint.add_link(WIRE, segmenting());
     for destination in [PEER, OTHER] {
         rig.send(Outgoing {
@@ -278,4 +279,31 @@ fn two_large_messages_to_two_places_take_turns_without_tearing_the_trains() {
     let to = |host| To::Peer(path(host).peer);
     let expected = [(PEER_HOST, 32), (9, 32), (PEER_HOST, 32), (9, 32)];
     assert_eq!(places, expected.map(|(host, count)| (to(host), count)));
+}
+
+#[test]
+fn datagrams_to_three_places_all_leave_with_packing_and_segments_together() {
+    let mut rig = with_packing(Packing::Within(Duration::ZERO));
+    rig.endpoint.add_link(WIRE, segmenting());
+    let peers = [1, 2, 3].map(|component| JausId::new(43, 1, component));
+    for (host, source) in (20..).zip(peers) {
+        let heard = from_peer(QUERY_HEARTBEAT);
+        rig.hear_from(host, &Frame { source, ..heard });
+    }
+    for _round in 0..3 {
+        for destination in peers {
+            rig.send(Outgoing {
+                destination,
+                ..to_peer()
+            })
+            .unwrap();
+        }
+    }
+    let transmits = rig.transmits();
+    let there = |host| To::Peer(path(host).peer);
+    let octets = |host| -> usize {
+        let mine = transmits.iter().filter(|it| it.to == there(host));
+        mine.map(|it| messages(it).len()).sum()
+    };
+    assert_eq!([20, 21, 22].map(octets), [3; 3]);
 }

@@ -274,6 +274,7 @@ fn the_first_octet_of_all_that_is_sent_is_zero() {
     let octets = [&head[..], &ids, QUERY_HEARTBEAT, &[1, 0]].concat();
     rig.hear_octets(PEER_HOST, octets.into());
     assert_eq!(rig.received().len(), 1);
+    rig.vouch_for(PEER);
     for acknowledge in [false, true] {
         for octets in [3, 4000] {
             rig.send(Outgoing {

@@ -54,7 +54,8 @@ fn a_message_goes_to_the_group_of_every_link() {
 #[test]
 fn a_peer_that_moves_is_answered_where_it_is() {
     let mut rig = Rig::new();
-    rig.meet_peer();
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    rig.events();
     rig.hear_from(9, &from_peer(QUERY_IDENTIFICATION));
     let moved = Event::PeerMoved {
         id: PEER,
@@ -63,7 +64,7 @@ fn a_peer_that_moves_is_answered_where_it_is() {
     };
     assert_eq!(rig.events()[0], moved);
     rig.send(to_peer()).unwrap();
-    assert_eq!(rig.sent()[0].0, To::Peer(path(9).peer));
+    assert_eq!(rig.sent().pop().unwrap().0, To::Peer(path(9).peer));
 }
 
 #[test]

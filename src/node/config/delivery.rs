@@ -113,7 +113,6 @@ impl Delivery {
         let profiles = to.profiles.into_iter().chain(repeating).collect();
         endpoint::Config {
             acknowledge_patience: self.patience,
-            retransmission_window: self.patience + Duration::from_millis(500),
             max_window: self.window,
             max_unacknowledged_octets: self.waiting,
             packing: self.packing,
@@ -215,6 +214,17 @@ mod tests {
         };
         assert_eq!(unpaced.validate(), Ok(()));
         assert_eq!(unpaced.apply(endpoint::Config::default()).pacing, None);
+    }
+
+    #[test]
+    fn what_is_taken_for_a_repetition_does_not_depend_on_our_own_patience() {
+        let usual = endpoint::Config::default();
+        let patient = Delivery {
+            patience: Duration::from_secs(60),
+            ..Delivery::default()
+        };
+        let window = patient.apply(usual.clone()).retransmission_window;
+        assert_eq!(window, usual.retransmission_window);
     }
 
     #[cfg(feature = "cli")]

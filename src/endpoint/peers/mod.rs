@@ -1,0 +1,580 @@
+//! Who is where: addresses learned from what peers send, and configured ones.
+//!
+//! There is one record for each peer. The table is bounded, and so is the share of it that one
+//! network address can hold: a newcomer from elsewhere takes the place of a peer of the address
+//! that holds most. Otherwise who was only heard goes first, then whom we have spoken to, then who
+//! has acknowledged something of ours; among equals the one heard longest ago. Those in
+//! conversation with us stay as long as they are heard now and then: if nobody else can go, a
+//! newcomer is not taken in. So invented ids replace each other.
+
+mod evidence;
+mod places;
+mod route;
+mod state;
+
+use std::collections::{BTreeSet, HashMap};
+use std::time::{Duration, Instant};
+
+use super::rate::Origin;
+use super::{Config, LinkId, Path, StaticPeer};
+use crate::address::JausId;
+use crate::peer::{Assignment, Recogniser};
+use crate::wire::{Frame, Version};
+use places::{Places, Standing};
+pub use route::RouteState;
+pub(super) use route::{Answer, Challenge, Doubt, Finding, Probe};
+use state::PeerState;
+pub use state::{Peer, Traffic};
+
+/// The most challenges under way.
+const MOST_CHALLENGES: usize = 64;
+/// After a challenge was decided, its peer is not challenged again for so long.
+const SETTLED: Duration = Duration::from_secs(2);
+/// After a path has not answered, it is not challenged again for so long.
+const UNANSWERED: Duration = Duration::from_secs(10);
+
+/// Where a message came from and what it teaches.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sighting<'a> {
+    pub(super) now: Instant,
+    pub(super) path: Path,
+    /// Whether both ends of the path have shown that they are there.
+    pub(super) is_stream: bool,
+    /// Whether a component of ours could challenge the sender.
+    pub(super) can_challenge: bool,
+    pub(super) frame: &'a Frame,
+}
+
+/// What [`Peers::hear`] did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Heard {
+    /// Nothing new.
+    Known,
+    /// A peer not known before; another may have been forgotten for it.
+    New { evicted: Option<JausId> },
+    /// A peer that was elsewhere before. If `contested`, it may still be there.
+    Moved {
+        from: Path,
+        contested: bool,
+        was_verified: bool,
+    },
+    /// A peer that is elsewhere, unless a challenge shows that it has moved.
+    Contested { incumbent: Path },
+    /// A peer that is elsewhere, which was found out a moment ago or is being found out.
+    Elsewhere,
+    /// A peer not known before, for which there is no room.
+    NoRoom,
+}
+
+/// The table of peers.
+#[derive(Debug)]
+pub(super) struct Peers {
+    states: HashMap<JausId, PeerState>,
+    places: Places,
+    /// How many peers have proven that they are there.
+    proven: HashMap<Path, usize>,
+    /// When to look at which challenge.
+    challenges: BTreeSet<(Instant, JausId)>,
+    configured: Vec<StaticPeer>,
+    assigned: Vec<Assignment>,
+    limit: usize,
+}
+
+impl Peers {
+    pub(super) fn new(config: &Config) -> Self {
+        Self {
+            states: HashMap::new(),
+            places: Places::default(),
+            proven: HashMap::new(),
+            challenges: BTreeSet::new(),
+            configured: config.static_peers.clone(),
+            assigned: config.profiles.clone(),
+            limit: config.max_peers.max(1),
+        }
+    }
+
+    pub(super) fn configure(&mut self, peers: Vec<StaticPeer>) {
+        self.configured = peers;
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.states.len()
+    }
+
+    pub(super) fn knows(&self, id: JausId) -> bool {
+        self.states.contains_key(&id)
+    }
+
+    /// Whether we have neither spoken to a peer nor been answered by it.
+    pub(super) fn is_stranger(&self, id: JausId) -> bool {
+        let state = self.states.get(&id);
+        state.is_none_or(|state| state.place.standing == Standing::Heard)
+    }
+
+    /// Where and when it was heard last.
+    pub(super) fn last_heard(&self, id: JausId) -> Option<(Path, Instant)> {
+        let peer = &self.states.get(&id)?.peer;
+        Some((peer.path, peer.last_heard))
+    }
+
+    /// Where on a link somebody was heard, each once or more.
+    pub(super) fn paths_on(&self, link: LinkId) -> impl Iterator<Item = Path> + '_ {
+        let paths = self.states.values().map(|state| state.peer.path);
+        paths.filter(move |path| path.link == link)
+    }
+
+    /// The configured address of an id: its own, or that of the first pattern that it matches.
+    fn pin(&self, id: JausId) -> Option<Path> {
+        if self.configured.is_empty() {
+            return None;
+        }
+        let exact = self.configured.iter().find(|pin| pin.id == id);
+        let pin = exact.or_else(|| self.configured.iter().find(|pin| pin.id.matches(id)))?;
+        Some(pin.path)
+    }
+
+    /// Whether an id is configured to be at another network address.
+    pub(super) fn is_pinned_elsewhere(&self, id: JausId, from: Path) -> bool {
+        let mut pins = self.configured.iter().filter(|pin| pin.id.matches(id));
+        let origin = Origin::from(from);
+        self.pin(id).is_some() && !pins.any(|pin| Origin::from(pin.path) == origin)
+    }
+
+    /// Whether somebody at the other end of a path has shown to be there, or is configured to be.
+    pub(super) fn is_proven(&self, path: Path) -> bool {
+        self.proven.contains_key(&path) || self.configured.iter().any(|pin| pin.path == path)
+    }
+
+    /// Takes note of where a message came from, and of what it tells about its sender.
+    pub(super) fn hear(&mut self, seen: Sighting<'_>) -> Heard {
+        let Sighting { now, frame, .. } = seen;
+        let pin = self.pin(frame.source);
+        let path = pin.unwrap_or(seen.path);
+        let number = self.counted_on(frame);
+        let can_challenge = seen.can_challenge && self.challenges.len() < MOST_CHALLENGES;
+        let Some(state) = self.states.get_mut(&frame.source) else {
+            return self.take_in(seen, path, number, pin.is_some());
+        };
+        let silence = now.saturating_duration_since(state.peer.last_heard);
+        state.peer.received.add(frame.payload.len());
+        state.peer.last_heard = now;
+        let from = state.peer.path;
+        if from == path {
+            state.hear_on_route(frame, number, silence);
+            if state.peer.route == RouteState::Stale {
+                self.set_route(frame.source, path, RouteState::Unverified);
+            }
+            return Heard::Known;
+        }
+        if let Some(challenge) = &mut state.challenge {
+            challenge.incumbent_heard |= challenge.incumbent.path == path;
+            return Heard::Elsewhere;
+        }
+        if pin.is_some() {
+            self.set_route(frame.source, path, RouteState::Verified);
+            return Heard::Moved {
+                from,
+                contested: false,
+                was_verified: true,
+            };
+        }
+        if state.settled_until.is_some_and(|until| now < until) {
+            return Heard::Elsewhere;
+        }
+        let is_near = Origin::from(from) == Origin::from(path);
+        let was_verified = state.peer.route == RouteState::Verified;
+        let (route, contested) = match state.peer.route {
+            RouteState::Unverified if seen.is_stream => (RouteState::Verified, false),
+            RouteState::Unverified => (RouteState::Unverified, can_challenge),
+            RouteState::Stale => (RouteState::of(seen.is_stream), false),
+            RouteState::Verified if is_near && seen.is_stream => (RouteState::Verified, false),
+            RouteState::Verified if !can_challenge => return Heard::Elsewhere,
+            RouteState::Verified if is_near => (RouteState::Unverified, true),
+            RouteState::Verified => return Heard::Contested { incumbent: from },
+        };
+        state.peer.version = frame.version;
+        if is_near {
+            state.hear_on_route(frame, number, silence);
+        } else if !contested {
+            state.begin_anew(frame, number);
+        }
+        self.set_route(frame.source, path, route);
+        Heard::Moved {
+            from,
+            contested,
+            was_verified,
+        }
+    }
+
+    fn take_in(&mut self, seen: Sighting<'_>, path: Path, number: u32, pinned: bool) -> Heard {
+        let Sighting { now, frame, .. } = seen;
+        let evicted = if self.states.len() >= self.limit {
+            let Some(evicted) = self.next_to_go(now, path.into()) else {
+                return Heard::NoRoom;
+            };
+            self.forget(evicted);
+            Some(evicted)
+        } else {
+            None
+        };
+        let id = frame.source;
+        let place = self.places.insert(id, path.into(), Standing::Heard, now);
+        let state = PeerState::new(now, path, frame, number, place);
+        self.states.insert(id, state);
+        self.set_route(id, path, RouteState::of(seen.is_stream || pinned));
+        Heard::New { evicted }
+    }
+
+    /// Changes where a peer is and how far that is proven.
+    fn set_route(&mut self, id: JausId, path: Path, route: RouteState) {
+        let Some(state) = self.states.get_mut(&id) else {
+            return;
+        };
+        let before = (state.peer.path, state.peer.route);
+        (state.peer.path, state.peer.route) = (path, route);
+        let origin = Origin::from(path);
+        if state.place.origin != origin {
+            self.places.remove(id, state.place);
+            let (standing, heard) = (state.place.standing, state.peer.last_heard);
+            state.place = self.places.insert(id, origin, standing, heard);
+        }
+        if before.1 == RouteState::Verified {
+            self.count_proof(before.0, false);
+        }
+        if route == RouteState::Verified {
+            self.count_proof(path, true);
+        }
+    }
+
+    fn count_proof(&mut self, path: Path, more: bool) {
+        let count = self.proven.entry(path).or_default();
+        *count = if more {
+            *count + 1
+        } else {
+            count.saturating_sub(1)
+        };
+        if *count == 0 {
+            self.proven.remove(&path);
+        }
+    }
+
+    /// A peer has acknowledged what was sent to it. If the acknowledgement came from where it is,
+    /// that is proven.
+    pub(super) fn verify(&mut self, id: JausId, from: Path) {
+        self.raise(id, Standing::Answered);
+        if let Some(state) = self.states.get(&id)
+            && state.peer.path == from
+            && state
+                .challenge
+                .is_none_or(|challenge| challenge.rival.is_none())
+            && state.peer.route != RouteState::Verified
+        {
+            self.set_route(id, from, RouteState::Verified);
+            self.end_challenge(id);
+        }
+    }
+
+    /// Nothing was heard of a peer while a message waited for its acknowledgement since then.
+    pub(super) fn lose(&mut self, id: JausId, since: Instant) {
+        if let Some(state) = self.states.get(&id)
+            && state.peer.last_heard < since
+            && self.pin(id).is_none()
+        {
+            let path = state.peer.path;
+            self.set_route(id, path, RouteState::Stale);
+        }
+    }
+
+    /// Whether a peer may be challenged now.
+    pub(super) fn may_challenge(&self, now: Instant, id: JausId) -> bool {
+        self.challenges.len() < MOST_CHALLENGES
+            && self.pin(id).is_none()
+            && self.states.get(&id).is_some_and(|state| {
+                state.challenge.is_none() && state.settled_until.is_none_or(|until| until <= now)
+            })
+    }
+
+    pub(super) fn is_challenged(&self, id: JausId) -> bool {
+        let state = self.states.get(&id);
+        state.is_some_and(|state| state.challenge.is_some())
+    }
+
+    /// A challenge is sent with these numbers, to where the peer is or, if it has a rival, to both.
+    pub(super) fn begin_challenge(
+        &mut self,
+        now: Instant,
+        id: JausId,
+        doubt: Doubt,
+        incumbent: Probe,
+        rival: Option<Probe>,
+    ) {
+        let Some(state) = self.states.get_mut(&id) else {
+            return;
+        };
+        let silence = now.saturating_duration_since(state.heard_on_route);
+        let is_near = |rival: Probe| Origin::from(rival.path) == Origin::from(incumbent.path);
+        let due = now + route::TRY_INTERVAL;
+        state.challenge = Some(Challenge {
+            doubt,
+            incumbent,
+            rival,
+            was_provisional: rival.is_some_and(|rival| rival.path == state.peer.path),
+            at_once: rival.is_some_and(is_near) || silence >= route::SILENT,
+            rival_answered: doubt.rival_is_stream,
+            incumbent_heard: false,
+            tries: 1,
+            due,
+        });
+        self.challenges.insert((due, id));
+    }
+
+    /// An acknowledgement came that no message waits for; what it is for a challenge, and which.
+    pub(super) fn answer_challenge(
+        &mut self,
+        now: Instant,
+        frame: &Frame,
+        from: Path,
+    ) -> Option<(Answer, Challenge)> {
+        let state = self.states.get_mut(&frame.source)?;
+        let challenge = state.challenge.as_mut()?;
+        let answer = challenge.handle_answer(frame.destination, frame.sequence, from)?;
+        let challenge = *challenge;
+        if let Answer::Decides(finding) = answer {
+            self.settle(now, frame.source, finding);
+        }
+        self.raise(frame.source, Standing::Answered);
+        Some((answer, challenge))
+    }
+
+    /// The next challenge that is due: whose, and what it has shown; `None` for one that is to be
+    /// sent again.
+    pub(super) fn next_due(
+        &mut self,
+        now: Instant,
+    ) -> Option<(JausId, Challenge, Option<Finding>)> {
+        let (due, id) = self.challenges.first().copied()?;
+        if due > now {
+            return None;
+        }
+        self.challenges.pop_first();
+        let challenge = self.states.get_mut(&id)?.challenge.as_mut()?;
+        let finding = challenge.handle_timeout(now);
+        let challenge = *challenge;
+        match finding {
+            Some(finding) => self.settle(now, id, finding),
+            None => {
+                self.challenges.insert((challenge.due, id));
+            }
+        }
+        Some((id, challenge, finding))
+    }
+
+    /// When the next challenge is due.
+    pub(super) fn next_deadline(&self) -> Option<Instant> {
+        self.challenges.first().map(|&(due, _)| due)
+    }
+
+    /// Does what a challenge has shown.
+    fn settle(&mut self, now: Instant, id: JausId, finding: Finding) {
+        let Some(challenge) = self.end_challenge(id) else {
+            return;
+        };
+        let Some(state) = self.states.get_mut(&id) else {
+            return;
+        };
+        let before = challenge.incumbent.path;
+        let (path, route) = match (finding, challenge.rival) {
+            (Finding::Moves { verified }, Some(rival)) => {
+                if Origin::from(rival.path) != Origin::from(before) {
+                    state.recogniser = Recogniser::new();
+                }
+                (rival.path, RouteState::of(verified))
+            }
+            (Finding::Stays, _) => (before, RouteState::Verified),
+            _ => (before, RouteState::of(challenge.doubt.was_verified)),
+        };
+        let pause = if finding == Finding::Unanswered && challenge.rival.is_none() {
+            UNANSWERED
+        } else {
+            SETTLED
+        };
+        state.settled_until = Some(now + pause);
+        self.set_route(id, path, route);
+    }
+
+    fn end_challenge(&mut self, id: JausId) -> Option<Challenge> {
+        let challenge = self.states.get_mut(&id)?.challenge.take()?;
+        self.challenges.remove(&(challenge.due, id));
+        Some(challenge)
+    }
+
+    /// The round of its sequence numbers in which a sender is with this frame.
+    pub(super) fn round(&self, frame: &Frame) -> u16 {
+        (self.counted_on(frame) >> 16) as u16
+    }
+
+    /// The frame's sequence number, counted on over all rounds: of the numbers that it can stand
+    /// for the one nearest to the sender's latest.
+    fn counted_on(&self, frame: &Frame) -> u32 {
+        const FIRST_ROUND: u32 = 1 << 16;
+        let latest = self
+            .states
+            .get(&frame.source)
+            .map_or(FIRST_ROUND | u32::from(frame.sequence), |state| {
+                state.latest
+            });
+        let ahead = frame.sequence.wrapping_sub(latest as u16) as i16;
+        latest.wrapping_add_signed(ahead.into())
+    }
+
+    /// Whether somebody is known or could be: there is room, or somebody can go.
+    pub(super) fn has_room_for(&mut self, now: Instant, id: JausId, from: Path) -> bool {
+        self.knows(id)
+            || self.states.len() < self.limit
+            || self.next_to_go(now, from.into()).is_some()
+    }
+
+    /// Who can be forgotten for a newcomer from a network address. An address that holds a quarter of
+    /// the table gets no more of it, and makes room for those that hold less, whoever it holds.
+    fn next_to_go(&mut self, now: Instant, newcomer: Origin) -> Option<JausId> {
+        let (most, holder) = self.places.most()?;
+        let own = self.places.held(newcomer);
+        let (is_excessive, own_is) = (most * 4 > self.limit, own * 4 > self.limit);
+        if most > own + 1 {
+            let found = Standing::ALL.into_iter().find_map(|standing| {
+                let silence = if is_excessive {
+                    Duration::ZERO
+                } else {
+                    standing.silence()
+                };
+                self.longest_silent(now, Some(holder), standing, silence)
+            });
+            if found.is_some() {
+                return found;
+            }
+        }
+        let of = own_is.then_some(newcomer);
+        Standing::ALL
+            .into_iter()
+            .find_map(|standing| self.longest_silent(now, of, standing, standing.silence()))
+    }
+
+    /// Who of a standing was heard longest ago, if that is long enough. Who was heard since it got
+    /// its place goes to the end; so a look costs no more than was heard.
+    fn longest_silent(
+        &mut self,
+        now: Instant,
+        of: Option<Origin>,
+        standing: Standing,
+        silence: Duration,
+    ) -> Option<JausId> {
+        loop {
+            let id = self.places.first(standing, of)?;
+            let state = self.states.get(&id)?;
+            let heard = state.peer.last_heard;
+            if heard > state.place.heard {
+                self.place_anew(id, standing);
+                continue;
+            }
+            return (now.saturating_duration_since(heard) >= silence).then_some(id);
+        }
+    }
+
+    fn place_anew(&mut self, id: JausId, standing: Standing) {
+        if let Some(state) = self.states.get_mut(&id) {
+            self.places.remove(id, state.place);
+            let (origin, heard) = (state.place.origin, state.peer.last_heard);
+            state.place = self.places.insert(id, origin, standing, heard);
+        }
+    }
+
+    fn raise(&mut self, id: JausId, standing: Standing) {
+        let state = self.states.get(&id);
+        if state.is_some_and(|state| state.place.standing < standing) {
+            self.place_anew(id, standing);
+        }
+    }
+
+    /// A component of ours sent `octets` to it alone.
+    pub(super) fn note_sent(&mut self, id: JausId, octets: usize) {
+        self.note(id, |peer| peer.sent.add(octets));
+        self.raise(id, Standing::SpokenTo);
+    }
+
+    /// Changes what is counted about a peer.
+    pub(super) fn note(&mut self, id: JausId, change: impl FnOnce(&mut Peer)) {
+        if let Some(state) = self.states.get_mut(&id) {
+            change(&mut state.peer);
+        }
+    }
+
+    /// Where and with which header to reach `id`, if known. A configured address goes before a
+    /// learned one.
+    pub(super) fn route(&self, id: JausId) -> Option<(Path, Version)> {
+        let learned = self.states.get(&id).map(|state| &state.peer);
+        let known = learned.filter(|peer| peer.route != RouteState::Stale);
+        let path = self.pin(id).or_else(|| known.map(|peer| peer.path))?;
+        Some((path, self.version(id)))
+    }
+
+    /// The header that a peer reads.
+    pub(super) fn version(&self, id: JausId) -> Version {
+        let learned = self.states.get(&id);
+        learned.map_or(Version::As5669a, |state| state.peer.version)
+    }
+
+    /// The addresses that get a copy of a broadcast to `destination`.
+    pub(super) fn broadcast_copies(&self, destination: JausId) -> Vec<Path> {
+        let reached = |peer: &&StaticPeer| peer.gets_broadcasts && overlap(peer.id, destination);
+        self.configured
+            .iter()
+            .filter(reached)
+            .map(|peer| peer.path)
+            .collect()
+    }
+
+    pub(super) fn forget(&mut self, id: JausId) {
+        self.end_challenge(id);
+        if let Some(state) = self.states.remove(&id) {
+            self.places.remove(id, state.place);
+            if state.peer.route == RouteState::Verified {
+                self.count_proof(state.peer.path, false);
+            }
+        }
+    }
+
+    pub(super) fn forget_link(&mut self, link: LinkId) {
+        self.forget_where(|path| path.link == link);
+    }
+
+    pub(super) fn forget_path(&mut self, path: Path) {
+        self.forget_where(|known| known == path);
+    }
+
+    fn forget_where(&mut self, gone: impl Fn(Path) -> bool) {
+        let states = self.states.values().map(|state| &state.peer);
+        let gone: Vec<_> = states.filter(|it| gone(it.path)).map(|it| it.id).collect();
+        gone.into_iter().for_each(|id| self.forget(id));
+    }
+
+    /// All of them, in order of their ids.
+    pub(super) fn iter(&self) -> impl Iterator<Item = Peer> + '_ {
+        let peers = self.states.values().map(|state| Peer {
+            profile: self.profile(state.peer.id),
+            ..state.peer
+        });
+        let mut peers: Vec<_> = peers.collect();
+        peers.sort_unstable_by_key(|peer| peer.id);
+        peers.into_iter()
+    }
+}
+
+/// Whether two ids, each of which may hold wildcards, have a component in common.
+fn overlap(one: JausId, other: JausId) -> bool {
+    let subsystem = one.subsystem() == other.subsystem()
+        || [one.subsystem(), other.subsystem()].contains(&JausId::ANY_SUBSYSTEM);
+    let node = one.node() == other.node() || [one.node(), other.node()].contains(&JausId::ANY_NODE);
+    let component = one.component() == other.component()
+        || [one.component(), other.component()].contains(&JausId::ANY_COMPONENT);
+    subsystem && node && component
+}

@@ -1,0 +1,131 @@
+//! How far it is proven where a peer is, and the challenges that prove it.
+//!
+//! A datagram's source address can be forged, and so can the id in it. So a path counts as
+//! verified only when the peer has acknowledged along it what was sent along it. Where an id
+//! is heard on two paths, both are challenged: with a query that wants an acknowledgement and has
+//! an unpredictable sequence number, which nobody else can acknowledge.
+
+use std::time::{Duration, Instant};
+
+use crate::address::JausId;
+use crate::endpoint::Path;
+
+/// How often a challenge is sent before it counts as not answered.
+const TRIES: u32 = 3;
+/// The time between two tries; the decision comes as long after the last.
+pub(super) const TRY_INTERVAL: Duration = Duration::from_millis(300);
+/// An incumbent that was silent for so long before the challenge need not be waited for.
+pub(super) const SILENT: Duration = Duration::from_secs(10);
+
+/// How far it is proven that a peer is where its messages seem to come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum RouteState {
+    /// It was heard from there, and anybody could have sent that.
+    #[default]
+    Unverified,
+    /// It has acknowledged what was sent there, is at the other end of a connection, or is
+    /// configured.
+    Verified,
+    /// It was silent for as long as a message waited for its acknowledgement. Messages to it go to
+    /// the group until it is heard again.
+    Stale,
+}
+
+/// A query to one path, and the number that its acknowledgement must have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::endpoint) struct Probe {
+    pub(in crate::endpoint) path: Path,
+    pub(in crate::endpoint) number: u16,
+}
+
+/// Why a peer is challenged, and in whose name.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::endpoint) struct Doubt {
+    /// The local component that asks.
+    pub(in crate::endpoint) local: JausId,
+    /// Where the peer was before.
+    pub(in crate::endpoint) incumbent: Path,
+    pub(in crate::endpoint) was_verified: bool,
+    /// Where else its id is heard; `None` if the one path is to be proven.
+    pub(in crate::endpoint) rival: Option<Path>,
+    pub(in crate::endpoint) rival_is_stream: bool,
+}
+
+/// A challenge under way.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::endpoint) struct Challenge {
+    pub(in crate::endpoint) doubt: Doubt,
+    pub(in crate::endpoint) incumbent: Probe,
+    pub(in crate::endpoint) rival: Option<Probe>,
+    /// Whether messages go to the rival meanwhile.
+    pub(in crate::endpoint) was_provisional: bool,
+    /// Whether an answer by the rival decides without waiting for the incumbent.
+    pub(super) at_once: bool,
+    pub(super) rival_answered: bool,
+    pub(super) incumbent_heard: bool,
+    pub(super) tries: u32,
+    pub(super) due: Instant,
+}
+
+/// What a challenge has shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::endpoint) enum Finding {
+    /// The peer is where it was, and has proven it.
+    Stays,
+    /// Nothing else than before is known.
+    Unanswered,
+    /// The peer is where the rival is.
+    Moves { verified: bool },
+}
+
+impl Challenge {
+    /// An acknowledgement with this number came along `path`. `None` if it is not the one that is
+    /// waited for, or does not decide yet.
+    pub(super) fn handle_answer(
+        &mut self,
+        local: JausId,
+        number: u16,
+        path: Path,
+    ) -> Option<Answer> {
+        let probe = Probe { path, number };
+        if local != self.doubt.local {
+            return None;
+        }
+        if probe == self.incumbent {
+            return Some(Answer::Decides(Finding::Stays));
+        }
+        if Some(probe) != self.rival {
+            return None;
+        }
+        self.rival_answered = true;
+        Some(if self.at_once {
+            Answer::Decides(Finding::Moves { verified: true })
+        } else {
+            Answer::Counts
+        })
+    }
+
+    /// The time for an answer is over: `None` if the challenge is to be sent once more.
+    pub(super) fn handle_timeout(&mut self, now: Instant) -> Option<Finding> {
+        if self.tries < TRIES {
+            self.tries += 1;
+            self.due = now + TRY_INTERVAL;
+            return None;
+        }
+        Some(match self.rival {
+            Some(_) if self.incumbent_heard => Finding::Unanswered,
+            Some(_) if self.rival_answered => Finding::Moves { verified: true },
+            Some(_) if !self.doubt.was_verified => Finding::Moves { verified: false },
+            _ => Finding::Unanswered,
+        })
+    }
+}
+
+/// What an acknowledgement is for a challenge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::endpoint) enum Answer {
+    /// It was waited for, and the other path has time to answer yet.
+    Counts,
+    Decides(Finding),
+}
