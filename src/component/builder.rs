@@ -5,6 +5,7 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, watch};
 
 use super::Component;
+use super::directories::{Directories, Membership};
 use super::driver::{Driver, Publisher};
 use super::handle::Shared;
 use super::watch::Outlet;
@@ -170,10 +171,12 @@ impl Builder {
         self.check_names()?;
         let id = port.id();
         let patience = self.patience;
-        let stack = self.stack(id);
+        let seed = self.seed.unwrap_or_else(|| id.to_u32().into());
+        let membership = Directories::join(&port, self.scope, self.timing, seed);
+        let stack = self.stack(id, &membership);
         stack.check()?;
         let (commands, inbox) = mpsc::channel(Shared::COMMANDS);
-        let (directory, directories) = watch::channel(Arc::new(stack.directory().clone()));
+        let (directory, directories) = watch::channel(());
         let (standing, standings) = watch::channel(*stack.standing());
         let changes = Arc::new(Outlet::new(Shared::CHANGES));
         let messages = Arc::new(Outlet::new(Shared::MESSAGES));
@@ -186,18 +189,18 @@ impl Builder {
         let shared = Shared {
             sender: port.sender(),
             commands,
+            known: membership.directory(),
             directories,
             standings,
             changes,
             messages,
         };
-        tokio::spawn(Driver::new(stack, port, inbox, publisher, patience).run());
+        tokio::spawn(Driver::new(stack, membership, port, inbox, publisher, patience).run());
         Ok(Component::new(shared))
     }
 
-    fn stack(mut self, id: JausId) -> Stack {
-        let seed = self.seed.unwrap_or_else(|| id.to_u32().into());
-        let discovery = Discovery::new(id, self.profile, self.scope, self.timing, seed);
+    fn stack(mut self, id: JausId, membership: &Membership) -> Stack {
+        let discovery = Discovery::join(membership.directory(), id, self.profile);
         let mut services: Vec<Box<dyn Service>> =
             vec![Box::new(Transport), Box::new(self.liveness)];
         services.append(&mut self.services);

@@ -10,6 +10,7 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 
 use super::clients::{Clients, Goodbye, Hold};
+use super::directories::Membership;
 use super::watch::Outlet;
 use crate::address::JausId;
 use crate::codec::Message;
@@ -17,8 +18,7 @@ use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::QueryHeartbeatPulse;
 use crate::node::{self, Port, Resident};
 use crate::service::{
-    Change, Condition, Directory, Event, Inquiry, NoAnswer, Patience, Service, Stack, Standing,
-    UnsafeService,
+    Change, Condition, Event, Inquiry, NoAnswer, Patience, Service, Stack, Standing, UnsafeService,
 };
 
 /// What the application wants of its component.
@@ -54,7 +54,8 @@ pub(super) enum Answer {
 
 /// What the application may read and listen to.
 pub(super) struct Publisher {
-    pub(super) directory: watch::Sender<Arc<Directory>>,
+    /// Wakes those who wait for a change of the directory.
+    pub(super) directory: watch::Sender<()>,
     pub(super) standing: watch::Sender<Standing>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
@@ -69,6 +70,8 @@ impl Drop for Publisher {
 
 pub(super) struct Driver {
     stack: Stack,
+    /// Dropped after the stack.
+    membership: Membership,
     port: Port,
     resident: Resident,
     probes: Probes,
@@ -83,6 +86,7 @@ pub(super) struct Driver {
 impl Driver {
     pub(super) fn new(
         stack: Stack,
+        membership: Membership,
         port: Port,
         inbox: mpsc::Receiver<Command>,
         publisher: Publisher,
@@ -91,6 +95,7 @@ impl Driver {
         let (bid, goodbyes) = mpsc::unbounded_channel();
         Self {
             stack,
+            membership,
             resident: port.reside(),
             port,
             probes: Probes::default(),
@@ -133,6 +138,7 @@ impl Driver {
                         self.stack.handle_acknowledged(Instant::now(), peer);
                     }
                 }
+                () = self.membership.changed() => self.stack.handle_directory(Instant::now()),
                 () = sleep_until(wake) => self.stack.handle_timeout(Instant::now()),
             }
             self.settle();
@@ -217,7 +223,7 @@ impl Driver {
                 Event::Change(change) => {
                     if !changed {
                         changed = true;
-                        self.publisher.directory.send_replace(self.snapshot());
+                        self.publisher.directory.send_replace(());
                     }
                     self.publisher.changes.send(change);
                 }
@@ -234,11 +240,8 @@ impl Driver {
                 Event::Message(message) => self.publisher.messages.send(message),
             }
         }
+        self.membership.publish();
         self.forget_the_impatient();
-    }
-
-    fn snapshot(&self) -> Arc<Directory> {
-        Arc::new(self.stack.directory().clone())
     }
 
     fn hold(&mut self, hold: Hold) {

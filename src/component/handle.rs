@@ -18,7 +18,8 @@ use crate::codec::{Message, ServiceId};
 use crate::endpoint::{Outgoing, Received};
 use crate::node;
 use crate::service::{
-    Change, Condition, Directory, Kind, Offer, Service, Standing, Topic, UnsafeService, When,
+    Change, Condition, Directory, Kind, NodeDirectory, Offer, Service, Standing, Topic,
+    UnsafeService, When,
 };
 use crate::wire::Priority;
 
@@ -32,7 +33,8 @@ pub struct Component {
 pub(super) struct Shared {
     pub(super) sender: node::Sender,
     pub(super) commands: mpsc::Sender<Command>,
-    pub(super) directories: watch::Receiver<Arc<Directory>>,
+    pub(super) known: Arc<NodeDirectory>,
+    pub(super) directories: watch::Receiver<()>,
     pub(super) standings: watch::Receiver<Standing>,
     pub(super) changes: Arc<Outlet<Change>>,
     pub(super) messages: Arc<Outlet<Received>>,
@@ -73,7 +75,7 @@ impl Component {
     /// Everybody who is known now, this component included.
     #[must_use]
     pub fn directory(&self) -> Arc<Directory> {
-        self.shared.directories.borrow().clone()
+        self.shared.known.directory()
     }
 
     /// The state of this component, and who controls it.
@@ -391,11 +393,15 @@ impl Component {
     ) -> Result<T, FindError> {
         let start = Instant::now();
         let own = self.id();
-        let found = |directory: &Directory| found(&Others { directory, own });
+        let mut result = None;
         let mut directories = self.shared.directories.clone();
-        let known = directories.wait_for(|directory| found(directory).is_some());
+        let known = directories.wait_for(|()| {
+            let directory = &self.directory();
+            result = found(&Others { directory, own });
+            result.is_some()
+        });
         match tokio::time::timeout(limit, known).await {
-            Ok(Ok(directory)) => found(&directory).ok_or(FindError::Stopped),
+            Ok(Ok(_)) => result.ok_or(FindError::Stopped),
             Ok(Err(_)) => Err(FindError::Stopped),
             Err(_) => Err(self.not_found(sought, start.elapsed())),
         }

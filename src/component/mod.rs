@@ -65,6 +65,7 @@
 mod builder;
 mod clients;
 mod control;
+mod directories;
 mod driver;
 mod error;
 mod feed;

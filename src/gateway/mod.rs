@@ -344,7 +344,7 @@ impl Gateway {
         self.former.retain(|_, until| now < *until);
         let (fronts, former) = (&self.fronts, &self.former);
         let is_front = |id| fronts.contains_key(&id) || former.contains_key(&id);
-        let picture = picture::draw(self.desk.directory(), &self.ids, subsystem, us, is_front);
+        let picture = picture::draw(&self.desk.directory(), &self.ids, subsystem, us, is_front);
         let Some(picture) = picture else {
             return self.hide(now, subsystem);
         };

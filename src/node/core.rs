@@ -4,6 +4,7 @@
 //! the endpoint in its own task, up to the socket, and is told at once what is wrong; nothing is
 //! queued in between. Receiving and waiting is the [driver](super::driver)'s.
 
+use std::any::Any;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::{BuildHasher, RandomState};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -52,6 +53,7 @@ pub(super) struct Shared {
     /// Whether no component process can come in (any more).
     pub(super) closed: watch::Sender<bool>,
     pub(super) residents: Residents,
+    commons: Mutex<Vec<Arc<dyn Any + Send + Sync>>>,
 }
 
 impl Shared {
@@ -67,7 +69,19 @@ impl Shared {
             stopped: watch::Sender::new(false),
             closed: watch::Sender::new(true),
             residents: Residents::default(),
+            commons: Mutex::default(),
         }
+    }
+
+    /// What the components of this process have in common on the node: one of each type.
+    pub(super) fn common<T: Any + Send + Sync + Default>(&self) -> Arc<T> {
+        let mut commons = self.commons.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = commons.iter().find_map(|it| it.clone().downcast().ok());
+        known.unwrap_or_else(|| {
+            let common = Arc::<T>::default();
+            commons.push(common.clone());
+            common
+        })
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Core> {

@@ -1,6 +1,7 @@
 //! A component's door to the node: it sends here and reads its mailbox. The node is in the same
 //! process, or in another one of the same host.
 
+use std::any::Any;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 
@@ -101,6 +102,15 @@ impl Port {
         match &self.sender.way {
             Way::Here(shared) => Resident::of(shared),
             Way::Host(_) => Resident::elsewhere(),
+        }
+    }
+
+    /// What the components of this process have in common on this node: one of each type. On the node
+    /// of another process they have nothing in common.
+    pub(crate) fn common<T: Any + Send + Sync + Default>(&self) -> Arc<T> {
+        match &self.sender.way {
+            Way::Here(shared) => shared.common(),
+            Way::Host(_) => Arc::default(),
         }
     }
 

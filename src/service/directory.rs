@@ -210,16 +210,19 @@ impl Directory {
         if known.is_none_or(|known| known.as_deref() == Some(&services[..])) {
             return false;
         }
-        // A node's components mostly offer the same.
-        let same = |list: &&Arc<[Offer]>| ***list == services[..];
-        let mut lists = self.components().filter_map(|it| it.services.as_ref());
-        let known = lists.find(same).cloned();
-        drop(lists);
-        let list = known.unwrap_or_else(|| services.into());
+        let list = self.list(&services).cloned();
+        let list = list.unwrap_or_else(|| services.into());
         if let Some(component) = self.component_mut(id) {
             component.services = Some(list);
         }
         true
+    }
+
+    /// The list of a component that offers just these services, in order: a node's components mostly
+    /// offer the same.
+    pub(super) fn list(&self, services: &[Offer]) -> Option<&Arc<[Offer]>> {
+        let mut lists = self.components().filter_map(|it| it.services.as_ref());
+        lists.find(|list| ***list == *services)
     }
 
     /// The subsystem of `id`, for changes; copied first if a copy of the directory shares it.

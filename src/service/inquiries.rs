@@ -1,7 +1,7 @@
 //! Questions of the application to other components: asked again if no answer comes, given up in
 //! the end, and one at a time where answers could not be told apart.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
@@ -52,16 +52,22 @@ pub struct NoAnswer {
 #[derive(Debug, Default)]
 pub(super) struct Inquiries {
     last: u64,
-    waiting: Vec<Waiting>,
+    waiting: BTreeMap<Inquiry, Waiting>,
+    /// Those for the same report of the same peer, of which the first is being asked.
+    turns: BTreeMap<Turn, VecDeque<Inquiry>>,
+    /// The turns whose peer has wildcards.
+    open: BTreeSet<Turn>,
+    due: BTreeSet<(Instant, Inquiry)>,
     failed: VecDeque<(Inquiry, NoAnswer)>,
 }
 
+/// The code of a report, and whose it is.
+type Turn = (u16, JausId);
+
 #[derive(Debug)]
 struct Waiting {
-    inquiry: Inquiry,
-    peer: JausId,
+    turn: Turn,
     query: Bytes,
-    report: u16,
     patience: Patience,
     asked: Option<Asked>,
 }
@@ -74,6 +80,9 @@ struct Asked {
 }
 
 impl Inquiries {
+    /// The most that may wait; one more fails at once.
+    const MOST: usize = 4096;
+
     pub(super) fn ask(
         &mut self,
         now: Instant,
@@ -84,23 +93,35 @@ impl Inquiries {
         out: &mut Outbox,
     ) -> Inquiry {
         self.last += 1;
-        let inquiry = Inquiry(self.last);
-        self.waiting.push(Waiting {
-            inquiry,
-            peer,
+        let (inquiry, turn) = (Inquiry(self.last), (report, peer));
+        if self.waiting.len() >= Self::MOST {
+            let (tries, waited) = (0, Duration::ZERO);
+            let failure = NoAnswer {
+                peer,
+                tries,
+                waited,
+            };
+            self.failed.push_back((inquiry, failure));
+            return inquiry;
+        }
+        let waiting = Waiting {
+            turn,
             query,
-            report,
             patience,
             asked: None,
-        });
-        self.proceed(now, out);
+        };
+        self.waiting.insert(inquiry, waiting);
+        self.turns.entry(turn).or_default().push_back(inquiry);
+        if peer.has_wildcard() {
+            self.open.insert(turn);
+        }
+        self.proceed(now, turn, out);
         inquiry
     }
 
     /// Forgets a question whose answer nobody waits for any more.
     pub(super) fn cancel(&mut self, now: Instant, inquiry: Inquiry, out: &mut Outbox) {
-        self.waiting.retain(|waiting| waiting.inquiry != inquiry);
-        self.proceed(now, out);
+        self.end(now, inquiry, out);
     }
 
     /// The question that this message answers, if any.
@@ -111,41 +132,42 @@ impl Inquiries {
         out: &mut Outbox,
     ) -> Option<Inquiry> {
         let code = code_of(&message.payload)?;
-        let answered = self.waiting.iter().position(|waiting| {
-            waiting.asked.is_some()
-                && waiting.report == code
-                && waiting.peer.matches(message.source)
-        })?;
-        let inquiry = self.waiting.remove(answered).inquiry;
-        self.proceed(now, out);
+        let all = (code, JausId::from_u32(0))..=(code, JausId::from_u32(u32::MAX));
+        let open = self.open.range(all);
+        let open = open.filter(|(_, peer)| peer.matches(message.source));
+        let own = (code, message.source);
+        let turns = open.chain([&own]);
+        let first = turns.filter_map(|turn| self.turns.get(turn)?.front());
+        let inquiry = first.min().copied()?;
+        self.end(now, inquiry, out);
         Some(inquiry)
     }
 
     pub(super) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
-        let failed = &mut self.failed;
-        self.waiting.retain_mut(|waiting| {
-            let Some(asked) = &mut waiting.asked else {
-                return true;
+        while let Some(&(due, inquiry)) = self.due.first().filter(|(due, _)| *due <= now) {
+            self.due.remove(&(due, inquiry));
+            let Some(waiting) = self.waiting.get_mut(&inquiry) else {
+                continue;
             };
-            if asked.next > now {
-                return true;
-            }
+            let peer = waiting.turn.1;
+            let Some(asked) = &mut waiting.asked else {
+                continue;
+            };
             if asked.tries < waiting.patience.tries {
                 asked.tries += 1;
                 asked.next = now + waiting.patience.interval;
-                out.send_octets(waiting.peer, waiting.query.clone());
-                return true;
+                self.due.insert((asked.next, inquiry));
+                out.send_octets(peer, waiting.query.clone());
+                continue;
             }
-            let waited = now.saturating_duration_since(asked.first);
             let failure = NoAnswer {
-                peer: waiting.peer,
+                peer,
                 tries: asked.tries,
-                waited,
+                waited: now.saturating_duration_since(asked.first),
             };
-            failed.push_back((waiting.inquiry, failure));
-            false
-        });
-        self.proceed(now, out);
+            self.failed.push_back((inquiry, failure));
+            self.end(now, inquiry, out);
+        }
     }
 
     pub(super) fn poll_failure(&mut self) -> Option<(Inquiry, NoAnswer)> {
@@ -153,31 +175,82 @@ impl Inquiries {
     }
 
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
-        self.waiting
-            .iter()
-            .filter_map(|waiting| Some(waiting.asked?.next))
-            .min()
+        self.due.first().map(|&(due, _)| due)
     }
 
-    /// Asks the questions whose turn has come.
-    fn proceed(&mut self, now: Instant, out: &mut Outbox) {
-        for turn in 0..self.waiting.len() {
-            let (before, rest) = self.waiting.split_at_mut(turn);
-            let Some(waiting) = rest.first_mut() else {
-                return;
-            };
-            let busy = before
-                .iter()
-                .any(|other| other.peer == waiting.peer && other.report == waiting.report);
-            if waiting.asked.is_none() && !busy {
-                let next = now + waiting.patience.interval;
-                waiting.asked = Some(Asked {
-                    first: now,
-                    tries: 1,
-                    next,
-                });
-                out.send_octets(waiting.peer, waiting.query.clone());
+    /// Takes a question out, and asks the one whose turn comes then.
+    fn end(&mut self, now: Instant, inquiry: Inquiry, out: &mut Outbox) {
+        let Some(ended) = self.waiting.remove(&inquiry) else {
+            return;
+        };
+        if let Some(asked) = ended.asked {
+            self.due.remove(&(asked.next, inquiry));
+        }
+        if let Some(queue) = self.turns.get_mut(&ended.turn) {
+            if queue.front() == Some(&inquiry) {
+                queue.pop_front();
+            } else {
+                queue.retain(|other| *other != inquiry);
+            }
+            if queue.is_empty() {
+                self.turns.remove(&ended.turn);
+                self.open.remove(&ended.turn);
             }
         }
+        self.proceed(now, ended.turn, out);
+    }
+
+    /// Asks the question whose turn it is.
+    fn proceed(&mut self, now: Instant, turn: Turn, out: &mut Outbox) {
+        let first = self.turns.get(&turn).and_then(VecDeque::front);
+        let Some((&inquiry, waiting)) = first.and_then(|it| Some((it, self.waiting.get_mut(it)?)))
+        else {
+            return;
+        };
+        if waiting.asked.is_some() {
+            return;
+        }
+        let next = now + waiting.patience.interval;
+        waiting.asked = Some(Asked {
+            first: now,
+            tries: 1,
+            next,
+        });
+        self.due.insert((next, inquiry));
+        out.send_octets(turn.1, waiting.query.clone());
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "an arbitrary beginning of virtual time"
+)]
+mod tests {
+    use super::*;
+
+    const US: JausId = JausId::new(101, 1, 1);
+    const PEER: JausId = JausId::new(102, 1, 1);
+
+    #[test]
+    fn a_question_too_many_fails_at_once_and_the_others_take_their_turns() {
+        let (mut inquiries, now) = (Inquiries::default(), Instant::now());
+        let mut out = Outbox::new(US);
+        let ask = |inquiries: &mut Inquiries, out: &mut Outbox| {
+            let patience = Patience::default();
+            inquiries.ask(now, PEER, Bytes::new(), 0x4202, patience, out)
+        };
+        for _ in 0..Inquiries::MOST {
+            ask(&mut inquiries, &mut out);
+        }
+        assert!(inquiries.poll_failure().is_none());
+        let last = ask(&mut inquiries, &mut out);
+        let failed = inquiries.poll_failure().map(|(inquiry, _)| inquiry);
+        assert_eq!(failed, Some(last));
+        assert!(out.pop().is_some() && out.pop().is_none(), "one at a time");
+        inquiries.cancel(now, Inquiry(2), &mut out);
+        inquiries.cancel(now, Inquiry(1), &mut out);
+        assert!(out.pop().is_some() && out.pop().is_none(), "the third");
+        assert_eq!(inquiries.waiting.len(), Inquiries::MOST - 2);
     }
 }

@@ -44,6 +44,7 @@ mod outbox;
 #[cfg(test)]
 mod rig;
 mod safety;
+mod share;
 mod stack;
 #[cfg(test)]
 mod stack_rig;
@@ -64,7 +65,7 @@ pub use client::{
 pub use context::Context;
 pub use control::{AccessControl, Condition, Management};
 pub use directory::{Component, Directory, Identification, Kind, Level, Node, Offer, Subsystem};
-pub use discovery::{Change, Discovery, Loss, Profile, Scope, Timing};
+pub use discovery::{Change, Discovery, Loss, NodeDirectory, Profile, Refused, Scope, Timing};
 pub use events::EventSettings;
 pub use guard::{MotionGuard, MotionPolicy, StopCause, Validity};
 pub use handlers::Handlers;

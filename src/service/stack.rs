@@ -2,7 +2,8 @@
 
 mod safeguard;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
@@ -127,7 +128,7 @@ impl Stack {
 
     /// Everybody who is known.
     #[must_use]
-    pub const fn directory(&self) -> &Directory {
+    pub fn directory(&self) -> Arc<Directory> {
         self.discovery.directory()
     }
 
@@ -180,7 +181,7 @@ impl Stack {
         self.end_overdue(now);
         self.life
             .hear(now, message.source, code_of(&message.payload));
-        self.discovery.hear(now, message.source);
+        self.discovery.hear(now, message);
         self.subscriptions.hear(now, message.source);
         let answered = self.inquiries.handle_message(now, message, &mut self.out);
         let mut handled = self.discovery.handle_message(now, message, &mut self.out);
@@ -324,6 +325,11 @@ impl Stack {
     /// The time of [`poll_timeout`](Self::poll_timeout) has come; earlier does no harm.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.wake(now);
+    }
+
+    /// Another component of the node has changed the [directory](super::NodeDirectory) that they share.
+    pub fn handle_directory(&mut self, now: Instant) {
+        self.collect(now);
     }
 
     /// Sends a message, and forgets it.
@@ -567,8 +573,13 @@ impl Stack {
         for query in changed {
             self.subscribers.handle_change(now, query);
         }
+        let mut reports: BTreeMap<Bytes, Option<Bytes>> = BTreeMap::new();
         while let Some(due) = self.subscribers.poll_due(now) {
-            let report = self.answer(now, due.client(), &due.query);
+            let report = match reports.get(&due.query) {
+                Some(report) => report.clone(),
+                None => self.answer(now, due.client(), &due.query),
+            };
+            reports.insert(due.query.clone(), report.clone());
             let events = &mut self.subscribers;
             events.report_due(now, &due, report, &mut self.out);
         }

@@ -8,7 +8,7 @@ use bytes::Bytes;
 use super::{Discovery, Kind, Profile, Scope, Service, Stack, Timing, code_of};
 use crate::address::JausId;
 use crate::codec::Message;
-use crate::endpoint::Received;
+use crate::endpoint::{Path, Received};
 use crate::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse};
 use crate::wire::{Broadcast, Priority};
 
@@ -46,6 +46,16 @@ impl StackRig {
 
     /// A client sends something; what it and others are told.
     pub(crate) fn hear<M: Message>(&mut self, source: JausId, message: &M) -> Vec<Told> {
+        self.hear_on(None, source, message)
+    }
+
+    /// The same through the network.
+    pub(crate) fn hear_on<M: Message>(
+        &mut self,
+        path: Option<Path>,
+        source: JausId,
+        message: &M,
+    ) -> Vec<Told> {
         let received = Received {
             source,
             destination: US,
@@ -53,7 +63,7 @@ impl StackRig {
             priority: Priority::Standard,
             broadcast: Broadcast::None,
             payload: message.encode().unwrap(),
-            path: None,
+            path,
         };
         self.stack.handle_message(self.now, &received);
         self.said()

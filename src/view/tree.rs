@@ -214,5 +214,6 @@ const fn reason(loss: Loss) -> &'static str {
         Loss::Silent => "it does not answer any more",
         Loss::Unlisted => "its subsystem does not list it any more",
         Loss::WithItsReporter => "the component that spoke for it is gone",
+        Loss::NoRoom => "it never spoke, and its place is needed for one that does",
     }
 }

@@ -76,7 +76,8 @@ fn a_registration_from_another_subsystem_is_learned_and_not_answered() {
         let told = news.filter(|(_, change)| *change == Change::Services(PEER));
         assert_eq!(told.count(), usize::from(again == 0), "it is news once");
     }
-    let known = world.stack(us).directory().component(PEER).unwrap();
+    let directory = world.stack(us).directory();
+    let known = directory.component(PEER).unwrap();
     assert_eq!(known.services.as_ref().map(|it| it.len()), Some(2));
 }
 

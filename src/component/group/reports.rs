@@ -6,7 +6,6 @@ use std::fmt;
 use std::future::poll_fn;
 use std::ops::Bound;
 use std::pin::Pin;
-use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 
@@ -18,7 +17,7 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::component::driver::sleep_until;
 use crate::component::{Component, SubscribeError, Subscription, Update};
-use crate::service::{Directory, Outage, Topic};
+use crate::service::{Outage, Topic};
 
 /// The reports of all members of an [`Audience`], as they come, whoever they are at the time. Made
 /// by [`Component::subscribe_all`]; dropping it ends the events at all of them.
@@ -33,7 +32,7 @@ pub struct GroupSubscription<R> {
     /// With the peer left to be filled in.
     topic: Topic,
     query: &'static str,
-    directories: watch::Receiver<Arc<Directory>>,
+    directories: watch::Receiver<()>,
     /// Whether the roll is to be called.
     is_stale: bool,
     roll: Roll,
@@ -153,7 +152,8 @@ impl<R: Message> GroupSubscription<R> {
 
     /// Takes in who has come, and lets go of who has left.
     fn call_the_roll(&mut self) {
-        let directory = self.directories.borrow_and_update().clone();
+        self.directories.mark_unchanged();
+        let directory = self.component.directory();
         let present = self.audience.members(&directory, self.component.id());
         for left in self.roll.handle_present(&present) {
             self.asked.remove(&left);

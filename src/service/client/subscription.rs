@@ -49,6 +49,8 @@ pub(super) struct Subscription {
     lifetime_asked: u32,
     /// When the last sign of the event came.
     heard: Instant,
+    /// When the peer confirmed the event last.
+    confirmed: Instant,
     /// When the peer said anything last.
     peer_heard: Instant,
     /// The last report's number, since the last confirmation.
@@ -83,6 +85,12 @@ impl Subscription {
     const SILENT_PERIODS: f64 = 4.0;
     /// … but not sooner than this after its last report.
     const LEAST_SILENCE: Duration = Duration::from_millis(500);
+    /// … nor sooner than this after its confirmation: JAUS++ sends a first report at once, and begins
+    /// with its periods some time later.
+    const SETTLING: Duration = Duration::from_secs(2);
+    /// Numbers may be so far ahead of what the rate explains: JAUS++ sends at the fastest rate of all
+    /// clients. A greater gap is another numbering.
+    const UNEXPLAINED: f64 = 16.0;
     /// The longest pause between two attempts to bring an event back.
     const LONGEST_PAUSE: Duration = Duration::from_secs(5);
     /// A peer that says something after so long a silence may have been away.
@@ -107,6 +115,7 @@ impl Subscription {
             lifetime: None,
             lifetime_asked: 0,
             heard: now,
+            confirmed: now,
             peer_heard: now,
             sequence: None,
             early: None,
@@ -175,6 +184,7 @@ impl Subscription {
         self.hz = confirmed;
         self.asked = 0;
         self.heard = now;
+        self.confirmed = now;
         self.sequence = None;
         self.next_ask = self.refresh().map(|pause| now + pause);
         if unasked {
@@ -252,6 +262,7 @@ impl Subscription {
             // restarted peer gives the number to, and is no sign of this one.
             return;
         }
+        let lost = ahead.map_or(0, |ahead| self.lost(now, ahead));
         self.heard = now;
         self.sequence = Some(event.sequence_number);
         if self.state == State::Down {
@@ -269,7 +280,7 @@ impl Subscription {
         }
         news.push(SubscriptionNews::Report {
             report: event.report_message,
-            lost: ahead.map_or(0, |ahead| ahead - 1),
+            lost,
         });
     }
 
@@ -343,7 +354,19 @@ impl Subscription {
     fn silent_at(&self) -> Option<Instant> {
         let hz = self.hz.filter(|_| self.state == State::Up)?;
         let periods = Duration::try_from_secs_f64(Self::SILENT_PERIODS / hz).ok()?;
-        self.heard.checked_add(periods.max(Self::LEAST_SILENCE))
+        let silent = self.heard.checked_add(periods.max(Self::LEAST_SILENCE))?;
+        Some(silent.max(self.confirmed + Self::SETTLING))
+    }
+
+    /// How many reports were lost if the next one's number is so far ahead: none if there cannot have
+    /// been so many, because the peer counts anew.
+    fn lost(&self, now: Instant, ahead: u8) -> u8 {
+        let passed = now.saturating_duration_since(self.heard).as_secs_f64();
+        let explained = self.hz.map(|hz| hz * passed * 1.25 + Self::UNEXPLAINED);
+        match explained {
+            Some(most) if f64::from(ahead) > most => 0,
+            _ => ahead - 1,
+        }
     }
 
     fn fall(&mut self, now: Instant, why: Outage, news: &mut Vec<SubscriptionNews>) {

@@ -12,7 +12,7 @@ use crate::messages::core::{
     query_service_list, query_services, report_configuration, report_service_list, report_services,
     report_subsystem_list,
 };
-use crate::service::{Component, Level, Node, Outbox, Subsystem, read};
+use crate::service::{Component, Directory, Level, Node, Outbox, Subsystem, read};
 
 /// A list of services is cut into several reports so that each stays under this many octets: one
 /// packet, which every peer can read.
@@ -43,7 +43,7 @@ impl Discovery {
         };
         if !self.quoted {
             // A call is also news about the caller.
-            self.admit(now, received.source, None);
+            self.known.lock().admit(now, received);
         }
         let told = match query.query_type.0 {
             1 => self.profile.system(),
@@ -80,7 +80,8 @@ impl Discovery {
         if !self.may_answer(now, received) {
             return;
         }
-        let nodes = self.directory.subsystem(self.own.subsystem()).into_iter();
+        let directory = self.directory();
+        let nodes = directory.subsystem(self.own.subsystem()).into_iter();
         let nodes = nodes
             .flat_map(Subsystem::nodes)
             .filter(|(id, _)| whole || *id == self.own.node());
@@ -97,11 +98,12 @@ impl Discovery {
         if !self.may_answer(now, received) {
             return;
         }
-        let known = self
+        let known = self.known.lock();
+        let subsystems = known
             .directory
             .subsystems()
             .filter_map(|(subsystem, members)| {
-                let reporter = self.search.reporters.get(&subsystem).copied();
+                let reporter = known.reporters.get(&subsystem).copied();
                 let any = || members.components().next().map(|component| component.id);
                 if subsystem == self.own.subsystem() {
                     Some(self.own)
@@ -109,13 +111,13 @@ impl Discovery {
                     reporter.or_else(any)
                 }
             });
-        let known = known.map(|id| report_subsystem_list::SubsystemRec {
+        let subsystems = subsystems.map(|id| report_subsystem_list::SubsystemRec {
             subsystem_id: id.subsystem(),
             node_id: id.node(),
             component_id: id.component(),
         });
         // The count is one octet.
-        let subsystem_list = known.take(usize::from(u8::MAX)).collect();
+        let subsystem_list = subsystems.take(usize::from(u8::MAX)).collect();
         out.reply(received, &ReportSubsystemList { subsystem_list });
     }
 
@@ -125,8 +127,9 @@ impl Discovery {
         };
         let together = received.destination.has_wildcard();
         let wanted = |id: JausId| query_services_wants(&query, id);
-        let mut asked: Vec<&Component> =
-            self.speaks_for(together).filter(|c| wanted(c.id)).collect();
+        let directory = self.directory();
+        let mine = self.speaks_for(&directory, together);
+        let mut asked: Vec<&Component> = mine.filter(|c| wanted(c.id)).collect();
         // Who reads one report only gets that of the component it asked.
         asked.sort_by_key(|component| component.id != self.own);
         let mut reports = Vec::new();
@@ -145,19 +148,6 @@ impl Discovery {
         }
     }
 
-    /// Tells the own services to every peer that may have asked for them.
-    pub(super) fn tell_services(&self, out: &mut Outbox) {
-        let mut reports = Vec::new();
-        if let Some(own) = self.directory.component(self.own) {
-            add_services(&mut reports, own);
-        }
-        for (peer, _) in self.search.speakers() {
-            for report in &reports {
-                out.send(peer, report);
-            }
-        }
-    }
-
     pub(super) fn answer_service_list(
         &mut self,
         now: Instant,
@@ -168,8 +158,8 @@ impl Discovery {
             return;
         };
         let together = received.destination.has_wildcard();
-        let known = self
-            .directory
+        let directory = self.directory();
+        let known = directory
             .components()
             .filter(|c| !together || c.id == self.own);
         let mut reports = Vec::new();
@@ -192,10 +182,33 @@ impl Discovery {
     }
 
     /// The components that we speak for: ourselves, or all that we know of our subsystem.
-    fn speaks_for(&self, together: bool) -> impl Iterator<Item = &Component> {
-        let subsystem = self.directory.subsystem(self.own.subsystem()).into_iter();
+    fn speaks_for<'d>(
+        &self,
+        directory: &'d Directory,
+        together: bool,
+    ) -> impl Iterator<Item = &'d Component> {
+        let own = self.own;
+        let subsystem = directory.subsystem(own.subsystem()).into_iter();
         let members = subsystem.flat_map(Subsystem::components);
-        members.filter(move |component| !together || component.id == self.own)
+        members.filter(move |component| !together || component.id == own)
+    }
+}
+
+/// Tells a component's services to every peer that may have asked for them.
+pub(super) fn tell_services(
+    directory: &Directory,
+    own: JausId,
+    peers: impl Iterator<Item = JausId>,
+    out: &mut Outbox,
+) {
+    let mut reports = Vec::new();
+    if let Some(own) = directory.component(own) {
+        add_services(&mut reports, own);
+    }
+    for peer in peers {
+        for report in &reports {
+            out.send(peer, report);
+        }
     }
 }
 

@@ -4,111 +4,180 @@ use std::collections::BTreeSet;
 use std::collections::btree_map::Entry;
 use std::time::Instant;
 
-use super::search::Question;
-use super::{Change, Discovery, Loss};
+use super::known::Known;
+use super::peers::NoRoom;
+use super::questions::{Question, What};
+use super::{Change, Loss, Profile};
 use crate::address::JausId;
 use crate::codec::Text;
 use crate::endpoint::Received;
 use crate::messages::core::{
     RegisterServices, ReportConfiguration, ReportIdentification, ReportServices,
 };
+use crate::service::share::Share;
 use crate::service::{Identification, Kind, Level, Offer, read};
 
-impl Discovery {
+/// A component may offer so many services, each in several versions …
+const MOST_SERVICES: usize = 128;
+/// … whose names have so many octets together.
+const MOST_URN_OCTETS: usize = 6 * 1024;
+/// What a service takes in memory beside its name.
+const OFFER_OCTETS: usize = size_of::<Offer>() + 16;
+
+impl Known {
     /// Any message is a sign of life, and a stranger's is a reason to ask who it is.
-    pub(in crate::service) fn hear(&mut self, now: Instant, source: JausId) {
-        if self.search.covers(self.own, source) && !self.search.hear(now, source) {
-            self.search
-                .wonder(now, Question::Identify(source, Level::Component));
+    pub(super) fn hear(&mut self, now: Instant, received: &Received) {
+        let source = received.source;
+        if self.covers(source) && !self.peers.hear(now, source) {
+            let what = What::Name(Level::Component);
+            self.wonder(now, source, what, Share::of(received));
         }
+    }
+
+    /// The sender of a message that belongs to discovery is in the tree, if there is room. Says whether
+    /// it is.
+    pub(super) fn admit(&mut self, now: Instant, received: &Received) -> bool {
+        self.admit_as(now, received.source, None, Share::of(received))
     }
 
     /// Takes a component into the tree, and wonders what there is to know about it. Says whether
     /// it is in the tree then.
-    pub(super) fn admit(&mut self, now: Instant, id: JausId, listed_by: Option<JausId>) -> bool {
-        if !self.search.covers(self.own, id) {
+    fn admit_as(
+        &mut self,
+        now: Instant,
+        id: JausId,
+        listed_by: Option<JausId>,
+        share: Share,
+    ) -> bool {
+        if !self.covers(id) {
             return false;
         }
-        let was_listed = self.search.is_listed(id);
-        let Some(new) = self.search.admit(now, id, listed_by) else {
-            return false;
-        };
-        if new {
-            self.welcome(now, id, listed_by.is_none());
-        } else if was_listed && listed_by.is_none() {
-            // Only now is there somebody to ask.
-            self.ask_who_it_is(now, id);
-        }
-        if listed_by.is_none() {
-            self.appoint(now, id);
+        let look = now + self.timing.patience(self.peers.confirmed());
+        match self.peers.get(id).map(|peer| peer.listed_by) {
+            None => return self.take_in(now, id, (listed_by, share), look),
+            Some(known) if listed_by.is_none() => {
+                self.peers.hear(now, id);
+                self.appoint(now, id, share);
+                if known.is_some() {
+                    // Only now is there somebody to ask.
+                    self.peers.speak(look, id);
+                    self.ask_who_it_is(now, id, share);
+                }
+            }
+            Some(_) => {}
         }
         true
     }
 
-    fn welcome(&mut self, now: Instant, id: JausId, direct: bool) {
+    fn take_in(
+        &mut self,
+        now: Instant,
+        id: JausId,
+        (listed_by, share): (Option<JausId>, Share),
+        look: Instant,
+    ) -> bool {
+        match self.peers.room(share, listed_by.is_none()) {
+            Ok(None) => {}
+            Ok(Some(weaker)) => {
+                self.refuse(now, |refused| &mut refused.no_room);
+                self.lose(now, weaker, Loss::NoRoom);
+            }
+            Err(NoRoom) => {
+                self.refuse(now, |refused| &mut refused.no_room);
+                return false;
+            }
+        }
+        let interval = self.timing.refresh_interval(self.peers.confirmed() + 1);
+        let refresh = now + self.jitter.around(interval);
+        self.peers
+            .insert(now, id, (listed_by, share), (look, refresh));
         if self.directory.subsystem(id.subsystem()).is_none() {
-            self.changes
-                .push_back(Change::SubsystemFound(id.subsystem()));
+            self.tell(Change::SubsystemFound(id.subsystem()));
         }
-        self.directory.insert(id);
-        self.changes.push_back(Change::Found(id));
-        self.search.wonder(now, Question::Services(id));
-        if direct {
-            self.ask_who_it_is(now, id);
+        self.tree().insert(id);
+        self.tell(Change::Found(id));
+        self.wonder(now, id, What::Services, share);
+        if listed_by.is_none() {
+            self.appoint(now, id, share);
+            self.ask_who_it_is(now, id, share);
         }
+        true
     }
 
-    fn ask_who_it_is(&mut self, now: Instant, id: JausId) {
+    /// Asks a component for the names that are missing; for that of its subsystem if it has the say,
+    /// and for that of its node if no other is being asked.
+    pub(super) fn ask_who_it_is(&mut self, now: Instant, id: JausId, share: Share) {
+        let has_the_say = self.reporters.get(&id.subsystem()) == Some(&id);
         for level in [Level::Subsystem, Level::Node, Level::Component] {
-            if self.directory.identification(level, id).is_none() {
-                self.search.wonder(now, Question::Identify(id, level));
+            let what = What::Name(level);
+            let is_its_turn = match level {
+                Level::Subsystem => has_the_say,
+                Level::Node => !self.questions.is_open(what, self.peers.of_node(id)),
+                Level::Component => true,
+            };
+            if is_its_turn && self.directory.identification(level, id).is_none() {
+                self.wonder(now, id, what, share);
             }
         }
     }
 
     /// Makes a component the one that is asked for its subsystem's configuration, if there is
     /// none yet.
-    fn appoint(&mut self, now: Instant, id: JausId) {
-        if let Entry::Vacant(vacant) = self.search.reporters.entry(id.subsystem()) {
+    fn appoint(&mut self, now: Instant, id: JausId, share: Share) {
+        if let Entry::Vacant(vacant) = self.reporters.entry(id.subsystem()) {
             vacant.insert(id);
-            self.search.wonder(now, Question::Configuration(id));
+            self.wonder(now, id, What::Configuration, share);
         }
     }
 
     /// Takes a component out of the tree, and those with it that it had listed.
     pub(super) fn lose(&mut self, now: Instant, id: JausId, loss: Loss) {
-        self.search.forget(id);
-        self.directory.remove(id);
-        self.changes.push_back(Change::Lost(id, loss));
-        let orphans: Vec<_> = self.listed_by(id).collect();
-        for orphan in orphans {
-            self.lose(now, orphan, Loss::WithItsReporter);
-        }
         let subsystem = id.subsystem();
-        let successor = self.search.peers.iter().find_map(|(&other, peer)| {
-            (other.subsystem() == subsystem && peer.listed_by.is_none()).then_some(other)
-        });
-        if let Some(successor) = successor {
-            self.appoint(now, successor);
+        let orphans: Vec<_> = self.peers.listed_by(id).collect();
+        self.drop_peer(id, loss);
+        for orphan in orphans {
+            self.drop_peer(orphan, Loss::WithItsReporter);
         }
-        if loss != Loss::WithItsReporter && self.directory.subsystem(subsystem).is_none() {
-            self.changes.push_back(Change::SubsystemLost(subsystem));
+        if self.reporters.get(&subsystem) == Some(&id) {
+            self.reporters.remove(&subsystem);
+        }
+        let successor = self.peers.speaker_of(subsystem);
+        let successor = successor.and_then(|id| Some((id, self.peers.get(id)?.share)));
+        if let Some((successor, share)) = successor {
+            self.appoint(now, successor, share);
+        }
+        if self.directory.subsystem(subsystem).is_none() {
+            self.tell(Change::SubsystemLost(subsystem));
         }
     }
 
-    fn listed_by(&self, reporter: JausId) -> impl Iterator<Item = JausId> {
-        let peers = self.search.peers.iter();
-        peers
-            .filter(move |(_, peer)| peer.listed_by == Some(reporter))
-            .map(|(&id, _)| id)
+    fn drop_peer(&mut self, id: JausId, loss: Loss) {
+        self.peers.remove(id);
+        self.questions.forget(id);
+        self.tree().remove(id);
+        self.tell(Change::Lost(id, loss));
     }
 
-    pub(super) fn learn_identification(&mut self, now: Instant, received: &Received) {
+    /// A question is answered; says whether it was asked.
+    fn settle(&mut self, about: JausId, what: What) -> bool {
+        let asked = self.questions.settle(Question { about, what });
+        if asked {
+            self.peers.confirm(about);
+        }
+        asked
+    }
+
+    pub(super) fn learn_identification(
+        &mut self,
+        now: Instant,
+        received: &Received,
+        (own, profile): (JausId, &Profile),
+    ) {
         let Some(report) = read::<ReportIdentification>(received) else {
             return;
         };
         let source = received.source;
-        if !self.admit(now, source, None) {
+        if !self.admit(now, received) {
             return;
         }
         let level = match report.query_type.0 {
@@ -117,45 +186,40 @@ impl Discovery {
             4 => Level::Component,
             _ => return,
         };
-        self.search.settle(Question::Identify(source, level));
-        let reporter = self.search.reporters.get(&source.subsystem());
+        self.settle(source, What::Name(level));
+        let reporter = self.reporters.get(&source.subsystem());
         if level == Level::Subsystem && reporter != Some(&source) {
             // Every component answers a call. Should they disagree, one has the say.
             return;
         }
-        if self.knows_better(level, source) {
+        if knows_better(level, source, own, profile) {
             return;
         }
         let told = Identification {
             kind: Kind::from_code(report.r#type.0),
             name: text(&report.identification),
         };
-        let known = self.directory.identification(level, source).is_some();
-        if self.directory.identify(level, source, told) {
-            self.changes.push_back(Change::Identified(level, source));
-            if known {
-                self.doubt(now, source);
+        let known = self.directory.identification(level, source);
+        if known == Some(&told) {
+            return;
+        }
+        let is_known = known.is_some();
+        if is_known && !self.peers.may_change(now, source) {
+            return self.refuse(now, |refused| &mut refused.too_often);
+        }
+        if self.tree().identify(level, source, told) {
+            self.tell(Change::Identified(level, source));
+            if is_known {
+                self.doubt(now, source, Share::of(received));
             }
         }
     }
 
-    /// Whether we have told others ourselves what is called how, namely our own subsystem or node.
-    /// A component that joins them may have another idea, or be a tool that passes by.
-    fn knows_better(&self, level: Level, source: JausId) -> bool {
-        let same_subsystem = source.subsystem() == self.own.subsystem();
-        let ours = match level {
-            Level::Subsystem => same_subsystem,
-            Level::Node => same_subsystem && source.node() == self.own.node(),
-            Level::Component => false,
-        };
-        ours && !self.profile.identification(level).name.is_empty()
-    }
-
     /// Asks a component anew who it is and what it offers: another program may have taken its id.
-    fn doubt(&mut self, now: Instant, id: JausId) {
-        self.search.wonder(now, Question::Services(id));
-        for level in [Level::Node, Level::Component] {
-            self.search.wonder(now, Question::Identify(id, level));
+    fn doubt(&mut self, now: Instant, id: JausId, share: Share) {
+        let names = [Level::Node, Level::Component].map(What::Name);
+        for what in [What::Services].into_iter().chain(names) {
+            self.wonder(now, id, what, share);
         }
     }
 
@@ -164,7 +228,7 @@ impl Discovery {
             return;
         };
         let source = received.source;
-        if !self.admit(now, source, None) {
+        if !self.admit(now, received) {
             return;
         }
         let mut listed = BTreeSet::new();
@@ -176,15 +240,13 @@ impl Discovery {
         }
         for &id in &listed {
             if id != source {
-                self.admit(now, id, Some(source));
+                self.admit_as(now, id, Some(source), Share::of(received));
             }
         }
         // Only what we asked for is known to be the whole subsystem.
-        if self.search.settle(Question::Configuration(source)) {
-            let gone: Vec<_> = self
-                .listed_by(source)
-                .filter(|id| !listed.contains(id))
-                .collect();
+        if self.settle(source, What::Configuration) {
+            let known = self.peers.listed_by(source);
+            let gone: Vec<_> = known.filter(|id| !listed.contains(id)).collect();
             for id in gone {
                 self.lose(now, id, Loss::Unlisted);
             }
@@ -196,20 +258,19 @@ impl Discovery {
             return;
         };
         let source = received.source;
-        if !self.admit(now, source, None) {
+        if !self.admit(now, received) {
             return;
         }
         for node in report.node_list {
             for component in node.component_list {
                 let (node, number) = (node.node_rec.node_id, component.component_rec.component_id);
                 let id = JausId::new(source.subsystem(), node, number);
-                let services = component.service_list.into_iter().map(|service| Offer {
-                    urn: text(&service.uri),
-                    major: service.major_version_number,
-                    minor: service.minor_version_number,
+                let services = component.service_list.iter().map(|it| {
+                    let version = (it.major_version_number, it.minor_version_number);
+                    (&it.uri, version)
                 });
-                if id == source || self.admit(now, id, Some(source)) {
-                    self.set_services(id, services.collect());
+                if id == source || self.admit_as(now, id, Some(source), Share::of(received)) {
+                    self.set_services(now, id, services);
                 }
             }
         }
@@ -219,22 +280,77 @@ impl Discovery {
         let Some(registration) = read::<RegisterServices>(received) else {
             return;
         };
-        if self.admit(now, received.source, None) {
-            let services = registration.service_list.into_iter().map(|service| Offer {
-                urn: text(&service.uri),
-                major: service.major_version_number,
-                minor: service.minor_version_number,
+        if self.admit(now, received) {
+            let services = registration.service_list.iter().map(|it| {
+                let version = (it.major_version_number, it.minor_version_number);
+                (&it.uri, version)
             });
-            self.set_services(received.source, services.collect());
+            self.set_services(now, received.source, services);
         }
     }
 
-    fn set_services(&mut self, id: JausId, services: Vec<Offer>) {
-        self.search.settle(Question::Services(id));
-        if self.directory.set_services(id, services) {
-            self.changes.push_back(Change::Services(id));
+    /// Sets what a component offers, as far as the limits allow.
+    fn set_services<'r>(
+        &mut self,
+        now: Instant,
+        id: JausId,
+        services: impl Iterator<Item = (&'r Text, (u8, u8))>,
+    ) {
+        let (services, is_cut) = offers(services);
+        if is_cut {
+            self.refuse(now, |refused| &mut refused.cut);
+        }
+        self.settle(id, What::Services);
+        let known = self.directory.component(id);
+        let known = known.and_then(|known| known.services.as_deref());
+        if known == Some(&services[..]) {
+            return;
+        }
+        if known.is_some() && !self.peers.may_change(now, id) {
+            return self.refuse(now, |refused| &mut refused.too_often);
+        }
+        let octets = match self.directory.list(&services) {
+            Some(_) => 0,
+            None => services.iter().map(|it| OFFER_OCTETS + it.urn.len()).sum(),
+        };
+        if !self.peers.charge(id, octets) {
+            return self.refuse(now, |refused| &mut refused.cut);
+        }
+        if self.tree().set_services(id, services) {
+            self.tell(Change::Services(id));
         }
     }
+}
+
+/// Whether we have told others ourselves what is called how, namely our own subsystem or node.
+/// A component that joins them may have another idea, or be a tool that passes by.
+fn knows_better(level: Level, source: JausId, own: JausId, profile: &Profile) -> bool {
+    let same_subsystem = source.subsystem() == own.subsystem();
+    let ours = match level {
+        Level::Subsystem => same_subsystem,
+        Level::Node => same_subsystem && source.node() == own.node(),
+        Level::Component => false,
+    };
+    ours && !profile.identification(level).name.is_empty()
+}
+
+/// A list of services in order, without repetitions; whether it had to be cut.
+fn offers<'r>(services: impl Iterator<Item = (&'r Text, (u8, u8))>) -> (Vec<Offer>, bool) {
+    let (mut offers, mut octets, mut is_cut) = (Vec::new(), 0, false);
+    for (uri, (major, minor)) in services {
+        let urn = text(uri);
+        octets += urn.len();
+        is_cut = offers.len() >= MOST_SERVICES || octets > MOST_URN_OCTETS;
+        if is_cut {
+            break;
+        }
+        if !urn.is_empty() {
+            offers.push(Offer { urn, major, minor });
+        }
+    }
+    offers.sort_unstable();
+    offers.dedup();
+    (offers, is_cut)
 }
 
 fn text(text: &Text) -> String {

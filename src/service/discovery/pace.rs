@@ -55,27 +55,16 @@ impl Budget {
 
     /// Takes a token if there is one.
     pub(in crate::service) fn take(&mut self, now: Instant) -> bool {
-        self.take_above(0, now)
-    }
-
-    /// Takes a token if more than `reserve` are there, which stay for what is more urgent.
-    pub(super) fn take_above(&mut self, reserve: u32, now: Instant) -> bool {
         self.fill(now);
-        if self.tokens <= reserve {
-            return false;
-        }
-        self.tokens -= 1;
-        true
+        let is_any = self.tokens > 0;
+        self.tokens -= u32::from(is_any);
+        is_any
     }
 
-    /// When there are more tokens than `reserve`; `None` if there are.
-    pub(super) fn next_above(&self, reserve: u32) -> Option<Instant> {
-        let missing = (reserve + 1).saturating_sub(self.tokens);
-        if missing == 0 {
-            None
-        } else {
-            self.since.map(|since| since + self.refill * missing)
-        }
+    /// When there is a token again; `None` if there is one.
+    pub(super) fn next(&self) -> Option<Instant> {
+        let since = self.since.filter(|_| self.tokens == 0)?;
+        Some(since + self.refill)
     }
 
     fn fill(&mut self, now: Instant) {
@@ -127,19 +116,6 @@ mod tests {
             .filter(|tick| budget.take(start + Duration::from_millis(100) * *tick))
             .count();
         assert_eq!(taken, 3 + 9, "three at once, then one a second for 9.9 s");
-        assert_eq!(budget.next_above(0), Some(start + Duration::from_secs(10)));
-    }
-
-    #[test]
-    fn a_reserve_is_left_to_what_is_more_urgent() {
-        let start = Instant::now();
-        let mut budget = Budget::new(3, Duration::from_secs(1));
-        assert_eq!(budget.next_above(2), None);
-        assert!(budget.take_above(2, start));
-        assert!(!budget.take_above(2, start));
-        assert!(budget.take(start) && budget.take(start) && !budget.take(start));
-        let next = budget.next_above(2).unwrap();
-        assert_eq!(next, start + Duration::from_secs(3));
-        assert!(budget.take_above(2, next));
+        assert_eq!(budget.next(), Some(start + Duration::from_secs(10)));
     }
 }

@@ -87,12 +87,16 @@ pub struct Timing {
     pub probes: u32,
     /// Between two such questions.
     pub probe_interval: Duration,
-    /// The most components that are kept; more are ignored.
+    /// The longest that a peer may be silent before it is asked, however many there are.
+    pub longest_silence: Duration,
+    /// The most components of one network address that are kept. Of all addresses together it is
+    /// twice as many, of which the second half is for newcomers; more are ignored.
     pub max_components: usize,
 }
 
 impl Default for Timing {
-    /// Calls every 5 s, refreshes every 30 s, three probes a second apart, 1024 components.
+    /// Calls every 5 s, refreshes every 30 s, three probes a second apart after 30 s of silence at
+    /// most, 1024 components.
     fn default() -> Self {
         Self {
             call: Duration::from_secs(5),
@@ -101,6 +105,7 @@ impl Default for Timing {
             refresh_per_peer: Duration::from_secs(20),
             probes: 3,
             probe_interval: Duration::from_secs(1),
+            longest_silence: Duration::from_secs(30),
             max_components: 1024,
         }
     }
@@ -113,7 +118,13 @@ impl Timing {
 
     /// How long a peer may be silent before it is asked directly.
     pub(super) fn patience(&self, peers: usize) -> Duration {
-        self.call_interval(peers).mul_f64(1.5) + self.probe_interval / 2
+        let patience = self.call_interval(peers).mul_f64(1.5) + self.probe_interval / 2;
+        patience.min(self.longest_silence)
+    }
+
+    /// How long a silent peer is kept that could not be asked because there are so many.
+    pub(super) fn longest_search(&self) -> Duration {
+        self.probe_interval * self.probes + self.longest_silence
     }
 
     pub(super) fn refresh_interval(&self, peers: usize) -> Duration {

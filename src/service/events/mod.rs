@@ -11,6 +11,8 @@
 //!   the 256 that an octet names. Clients know an event by producer and number.
 //! * The first report follows the confirmation at once, of both types: the client knows where
 //!   things stand, and need not ask beside.
+//! * A query is answered once for all clients to whom its report is due at the same time: the answer
+//!   may not depend on who asks.
 //! * Creating what is there already (same client, type and query) changes its rate and confirms the
 //!   same number, so that a client that repeats itself, because an answer got lost or it was
 //!   restarted, does not multiply streams. At the same rate a periodic event keeps its beat, and
@@ -33,6 +35,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use super::share::Share;
 use super::{Outbox, code_of, read};
 use crate::address::JausId;
 use crate::codec::{Message, ServiceId, report_code};
@@ -64,19 +67,21 @@ const LONGEST_QUERY: usize = 1024;
 pub struct EventSettings {
     /// Subscriptions of one client; the numbers of events allow 256.
     pub per_client: usize,
-    /// Subscriptions of all clients.
+    /// Subscriptions of all clients behind one network address. Of all addresses together it is twice
+    /// as many, of which the second half is for newcomers.
     pub total: usize,
     /// The fastest rate of one subscription, in hertz. Faster ones are confirmed at this rate, and
     /// changes that follow one another faster are told together.
     pub fastest: f64,
-    /// The most reports a second that all periodic subscriptions may add up to.
+    /// The most reports a second that the periodic subscriptions of one network address may add up to;
+    /// those of all addresses together twice that.
     pub reports_per_second: f64,
     /// After how many minutes an event ends that its client does not renew; 0 for never.
     pub timeout: u8,
 }
 
 impl Default for EventSettings {
-    /// 256 for each client and 4096 in all, up to 250 Hz each and 20 000 reports a second.
+    /// 256 for each client and 4096 for each network address, up to 250 Hz each and 20 000 reports a second.
     fn default() -> Self {
         Self {
             per_client: 256,
@@ -131,7 +136,7 @@ impl Events {
     pub(super) fn new(settings: EventSettings) -> Self {
         Self {
             settings,
-            table: Table::default(),
+            table: Table::new(settings.total, settings.reports_per_second),
             commands: Commands::default(),
         }
     }
@@ -265,7 +270,8 @@ impl Events {
             .event_id
             .or_else(|| self.table.find(client, type_number(kind), &trial.query));
         let before = known.and_then(|id| self.table.get((client, id)));
-        if !self.has_room_for(client, kind, before) {
+        let share = Share::of(&trial.request);
+        if !self.has_room_for((client, share), kind, before) {
             let why = ResponseCode::CONNECTION_REFUSED;
             return reject(&trial.request, trial.request_id, why, out);
         }
@@ -282,6 +288,7 @@ impl Events {
             next: None,
             expires: self.expiry(now),
             request_id: trial.request_id,
+            share: before.map_or(share, |before| before.share),
         };
         let name = (client, id);
         confirm(&trial.request, trial.request_id, name, &subscription, out);
@@ -320,17 +327,15 @@ impl Events {
         }
     }
 
-    fn has_room_for(&self, client: JausId, kind: Kind, before: Option<&Subscription>) -> bool {
-        let rate = |kind: Kind| match kind {
-            Kind::Periodic { hertz, .. } => hertz,
-            Kind::EveryChange { .. } => 0.0,
-        };
-        let freed = before.map_or(0.0, |before| rate(before.kind));
-        let load = self.table.load() - freed + rate(kind);
-        let fits = before.is_some()
-            || (self.table.of(client).count() < self.settings.per_client
-                && self.table.len() < self.settings.total);
-        fits && load <= self.settings.reports_per_second
+    fn has_room_for(
+        &self,
+        (client, share): (JausId, Share),
+        kind: Kind,
+        before: Option<&Subscription>,
+    ) -> bool {
+        let before = before.map(|before| before.kind);
+        (before.is_some() || self.table.of(client).count() < self.settings.per_client)
+            && self.table.has_room(share, kind, before)
     }
 
     fn expiry(&self, now: Instant) -> Option<Instant> {

@@ -8,6 +8,7 @@ use bytes::Bytes;
 
 use crate::address::JausId;
 use crate::service::code_of;
+use crate::service::share::{Share, Shares};
 
 /// The client, and its number of the event.
 pub(super) type Name = (JausId, u8);
@@ -25,6 +26,21 @@ pub(super) enum Kind {
     },
 }
 
+impl Kind {
+    /// How many reports are sent in 1000 seconds for certain.
+    fn reports(self) -> usize {
+        match self {
+            Self::Periodic { hertz, .. } => in_1000_seconds(hertz),
+            Self::EveryChange { .. } => 0,
+        }
+    }
+}
+
+/// A rate in the smallest step that is counted.
+fn in_1000_seconds(hertz: f64) -> usize {
+    (hertz * 1000.0).round() as usize
+}
+
 #[derive(Debug)]
 pub(super) struct Subscription {
     pub(super) kind: Kind,
@@ -37,6 +53,8 @@ pub(super) struct Subscription {
     pub(super) expires: Option<Instant>,
     /// The number of the request that it was last set up by.
     pub(super) request_id: u8,
+    /// Which network address pays for it.
+    pub(super) share: Share,
 }
 
 /// A report that is due.
@@ -63,18 +81,39 @@ impl Subscription {
     }
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Table {
     subscriptions: BTreeMap<Name, Subscription>,
     due: BTreeSet<(Instant, Name)>,
     expiring: BTreeSet<(Instant, Name)>,
     /// Those that wait for a change of the answer to a query, by its code.
     by_query: BTreeSet<(u16, Name)>,
-    /// Reports a second of all periodic ones.
-    load: f64,
+    shares: Shares,
+    /// Reports of the periodic ones, in 1000 seconds.
+    rates: Shares,
 }
 
 impl Table {
+    /// A table with room for so many of one network address, with so many reports a second.
+    pub(super) fn new(most: usize, reports_per_second: f64) -> Self {
+        Self {
+            subscriptions: BTreeMap::new(),
+            due: BTreeSet::new(),
+            expiring: BTreeSet::new(),
+            by_query: BTreeSet::new(),
+            shares: Shares::new(most),
+            rates: Shares::new(in_1000_seconds(reports_per_second)),
+        }
+    }
+
+    /// Whether a network address may have one more of a kind, in place of `before` if there is one.
+    pub(super) fn has_room(&self, share: Share, kind: Kind, before: Option<Kind>) -> bool {
+        let freed = before.map_or(0, Kind::reports);
+        let more = kind.reports().saturating_sub(freed);
+        (before.is_some() || self.shares.has_room(share, 1))
+            && (more == 0 || self.rates.has_room(share, more))
+    }
+
     pub(super) fn len(&self) -> usize {
         self.subscriptions.len()
     }
@@ -82,10 +121,6 @@ impl Table {
     /// All of them.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Subscription> {
         self.subscriptions.values()
-    }
-
-    pub(super) const fn load(&self) -> f64 {
-        self.load
     }
 
     pub(super) fn get(&self, name: Name) -> Option<&Subscription> {
@@ -124,35 +159,28 @@ impl Table {
         if let Some(expires) = subscription.expires {
             self.expiring.insert((expires, name));
         }
-        match subscription.kind {
-            Kind::Periodic { hertz, .. } => self.load += hertz,
-            Kind::EveryChange { .. } => {
-                self.by_query
-                    .extend(code_of(&subscription.query).map(|code| (code, name)));
-            }
+        if matches!(subscription.kind, Kind::EveryChange { .. }) {
+            self.by_query
+                .extend(code_of(&subscription.query).map(|code| (code, name)));
         }
+        self.shares.take(subscription.share, 1);
+        self.rates
+            .take(subscription.share, subscription.kind.reports());
         self.subscriptions.insert(name, subscription);
     }
 
     pub(super) fn remove(&mut self, name: Name) -> Option<Subscription> {
         let gone = self.subscriptions.remove(&name)?;
+        self.shares.give_back(gone.share, 1);
+        self.rates.give_back(gone.share, gone.kind.reports());
         if let Some(next) = gone.next {
             self.due.remove(&(next, name));
         }
         if let Some(expires) = gone.expires {
             self.expiring.remove(&(expires, name));
         }
-        match gone.kind {
-            Kind::Periodic { hertz, .. } => self.load -= hertz,
-            Kind::EveryChange { .. } => {
-                if let Some(code) = code_of(&gone.query) {
-                    self.by_query.remove(&(code, name));
-                }
-            }
-        }
-        if self.subscriptions.is_empty() {
-            // What rounding has left.
-            self.load = 0.0;
+        if let Some(code) = code_of(&gone.query) {
+            self.by_query.remove(&(code, name));
         }
         Some(gone)
     }

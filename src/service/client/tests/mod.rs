@@ -1,6 +1,7 @@
 //! The client's half against a peer that does what the test says, in virtual time.
 
 mod control;
+mod streams;
 mod subscriptions;
 
 use std::time::{Duration, Instant};

@@ -42,7 +42,7 @@ fn subscribe(bench: &mut Bench, topic: &Topic) -> SubscriptionId {
 }
 
 /// Confirms a request as the event `event_id` at a rate.
-fn confirm(bench: &mut Bench, request_id: u8, event_id: u8, hz: f64) {
+pub(super) fn confirm(bench: &mut Bench, request_id: u8, event_id: u8, hz: f64) {
     let mut confirm = ConfirmEventRequest {
         request_id,
         event_id,
@@ -69,21 +69,21 @@ fn event_of(event_id: u8, sequence_number: u8, report_message: Bytes) -> Event {
     }
 }
 
-fn fire(bench: &mut Bench, event: u8, sequence: u8) {
+pub(super) fn fire(bench: &mut Bench, event: u8, sequence: u8) {
     let report = ReportStatus::default().encode().expect("a report");
     bench.hear(PEER, &event_of(event, sequence, report));
 }
 
 /// What was told since the last call, in short.
 #[derive(Debug, PartialEq)]
-enum Told {
+pub(super) enum Told {
     Up(Option<u32>),
     Report { lost: u8 },
     Down(Outage),
     Ended(SubscriptionEnd),
 }
 
-fn told(bench: &mut Bench) -> Vec<Told> {
+pub(super) fn told(bench: &mut Bench) -> Vec<Told> {
     let events = bench.events().into_iter();
     events
         .filter_map(|event| match event {
@@ -99,7 +99,7 @@ fn told(bench: &mut Bench) -> Vec<Told> {
 }
 
 /// A bench with a confirmed subscription, the event 7.
-fn up(when: When) -> (Bench, SubscriptionId) {
+pub(super) fn up(when: When) -> (Bench, SubscriptionId) {
     let mut bench = Bench::new();
     let id = subscribe(&mut bench, &status(when));
     let hz = match when {
@@ -201,56 +201,6 @@ fn a_rate_below_what_is_of_use_is_refused_and_cancelled() {
         [Told::Ended(SubscriptionEnd::TooSlow { .. })]
     ));
     assert_eq!(bench.sent::<CancelEvent>()[0].event_id, 7);
-}
-
-#[test]
-fn gaps_in_the_numbers_are_lost_reports_and_repetitions_are_no_reports() {
-    let (mut bench, _) = up(When::hz(100.0));
-    for sequence in [254, 254, 255, 2, 1, 3] {
-        fire(&mut bench, 7, sequence);
-    }
-    let report = |lost| Told::Report { lost };
-    assert_eq!(
-        told(&mut bench),
-        [report(0), report(0), report(2), report(0)]
-    );
-}
-
-#[test]
-fn a_periodic_event_that_stops_is_down_until_it_is_confirmed_again() {
-    let (mut bench, _) = up(When::hz(2.0));
-    fire(&mut bench, 7, 0);
-    bench.run_ms(1900);
-    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
-    bench.run_ms(200);
-    assert_eq!(told(&mut bench), [Told::Down(Outage::Silent)]);
-    bench.run_ms(60_000);
-    let attempts = bench.sent::<CreateEvent>();
-    assert!((10..20).contains(&attempts.len()), "{}", attempts.len());
-    // It comes back with another number.
-    confirm(&mut bench, attempts[0].request_id, 1, 2.0);
-    fire(&mut bench, 1, 0);
-    assert_eq!(
-        told(&mut bench),
-        [Told::Up(Some(2)), Told::Report { lost: 0 }]
-    );
-}
-
-#[test]
-fn a_stream_that_goes_on_by_itself_is_up_again() {
-    let (mut bench, _) = up(When::hz(10.0));
-    fire(&mut bench, 7, 0);
-    bench.run_ms(600);
-    fire(&mut bench, 7, 6);
-    assert_eq!(
-        told(&mut bench),
-        [
-            Told::Report { lost: 0 },
-            Told::Down(Outage::Silent),
-            Told::Up(Some(10)),
-            Told::Report { lost: 5 }
-        ]
-    );
 }
 
 /// Confirms what is asked for during a minute; says how often that was.

@@ -1,14 +1,19 @@
 //! What is refused, and what is limited.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use bytes::Bytes;
 
-use super::{CLIENT, OTHER, Rig, SECOND, answer, events, periodic};
+use super::{CLIENT, COUNTER, OTHER, Rig, SECOND, answer, events, periodic};
 use crate::address::JausId;
 use crate::codec::Message;
+use crate::endpoint::{LinkId, Path};
 use crate::messages::core::create_event::EventType;
 use crate::messages::core::reject_event_request::ResponseCode;
 use crate::messages::core::*;
-use crate::service::EventSettings;
+use crate::service::stack_rig::StackRig;
+use crate::service::{EventSettings, Handlers};
 
 /// JAUS++ reads presence vector, request, code and, with the vector's first bit, 80 octets of text.
 #[test]
@@ -218,4 +223,59 @@ fn events_that_nobody_renews_expire_if_so_wanted() {
         (1, 1),
         "its end is told"
     );
+}
+
+/// A network address.
+fn at(host: u8) -> Option<Path> {
+    let peer = std::net::SocketAddr::from(([10, 0, 0, host], 3794)).into();
+    let link = LinkId(0);
+    Some(Path { link, peer })
+}
+
+#[test]
+fn whatever_one_address_takes_under_many_ids_another_can_subscribe() {
+    for hertz in [0.1, 200.0] {
+        let mut rig = Rig::new();
+        let (mut granted, mut refused) = (0, 0);
+        for forged in 0..=u8::MAX {
+            for request in 0..20 {
+                let element_uid = request.into();
+                let create = periodic(request, hertz, &QueryElement { element_uid });
+                let client = JausId::new(42, 1 + forged / 128, 1 + forged % 128);
+                let said = rig.hear_on(at(66), client, &create);
+                let said = said.into_iter().find(|(to, _)| *to == client).unwrap();
+                granted += usize::from(ConfirmEventRequest::decode(&said.1).is_ok());
+                refused += usize::from(RejectEventRequest::decode(&said.1).is_ok());
+            }
+        }
+        assert!(granted <= 4096 && refused > 0, "{granted} granted");
+        let honest = JausId::new(43, 1, 1);
+        let said = rig.hear_on(at(9), honest, &periodic(1, hertz, &QueryElement::default()));
+        let _: ConfirmEventRequest = answer(&said);
+    }
+}
+
+#[test]
+fn a_query_is_answered_once_for_all_clients_that_are_told_together() {
+    let asked = Arc::new(AtomicUsize::new(0));
+    let count = asked.clone();
+    let counter = Handlers::new(COUNTER).answer(move |_: QueryElement| {
+        let element_count = count.fetch_add(1, Ordering::Relaxed) as u16;
+        ReportElementCount { element_count }
+    });
+    let mut rig = StackRig::new(vec![Box::new(counter)], |stack| stack);
+    for client in 1..=100 {
+        let create = CreateEvent {
+            event_type: EventType(1),
+            ..periodic(1, 0.0, &QueryElement::default())
+        };
+        rig.hear(JausId::new(42, 1, client), &create);
+    }
+    rig.pass(SECOND);
+    let before = asked.load(Ordering::Relaxed);
+    let now = rig.now;
+    rig.stack.announce(now, QueryElement::CODE);
+    let told = rig.said();
+    assert_eq!(told.len(), 100);
+    assert_eq!(asked.load(Ordering::Relaxed) - before, 1);
 }

@@ -1,0 +1,86 @@
+//! The numbers and the silence of streams of reports.
+
+use super::subscriptions::{Told, confirm, fire, told, up};
+use crate::messages::core::CreateEvent;
+use crate::service::{Outage, When};
+
+#[test]
+fn gaps_in_the_numbers_are_lost_reports_and_repetitions_are_no_reports() {
+    let (mut bench, _) = up(When::hz(100.0));
+    for sequence in [254, 254, 255, 2, 1, 3] {
+        fire(&mut bench, 7, sequence);
+    }
+    let report = |lost| Told::Report { lost };
+    assert_eq!(
+        told(&mut bench),
+        [report(0), report(0), report(2), report(0)]
+    );
+}
+
+#[test]
+fn a_periodic_event_that_stops_is_down_until_it_is_confirmed_again() {
+    let (mut bench, _) = up(When::hz(2.0));
+    fire(&mut bench, 7, 0);
+    bench.run_ms(1900);
+    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
+    bench.run_ms(200);
+    assert_eq!(told(&mut bench), [Told::Down(Outage::Silent)]);
+    bench.run_ms(60_000);
+    let attempts = bench.sent::<CreateEvent>();
+    assert!((10..20).contains(&attempts.len()), "{}", attempts.len());
+    // It comes back with another number.
+    confirm(&mut bench, attempts[0].request_id, 1, 2.0);
+    fire(&mut bench, 1, 0);
+    assert_eq!(
+        told(&mut bench),
+        [Told::Up(Some(2)), Told::Report { lost: 0 }]
+    );
+}
+
+#[test]
+fn a_stream_that_goes_on_by_itself_is_up_again() {
+    let (mut bench, _) = up(When::hz(10.0));
+    fire(&mut bench, 7, 0);
+    bench.run_ms(2100);
+    fire(&mut bench, 7, 6);
+    assert_eq!(
+        told(&mut bench),
+        [
+            Told::Report { lost: 0 },
+            Told::Down(Outage::Silent),
+            Told::Up(Some(10)),
+            Told::Report { lost: 5 }
+        ]
+    );
+}
+
+/// JAUS++ sends the first report at once, and begins with the periods some time later.
+#[test]
+fn a_stream_that_begins_a_second_after_its_first_report_is_not_down() {
+    let (mut bench, _) = up(When::hz(25.0));
+    fire(&mut bench, 7, 0);
+    bench.run_ms(1000);
+    assert_eq!(told(&mut bench), [Told::Report { lost: 0 }]);
+    for sequence in 1..=50 {
+        fire(&mut bench, 7, sequence);
+        bench.run_ms(40);
+    }
+    told(&mut bench);
+    bench.run_ms(500);
+    assert_eq!(told(&mut bench), [Told::Down(Outage::Silent)]);
+}
+
+#[test]
+fn numbers_that_the_rate_cannot_explain_are_no_lost_reports() {
+    let (mut bench, _) = up(When::hz(10.0));
+    fire(&mut bench, 7, 0);
+    bench.run_ms(100);
+    fire(&mut bench, 7, 90);
+    bench.run_ms(100);
+    fire(&mut bench, 7, 91);
+    bench.run_ms(300);
+    fire(&mut bench, 7, 94);
+    let report = |lost| Told::Report { lost };
+    let reports = [report(0), report(0), report(0), report(2)];
+    assert_eq!(told(&mut bench), reports);
+}

@@ -1,0 +1,251 @@
+//! What the components of one node know together of the others: one directory, and one search that
+//! keeps it.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::pace::{Budget, Jitter};
+use super::peers::Peers;
+use super::questions::{Question, Questions, What};
+use super::{Change, Discovery, Loss, Profile, Scope, Timing};
+use crate::address::JausId;
+use crate::service::share::Share;
+use crate::service::{Directory, Level};
+
+/// The directory that the components of one node share, and the search behind it.
+///
+/// Each component [joins](Discovery::join) it. One of them, the one with the lowest id, calls and asks
+/// for all; what any of them hears is known to all.
+#[derive(Debug)]
+pub struct NodeDirectory(Mutex<Known>);
+
+/// What discovery has left out because of its limits.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Refused {
+    /// Components, and questions about components, for which the share of their network address had
+    /// no room.
+    pub no_room: u64,
+    /// Messages that were longer than any of their kind has to be.
+    pub too_long: u64,
+    /// Lists of services that were cut, or left out, because they were too long.
+    pub cut: u64,
+    /// Names and lists of services that changed too often.
+    pub too_often: u64,
+}
+
+#[derive(Debug)]
+pub(super) struct Known {
+    pub(super) scope: Scope,
+    pub(super) timing: Timing,
+    pub(super) jitter: Jitter,
+    pub(super) directory: Arc<Directory>,
+    pub(super) peers: Peers,
+    pub(super) questions: Questions,
+    /// For each subsystem, the component that is asked for its configuration.
+    pub(super) reporters: BTreeMap<u16, JausId>,
+    /// For questions that were never asked, and for those that were, probes among them.
+    pub(super) first: Budget,
+    pub(super) again: Budget,
+    pub(super) calls: u32,
+    pub(super) next_call: Option<Instant>,
+    /// The components of this node, with the number of the change that each reads next.
+    members: BTreeMap<JausId, u64>,
+    log: VecDeque<Change>,
+    /// The number of the first change in the log.
+    log_start: u64,
+    /// The length at which the log is looked through for what everybody has read.
+    log_limit: usize,
+    refused: Refused,
+    next_warning: Option<Instant>,
+}
+
+impl NodeDirectory {
+    /// An empty directory for the components of one node. `seed` is for the jitter of its times.
+    #[must_use]
+    pub fn new(scope: Scope, timing: Timing, seed: u64) -> Self {
+        Self(Mutex::new(Known::new(scope, timing, seed)))
+    }
+
+    /// Everybody who is known, the components of the node included.
+    #[must_use]
+    pub fn directory(&self) -> Arc<Directory> {
+        self.lock().directory.clone()
+    }
+
+    /// How many changes there were: while this stays the same there is nothing for the members to read.
+    #[must_use]
+    pub fn change_count(&self) -> u64 {
+        let known = self.lock();
+        known.log_start + known.log.len() as u64
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Known> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Known {
+    /// Questions that were never asked: a burst of so many, for a network that is found at once, then
+    /// one in this time. JAUS++ takes some 900 messages a second.
+    const FIRST_BURST: u32 = 96;
+    const FIRST_REFILL: Duration = Duration::from_millis(5);
+    /// Questions that were asked before, and probes.
+    const AGAIN_BURST: u32 = 64;
+    const AGAIN_REFILL: Duration = Duration::from_millis(31);
+    /// Changes that are kept for components that have not read them.
+    const LONGEST_LOG: usize = 8192;
+    const SHORTEST_LOG: usize = 64;
+    /// Between two warnings about what is left out.
+    const WARNING_INTERVAL: Duration = Duration::from_secs(30);
+
+    fn new(scope: Scope, timing: Timing, seed: u64) -> Self {
+        Self {
+            scope,
+            timing,
+            jitter: Jitter::new(seed),
+            directory: Arc::default(),
+            peers: Peers::new(timing.max_components),
+            questions: Questions::new(timing.max_components.saturating_mul(2)),
+            reporters: BTreeMap::new(),
+            first: Budget::new(Self::FIRST_BURST, Self::FIRST_REFILL),
+            again: Budget::new(Self::AGAIN_BURST, Self::AGAIN_REFILL),
+            calls: 0,
+            next_call: None,
+            members: BTreeMap::new(),
+            log: VecDeque::new(),
+            log_start: 0,
+            log_limit: Self::SHORTEST_LOG,
+            refused: Refused::default(),
+            next_warning: None,
+        }
+    }
+
+    pub(super) fn refused(&self) -> Refused {
+        self.refused
+    }
+
+    /// The tree, for changes; copied first if an application holds it.
+    pub(super) fn tree(&mut self) -> &mut Directory {
+        Arc::make_mut(&mut self.directory)
+    }
+
+    /// Takes in a component of this node. What it belongs to keeps the name that it has.
+    pub(super) fn join(&mut self, own: JausId, profile: &Profile) {
+        self.questions.forget(own);
+        self.peers.remove(own);
+        let is_first = self.directory.subsystem(own.subsystem()).is_none();
+        let tree = self.tree();
+        tree.remove(own);
+        tree.insert(own);
+        for level in [Level::Subsystem, Level::Node, Level::Component] {
+            let known = tree.identification(level, own);
+            if known.is_none_or(|known| known.name.is_empty()) {
+                tree.identify(level, own, profile.identification(level));
+            }
+        }
+        if is_first {
+            self.tell(Change::SubsystemFound(own.subsystem()));
+        }
+        self.tell(Change::Found(own));
+        self.tell(Change::Identified(Level::Component, own));
+        self.members.insert(own, 0);
+        self.skip(own);
+    }
+
+    /// A component of this node is gone.
+    pub(super) fn leave(&mut self, own: JausId) {
+        self.members.remove(&own);
+        self.tree().remove(own);
+        self.tell(Change::Lost(own, Loss::Unlisted));
+    }
+
+    /// Whether a component calls and asks for all.
+    pub(super) fn is_leader(&self, id: JausId) -> bool {
+        self.members.keys().next() == Some(&id)
+    }
+
+    /// Whether `id` is somebody to know and not of this node.
+    pub(super) fn covers(&self, id: JausId) -> bool {
+        let mut members = self.members.keys();
+        let in_scope = match self.scope {
+            Scope::System => true,
+            Scope::Subsystem => members.next().map(|own| own.subsystem()) == Some(id.subsystem()),
+            Scope::Nobody => false,
+        };
+        in_scope && id.is_unicast() && !self.members.contains_key(&id)
+    }
+
+    /// Wants to know something, as far as the share of the component's address goes.
+    pub(super) fn wonder(&mut self, now: Instant, about: JausId, what: What, share: Share) {
+        let is_wanted = self.scope != Scope::Nobody;
+        if is_wanted && !self.questions.wonder(now, Question { about, what }, share) {
+            self.refuse(now, |refused| &mut refused.no_room);
+        }
+    }
+
+    /// Leaves something out: it is counted, and now and then logged.
+    pub(super) fn refuse(&mut self, now: Instant, count: impl FnOnce(&mut Refused) -> &mut u64) {
+        *count(&mut self.refused) += 1;
+        if self.next_warning.is_none_or(|due| due <= now) {
+            self.next_warning = Some(now + Self::WARNING_INTERVAL);
+            let Refused {
+                no_room,
+                too_long,
+                cut,
+                too_often,
+            } = self.refused;
+            tracing::warn!(
+                no_room,
+                too_long,
+                cut,
+                too_often,
+                "discovery leaves out what a peer says: it exceeds the limits"
+            );
+        }
+    }
+
+    /// Notes a change for all components of this node.
+    pub(super) fn tell(&mut self, change: Change) {
+        if self.log.len() >= self.log_limit {
+            self.trim();
+        }
+        self.log.push_back(change);
+    }
+
+    /// The next change that a component has not read.
+    pub(super) fn poll_change(&mut self, own: JausId) -> Option<Change> {
+        let next = self.members.get_mut(&own)?;
+        *next = (*next).max(self.log_start);
+        let place = usize::try_from(*next - self.log_start).ok()?;
+        let change = *self.log.get(place)?;
+        *next += 1;
+        Some(change)
+    }
+
+    /// Takes all changes so far for read.
+    pub(super) fn skip(&mut self, own: JausId) {
+        let end = self.log_start + self.log.len() as u64;
+        if let Some(next) = self.members.get_mut(&own) {
+            *next = end;
+        }
+    }
+
+    /// Drops the changes that everybody has read, and the oldest if there are too many.
+    fn trim(&mut self) {
+        let end = self.log_start + self.log.len() as u64;
+        let oldest = self.members.values().copied().min().unwrap_or(end);
+        while self.log_start < oldest || self.log.len() >= Self::LONGEST_LOG {
+            self.log.pop_front();
+            self.log_start += 1;
+        }
+        self.log_limit = (2 * self.log.len()).clamp(Self::SHORTEST_LOG, Self::LONGEST_LOG);
+        self.log.shrink_to(self.log_limit);
+    }
+}
+
+impl Drop for Discovery {
+    fn drop(&mut self) {
+        self.known.lock().leave(self.own);
+    }
+}
