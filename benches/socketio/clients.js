@@ -23,7 +23,7 @@ async function attach({ port, numbers, partners }) {
   await Promise.all(clients.map(({ socket }) => new Promise((done) => socket.on("connect", done))));
 }
 
-function measure({ rate, window, seconds, octets }) {
+function measure({ rate, window, burst, seconds, octets }) {
   const message = "x".repeat(octets);
   const times = [];
   const tally = { all: 0, sent: 0, refused: 0 };
@@ -57,7 +57,7 @@ function measure({ rate, window, seconds, octets }) {
       const now = performance.now();
       if (now < end) {
         const due = window ? 0 : Math.floor(((now - begin) / 1000) * rate);
-        for (; done < due; done++) send(clients[done % clients.length], now);
+        for (; done < due; done++) send(clients[Math.floor(done / burst) % clients.length], now);
         return setTimeout(tick, TICK);
       }
       const isDone = clients.every(({ waiting }) => waiting === 0);

@@ -11,15 +11,20 @@ const { values: settings } = parseArgs({
     components: { type: "string", default: "1000" },
     processes: { type: "string", default: "4" },
     rates: { type: "string", default: "100,1000,3000,9000,30000,100000,max" },
+    burst: { type: "string", default: "1" },
     window: { type: "string", default: "2" },
     seconds: { type: "string", default: "5" },
     size: { type: "string", default: "170" },
     json: { type: "string" },
   },
 });
-const [components, processes, window, octets] = ["components", "processes", "window", "size"].map(
-  (name) => Number.parseInt(settings[name], 10),
-);
+const [components, processes, window, burst, octets] = [
+  "components",
+  "processes",
+  "window",
+  "burst",
+  "size",
+].map((name) => Number.parseInt(settings[name], 10));
 const seconds = Number.parseFloat(settings.seconds);
 
 // A child that ends before it is asked to is a failure.
@@ -75,13 +80,13 @@ async function main() {
       return ask(client, { order: "attach", port, numbers, partners });
     }),
   );
-  console.log(`Socket.IO: ${components} clients in ${processes} processes, one relay; ${octets} octets, ${seconds} s for each row`);
+  console.log(`Socket.IO: ${components} clients in ${processes} processes, one relay; ${octets} octets, bursts of ${burst}, ${seconds} s for each row`);
   console.log("| wanted/s | acknowledged/s | sent | lost | refused | mean ms | p50 ms | p99 ms | p99.9 ms | max ms | CPU µs |");
   console.log("|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|");
   const rows = [];
   for (const rate of settings.rates.split(",")) {
     const wanted = rate === "max" ? null : Number.parseInt(rate, 10);
-    const step = { order: "measure", seconds, octets };
+    const step = { order: "measure", seconds, octets, burst };
     const before = used(await askAll([relay, ...clients], "usage"));
     const answers = await Promise.all(
       clients.map((client, first) => {
@@ -96,7 +101,7 @@ async function main() {
     console.log(`| ${[rate, result.per_second.toFixed(0), result.sent, result.lost, result.refused, ...times, result.processor.toFixed(1)].join(" | ")} |`);
   }
   if (settings.json) {
-    const report = { name: "Socket.IO", components, processes, octets, window, seconds, rows };
+    const report = { name: "Socket.IO", components, processes, octets, window, burst, seconds, rows };
     writeFileSync(settings.json, `${JSON.stringify(report, null, 2)}\n`);
   }
   process.exit(0);

@@ -122,7 +122,8 @@ impl Components {
                     let due = (elapsed.as_secs_f64() * rate) as u64;
                     let now = self.origin.elapsed();
                     for message in done..due {
-                        self.send((message % self.members.len() as u64) as usize, now);
+                        let turn = message / u64::from(run.burst);
+                        self.send((turn % self.members.len() as u64) as usize, now);
                     }
                     done = due;
                 }

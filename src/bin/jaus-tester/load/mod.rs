@@ -76,6 +76,10 @@ pub(crate) struct LoadCommand {
     #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u32).range(1..=256))]
     window: u32,
 
+    /// In a row with a rate: how many messages a component sends at once
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=256))]
+    burst: u32,
+
     /// How long each row is measured, at most an hour
     #[arg(long, default_value = "5", value_parser = row_time)]
     seconds: Duration,
@@ -147,6 +151,7 @@ impl LoadCommand {
             processes: self.processes,
             octets: self.size,
             window: self.window,
+            burst: self.burst,
             seconds: self.seconds.as_secs_f64(),
             rows,
         };
@@ -194,7 +199,7 @@ impl LoadCommand {
             None => Fleet::start(self),
         }?;
         output.line(format_args!(
-            "{} components in {} processes, {}; {} octets, {} s for each row",
+            "{} components in {} processes, {}; {} octets, bursts of {}, {} s for each row",
             self.components,
             self.processes,
             match &self.attach {
@@ -202,6 +207,7 @@ impl LoadCommand {
                 None => format!("on {} nodes", self.nodes),
             },
             self.size,
+            self.burst,
             self.seconds.as_secs_f64()
         ))?;
         output.line(Row::HEAD)?;
@@ -210,6 +216,7 @@ impl LoadCommand {
             let run = |pace| Run {
                 number,
                 pace,
+                burst: self.burst,
                 time: self.seconds,
                 size: self.size.into(),
                 acknowledged_by: self.acknowledged_by,

@@ -53,6 +53,8 @@ pub(super) struct Run {
     pub(super) number: u32,
     /// Messages per second of this process.
     pub(super) pace: Pace,
+    /// How many messages a component sends at once, where the pace is a rate.
+    pub(super) burst: u32,
     /// How long messages count. Those of the warm-up before that do not.
     pub(super) time: Duration,
     /// Octets of a message.

@@ -22,6 +22,7 @@ pub(super) struct Report {
     /// Of a message.
     pub(super) octets: u16,
     pub(super) window: u32,
+    pub(super) burst: u32,
     /// For each row.
     pub(super) seconds: f64,
     pub(super) rows: Vec<Row>,
@@ -156,6 +157,7 @@ mod tests {
             processes: 1,
             octets: 170,
             window: 2,
+            burst: 1,
             seconds: 2.0,
             rows: [Rate::PerSecond(50), Rate::Max]
                 .map(|rate| Row::new(rate, &tally, time, None))
