@@ -3,7 +3,9 @@
 #![cfg(all(feature = "cli", target_os = "linux"))]
 #![expect(
     clippy::disallowed_methods,
-    reason = "the program runs in real time, and its end is waited for"
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test of a program, which runs in real time"
 )]
 
 use std::fs;

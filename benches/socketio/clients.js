@@ -33,7 +33,6 @@ function measure({ rate, window, burst, seconds, octets }) {
 
   const send = (client, now) => {
     const counts = now >= begin + WARM_UP;
-    tally.all += 1;
     if (client.waiting >= QUEUE) {
       tally.refused += counts;
       return;
@@ -43,6 +42,7 @@ function measure({ rate, window, burst, seconds, octets }) {
     client.socket.emit("load", client.partner, message, () => {
       const now_ = performance.now();
       client.waiting -= 1;
+      tally.all += 1;
       if (counts && !isOver) times.push(now_ - now);
       if (window && now_ < end) send(client, now_);
     });

@@ -1,6 +1,7 @@
 //! What one event costs its sender with one subscriber and with a hundred, each on a node of its own.
 
 use std::net::SocketAddr;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
@@ -130,12 +131,16 @@ pub(crate) async fn sensor(at: SocketAddr, subscribers: Vec<SocketAddr>) {
         settings = settings.peer(peer.parse().expect("a peer"));
     }
     let node = Node::start(settings).expect("a node");
-    let mut report = ReportVelocityState::default();
-    report
-        .set_velocity_x_m_per_s(1.5)
-        .expect("within its range");
-    let sensor = Handlers::new(velocity_state_sensor::LATEST)
-        .answer(move |_: QueryVelocityState| report.clone());
+    let count = AtomicU32::new(0);
+    // Every answer differs, or there would be no event.
+    let answer = move |_: QueryVelocityState| {
+        let speed = count.fetch_add(1, Ordering::Relaxed) % 100;
+        let mut report = ReportVelocityState::default();
+        let set = report.set_velocity_x_m_per_s(f64::from(speed) / 10.0);
+        set.expect("within its range");
+        report
+    };
+    let sensor = Handlers::new(velocity_state_sensor::LATEST).answer(answer);
     let component = Component::builder(Kind::Vehicle, "Bench")
         .offer(sensor)
         .attach(&node, SENSOR.component())

@@ -1,4 +1,5 @@
 //! The child's side of the load: a node, or a number of components that send and measure.
+#![expect(clippy::disallowed_methods, reason = "a program owns its tasks")]
 
 use std::net::SocketAddr;
 use std::sync::Arc;

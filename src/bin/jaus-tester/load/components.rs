@@ -173,6 +173,7 @@ impl Components {
         let Some(run) = step.run.filter(|run| run.number == number) else {
             return;
         };
+        step.tally.all += 1;
         if step.counts(sent) {
             step.tally.latencies.add(now.saturating_sub(sent));
         }
@@ -224,7 +225,6 @@ impl Components {
         };
         let mut step = self.step();
         let counts = u64::from(step.counts(now));
-        step.tally.all += 1;
         if result {
             step.tally.sent += counts;
             step.windows[member].waiting += 1;

@@ -1,4 +1,9 @@
 //! The processes of a load: nodes, and components attached to them.
+#![expect(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "finds free ports, and waits for processes"
+)]
 
 use std::net::{SocketAddr, UdpSocket};
 use std::path::{Path, PathBuf};
@@ -15,6 +20,9 @@ use super::{LoadCommand, Rate, progress};
 
 /// How long a process may take beyond what it was asked to wait.
 const PATIENCE: Duration = Duration::from_secs(30);
+
+/// How long a step may wait for the backlog of an earlier one.
+const SETTLE: Duration = Duration::from_secs(10);
 
 /// All processes of a load. Dropped in this order: components leave before their nodes end.
 pub(super) struct Fleet {
@@ -105,6 +113,7 @@ impl Fleet {
             Rate::PerSecond(rate) => format!("measuring {rate} messages/s"),
             Rate::Max => "measuring as many messages/s as possible".to_owned(),
         });
+        self.settle();
         let before = self.processor_time();
         let processes = self.clients.len();
         let mut time = Duration::ZERO;
@@ -128,6 +137,23 @@ impl Fleet {
         let used = before.zip(self.processor_time());
         let used = used.map(|(before, after)| after.saturating_sub(before));
         Ok(Row::new(rate, &tally, time, used))
+    }
+
+    /// Waits until the processes have finished with what an earlier step left, if they are busy.
+    fn settle(&self) {
+        let pause = Duration::from_millis(100);
+        let mut before = self.processor_time();
+        for _ in 0..SETTLE.as_millis() / pause.as_millis() {
+            std::thread::sleep(pause);
+            let now = self.processor_time();
+            let used = before
+                .zip(now)
+                .map(|(before, now)| now.saturating_sub(before));
+            if used.is_none_or(|used| used < pause / 5) {
+                return;
+            }
+            before = now;
+        }
     }
 
     /// Of all processes together.

@@ -45,8 +45,8 @@ const MOST_IN_PROCESS: u16 = 1000;
     jaus-tester load --beside socketio.json --svg both.svg\n\n\
     Columns: messages per second that were wanted and that were acknowledged; messages sent, lost \
     (sent and not acknowledged within 2 s) and refused (by the sender's connection); round trips in \
-    milliseconds; processor time of all processes for each message, with its acknowledgement, in \
-    microseconds (Linux). Each row has 0.5 s of warm-up that does not count.\n\n\
+    milliseconds; processor time of all processes for each acknowledged message in microseconds \
+    (Linux). Each row has 0.5 s of warm-up that does not count.\n\n\
     Messages leave at ticks of one millisecond. The round trip begins when the tick is handled, so \
     that messages which leave together wait for each other.")]
 pub(crate) struct LoadCommand {

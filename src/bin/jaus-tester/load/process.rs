@@ -1,6 +1,7 @@
 //! Child processes of the load: this program again, which takes orders on its standard input and
 //! answers each on its standard output, as lines of JSON. A child ends when its input does, also
 //! when the parent was killed.
+#![expect(clippy::disallowed_methods, reason = "waits for processes")]
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::SocketAddr;
@@ -93,7 +94,7 @@ pub(super) enum Answer {
 /// What the components of one or several processes measured in one step.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Tally {
-    /// Messages sent, those of the warm-up included.
+    /// Messages acknowledged, those of the warm-up included.
     pub(super) all: u64,
     /// Messages sent that count.
     pub(super) sent: u64,

@@ -43,8 +43,8 @@ pub(super) struct Row {
     pub(super) p99: f64,
     pub(super) p999: f64,
     pub(super) max: f64,
-    /// Microseconds of processor time for each message, of all processes; `None` where the
-    /// operating system does not say.
+    /// Microseconds of processor time for each acknowledged message, of all processes; `None` where
+    /// the operating system does not say.
     pub(super) processor: Option<f64>,
 }
 
@@ -127,13 +127,13 @@ impl Report {
     }
 
     fn lines(&self) -> [Line; 2] {
-        let line = |what: &str, time: fn(&Row) -> f64| Line {
-            name: format!("{} {what}", self.name),
-            points: self
-                .rows
-                .iter()
-                .map(|row| (row.per_second, time(row)))
-                .collect(),
+        let line = |what: &str, time: fn(&Row) -> f64| {
+            let points = self.rows.iter().map(|row| (row.per_second, time(row)));
+            let mut points: Vec<_> = points.collect();
+            // A step beyond what is possible may reach less than the one before it.
+            points.sort_by(|one, other| one.0.total_cmp(&other.0));
+            let name = format!("{} {what}", self.name);
+            Line { name, points }
         };
         [line("p99", |row| row.p99), line("mean", |row| row.mean)]
     }
