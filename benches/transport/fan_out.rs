@@ -90,7 +90,7 @@ async fn cost(subscribers: usize, time: Duration, placement: Placement) -> f64 {
             events += u32::from(Event::decode(&message.payload).is_ok());
         }
     }
-    assert!(events > 0, "no event came");
+    assert!(events > 0, "no event came to {subscribers} subscribers");
     let used = process.processor_time() - before;
     used.as_secs_f64() * 1e6 / f64::from(events)
 }
@@ -132,9 +132,10 @@ pub(crate) async fn sensor(at: SocketAddr, subscribers: Vec<SocketAddr>) {
     }
     let node = Node::start(settings).expect("a node");
     let count = AtomicU32::new(0);
-    // Every answer differs, or there would be no event.
+    // Each subscriber's next answer differs, or there would be no event: no number of subscribers is
+    // a multiple of 97.
     let answer = move |_: QueryVelocityState| {
-        let speed = count.fetch_add(1, Ordering::Relaxed) % 100;
+        let speed = count.fetch_add(1, Ordering::Relaxed) % 97;
         let mut report = ReportVelocityState::default();
         let set = report.set_velocity_x_m_per_s(f64::from(speed) / 10.0);
         set.expect("within its range");

@@ -91,11 +91,11 @@ fn main() {
     if wanted("loss") {
         loss::measure(effort);
     }
-    if wanted("fan-out") {
-        fan_out::measure(effort);
-    }
     if wanted("idle") {
         idle::measure(effort);
+    }
+    if wanted("fan-out") {
+        fan_out::measure(effort);
     }
     report::machine();
     // Left behind if a measurement has failed.
