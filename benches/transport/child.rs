@@ -3,7 +3,9 @@
 use std::env;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
+use crate::placement;
 use crate::roles::Role;
 use crate::run;
 
@@ -15,11 +17,13 @@ pub(crate) struct Process {
 }
 
 impl Process {
-    /// Starts a child and waits until it is ready.
-    pub(crate) fn start(role: &Role) -> Self {
+    /// Starts a child on these processors and waits until it is ready.
+    pub(crate) fn start(role: &Role, processors: &[usize]) -> Self {
+        let processors: Vec<_> = processors.iter().map(usize::to_string).collect();
         let this = env::current_exe().expect("the path of this program");
         let mut child = Command::new(this)
             .env(Role::VARIABLE, role.to_words())
+            .env(placement::VARIABLE, processors.join(","))
             .env(run::VARIABLE, run::number().to_string())
             .stdout(Stdio::piped())
             .spawn()
@@ -38,6 +42,14 @@ impl Process {
 
     pub(crate) fn id(&self) -> u32 {
         self.child.id()
+    }
+
+    /// Processor time that it has used.
+    pub(crate) fn processor_time(&self) -> Duration {
+        let stat = std::fs::read_to_string(format!("/proc/{}/schedstat", self.id()));
+        let stat = stat.expect("Linux");
+        let nanoseconds = stat.split(' ').next().and_then(|word| word.parse().ok());
+        Duration::from_nanos(nanoseconds.expect("nanoseconds"))
     }
 }
 

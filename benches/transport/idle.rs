@@ -11,6 +11,7 @@ use jaus::node::Node;
 use crate::Effort;
 use crate::child::Process;
 use crate::place;
+use crate::placement::{Placement, Side};
 use crate::report;
 use crate::roles::Role;
 
@@ -34,12 +35,12 @@ pub(crate) async fn stay(components: usize) {
 
 pub(crate) fn measure(effort: Effort) {
     let watch = |components| {
-        let process = Process::start(&Role::Idle(components));
+        let process = Process::start(&Role::Idle(components), &Placement::Free.of(Side::Theirs));
         // Discovery has more to say in the beginning.
         sleep(Duration::from_secs(3));
-        let (before, time) = (processor_time(process.id()), effort.idle_seconds);
+        let (before, time) = (process.processor_time().as_secs_f64(), effort.idle_seconds);
         sleep(Duration::from_secs_f64(time));
-        let share = 100.0 * (processor_time(process.id()) - before) / time;
+        let share = 100.0 * (process.processor_time().as_secs_f64() - before) / time;
         (share, resident(process.id()))
     };
     report::head(
@@ -65,17 +66,6 @@ pub(crate) fn measure(effort: Effort) {
         ]);
         fewer = Some((components, kib));
     }
-}
-
-/// Seconds of processor time that a process has had.
-fn processor_time(process: u32) -> f64 {
-    let stat = fs::read_to_string(format!("/proc/{process}/schedstat")).expect("Linux");
-    let nanoseconds: f64 = stat
-        .split(' ')
-        .next()
-        .and_then(|word| word.parse().ok())
-        .expect("nanoseconds");
-    nanoseconds / 1e9
 }
 
 /// Resident memory of a process, in KiB; the pages of the program itself are part of it.

@@ -5,10 +5,12 @@
 //! cargo bench --bench transport -- round --quick    what has "round" in its name, few repetitions
 //! ```
 //!
-//! Every figure stands next to a baseline of the same run (raw UDP, a raw Unix socket, a copy in
-//! memory), because a machine that others share is never twice the same: read the ratios. The
-//! program starts itself as child processes for the other components and nodes, all on loopback,
-//! and prints Markdown. What was measured, where and when, is kept in `docs/performance.md`.
+//! Every figure stands next to a baseline of the same run (raw UDP, a raw Unix stream, bare relays
+//! of as many hops, a copy in memory), because a machine that others share is never twice the same:
+//! read the ratios. The program starts itself as child processes for the other components and nodes,
+//! all on loopback, pinned to processors, and prints Markdown. What was measured, where and when, is
+//! kept in `docs/performance.md`. What a message costs within the endpoint alone is measured by
+//! `cargo bench --bench wire`.
 
 #![expect(
     clippy::expect_used,
@@ -20,10 +22,14 @@
 
 mod baseline;
 mod child;
+mod fan_out;
 mod idle;
+mod loss;
 mod one_way;
 mod place;
+mod placement;
 mod play;
+mod relay;
 mod report;
 mod roles;
 mod round_trip;
@@ -48,7 +54,7 @@ struct Effort {
 const THOROUGH: Effort = Effort {
     runs: 7,
     round_trips: 5000,
-    seconds: 1.0,
+    seconds: 0.5,
     idle_seconds: 20.0,
 };
 
@@ -61,6 +67,7 @@ const QUICK: Effort = Effort {
 
 fn main() {
     if let Some(role) = roles::of_this_process() {
+        placement::settle();
         return play::play(role);
     }
     let mut effort = THOROUGH;
@@ -81,8 +88,14 @@ fn main() {
     if wanted("one way") {
         one_way::measure(effort);
     }
+    if wanted("loss") {
+        loss::measure(effort);
+    }
     if wanted("idle") {
         idle::measure(effort);
+    }
+    if wanted("fan-out") {
+        fan_out::measure(effort);
     }
     report::machine();
     // Left behind if a measurement has failed.

@@ -9,14 +9,16 @@ use jaus::node::{Port, Undelivered};
 use jaus::wire::Priority;
 use tokio::time::{sleep, timeout};
 
+use crate::Effort;
+use crate::baseline::{self, Batching, Flow};
 use crate::child::Process;
+use crate::placement::{Placement, Side};
 use crate::report::{self, median, ratio, spread};
 use crate::roles::{self, CODE, COUNT, Role};
 use crate::setting::Setting;
-use crate::{Effort, baseline};
 
 /// Octets of a message.
-const LENGTHS: [usize; 5] = [8, 64, 1024, 64 << 10, 1 << 20];
+const LENGTHS: [usize; 4] = [64, 1024, 64 << 10, 1 << 20];
 /// Octets of acknowledged messages that are on their way at once, and the most messages.
 const UNDERWAY: (usize, usize) = (4 << 20, 256);
 /// Small messages a second, where the sender keeps to a pace.
@@ -24,7 +26,7 @@ const PACE: f64 = 300_000.0;
 
 /// How the messages are sent.
 #[derive(Clone, Copy, PartialEq)]
-enum Manner {
+pub(crate) enum Manner {
     /// As fast as the node takes them.
     AllOut,
     /// Small ones at a steady pace.
@@ -41,67 +43,67 @@ impl Manner {
     ];
 }
 
-/// What one run gave.
-#[derive(Clone, Copy)]
-struct Flow {
-    sent: u64,
-    received: u64,
-    /// From the first message sent to the last received.
-    seconds: f64,
-}
-
-impl Flow {
-    fn rate(self) -> f64 {
-        self.received as f64 / self.seconds
-    }
-
-    fn lost(self) -> f64 {
-        100.0 * self.sent.saturating_sub(self.received) as f64 / self.sent.max(1) as f64
-    }
-}
-
 pub(crate) fn measure(effort: Effort) {
+    for placement in Placement::pinned() {
+        placement.take();
+        for length in LENGTHS {
+            measure_length(length, placement, effort);
+        }
+    }
+    Placement::Free.take();
+}
+
+fn measure_length(length: usize, placement: Placement, effort: Effort) {
     let time = Duration::from_secs_f64(effort.seconds);
-    for length in LENGTHS {
-        let mut flows: Vec<(String, Vec<Flow>)> = Vec::new();
-        let mut copies = Vec::new();
-        for _ in 0..effort.runs {
-            let mut note =
-                |name: String, flow| match flows.iter_mut().find(|(known, _)| *known == name) {
-                    Some((_, flows)) => flows.push(flow),
-                    None => flows.push((name, vec![flow])),
-                };
-            // What a datagram of ours holds at most; a larger message takes several.
-            let datagram = length.min(1440);
-            let (sent, received, seconds) = baseline::udp_one_way(datagram, time);
+    // What a datagram of ours holds at most; a larger message takes several.
+    let datagram = length.min(1440);
+    let mut flows: Vec<(String, Vec<Flow>)> = Vec::new();
+    let mut copies = Vec::new();
+    for _ in 0..effort.runs {
+        let mut note = |name: String, flow| match flows.iter_mut().find(|(known, _)| *known == name)
+        {
+            Some((_, flows)) => flows.push(flow),
+            None => flows.push((name, vec![flow])),
+        };
+        for (batching, how) in [(Batching::Single, ""), (Batching::Segments, ", segments")] {
+            let raw = baseline::udp_one_way(datagram, time, batching, placement);
             let share = (length / datagram) as u64;
             let raw = Flow {
-                sent: sent / share,
-                received: received / share,
-                seconds,
+                sent: raw.sent / share,
+                received: raw.received / share,
+                ..raw
             };
-            note(format!("raw UDP, datagrams of {datagram}"), raw);
-            for setting in Setting::ALL {
-                for (manner, how) in Manner::ALL {
-                    if manner != Manner::Paced || length <= 64 {
-                        let flow = flow(setting, length, manner, time);
-                        note(format!("{}{how}", setting.name()), flow);
-                    }
+            note(format!("raw UDP, datagrams of {datagram}{how}"), raw);
+        }
+        let stream = baseline::unix_one_way(length, time, placement);
+        note("raw Unix stream".to_owned(), stream);
+        for setting in Setting::ALL {
+            for (manner, how) in Manner::ALL {
+                if manner != Manner::Paced || length <= 64 {
+                    let flow = flow(setting, length, manner, time, placement);
+                    note(format!("{}{how}", setting.name()), flow);
                 }
             }
-            copies.push(baseline::memcpy(length) / 1e6);
         }
-        print(length, &flows, &copies);
+        copies.push(baseline::memcpy(length) / 1e6);
     }
+    print(length, placement, &flows, &copies);
 }
 
-fn print(length: usize, flows: &[(String, Vec<Flow>)], copies: &[f64]) {
+fn print(length: usize, placement: Placement, flows: &[(String, Vec<Flow>)], copies: &[f64]) {
     report::head(
-        &format!("One way, {length} octets"),
-        ["between", "thousand/s", "MB/s", "lost", "rate to raw UDP"],
+        &format!("One way, {length} octets, {}", placement.name()),
+        [
+            "between",
+            "thousand/s",
+            "MB/s",
+            "lost",
+            "rate to raw UDP",
+            "to raw UDP, segments",
+        ],
     );
     let rates = |flows: &[Flow]| flows.iter().map(|flow| flow.rate()).collect::<Vec<_>>();
-    let raw = rates(&flows[0].1);
+    let (single, segments) = (rates(&flows[0].1), rates(&flows[1].1));
     for (name, flows) in flows {
         let rates = rates(flows);
         let thousands: Vec<_> = rates.iter().map(|rate| rate / 1e3).collect();
@@ -111,39 +113,57 @@ fn print(length: usize, flows: &[(String, Vec<Flow>)], copies: &[f64]) {
             &spread(&thousands, 1),
             &format!("{:.1}", median(&rates) * length as f64 / 1e6),
             &format!("{:.1} %", median(&lost)),
-            &ratio(&rates, &raw),
+            &ratio(&rates, &single),
+            &ratio(&rates, &segments),
         ]);
     }
     let copy = format!("{:.0}", median(copies));
-    report::row(["copy in memory", "", &copy, "", ""]);
+    report::row(["copy in memory", "", &copy, "", "", ""]);
 }
 
 /// Sends for a time from here to a child that counts.
-fn flow(setting: Setting, length: usize, manner: Manner, time: Duration) -> Flow {
-    let (_nodes, [here, there]) = setting.start();
+fn flow(
+    setting: Setting,
+    length: usize,
+    manner: Manner,
+    time: Duration,
+    placement: Placement,
+) -> Flow {
+    let (_nodes, [here, there]) = setting.start(placement);
     let [ours, theirs] = setting.ids();
-    let _sink = Process::start(&Role::Sink(theirs, there));
+    let sink = Role::Sink(theirs, there);
+    let _sink = Process::start(&sink, &placement.of(Side::Theirs));
     let mut message = vec![0; length];
     message[..2].copy_from_slice(&CODE);
     let message = Outgoing::new(ours, theirs, message.into());
     roles::runtime().block_on(async {
         let mut component = here.attach(ours).await;
-        let port = &mut component.port;
-        // Also makes the two known to each other.
-        assert_eq!(count(port, theirs).await, 0);
-        let start = Instant::now();
-        let sent = match manner {
-            Manner::AllOut => all_out(port, &message, time).await,
-            Manner::Paced => paced(port, &message, time).await,
-            Manner::Acknowledged => acknowledged(port, &message, time).await,
-        };
-        let (received, seconds) = arrived(port, theirs, sent, start).await;
-        Flow {
-            sent,
-            received,
-            seconds,
-        }
+        send(&mut component.port, &message, manner, time).await
     })
+}
+
+/// Sends for a time to a component that counts.
+pub(crate) async fn send(
+    port: &mut Port,
+    message: &Outgoing,
+    manner: Manner,
+    time: Duration,
+) -> Flow {
+    let sink = message.destination;
+    // Also makes the two known to each other.
+    assert_eq!(count(port, sink).await, 0);
+    let start = Instant::now();
+    let sent = match manner {
+        Manner::AllOut => all_out(port, message, time).await,
+        Manner::Paced => paced(port, message, time).await,
+        Manner::Acknowledged => acknowledged(port, message, time).await,
+    };
+    let (received, seconds) = arrived(port, sink, sent, start).await;
+    Flow {
+        sent,
+        received,
+        seconds,
+    }
 }
 
 async fn all_out(port: &Port, message: &Outgoing, time: Duration) -> u64 {

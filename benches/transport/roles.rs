@@ -1,10 +1,14 @@
 //! What a child process of the benchmark may be, and how it is told.
 
 use std::env;
+use std::net::SocketAddr;
+use std::path::PathBuf;
 
 use jaus::address::JausId;
 use jaus::endpoint::Received;
+use jaus::node::Peer;
 
+use crate::baseline::Batching;
 use crate::place::Place;
 
 /// The code of all messages here: an experimental one, which no service takes.
@@ -18,13 +22,25 @@ pub(crate) enum Role {
     /// Sends datagrams back.
     UdpEcho,
     /// Counts datagrams.
-    UdpSink,
-    /// Sends octets back.
-    UnixEcho,
+    UdpSink(Batching),
+    /// Connects to a stream and sends octets back.
+    StreamEcho(PathBuf),
+    /// Connects to a stream and counts octets.
+    StreamSink(PathBuf),
+    /// Copies between two streams.
+    Relay(PathBuf),
+    /// Copies between a stream and another relay, at this address if it is there already.
+    DatagramRelay(PathBuf, Option<SocketAddr>),
+    /// Delays datagrams between two addresses, and loses so many percent, by a seed.
+    Network(SocketAddr, SocketAddr, u8, u64),
     /// A component that sends messages back.
     Echo(JausId, Place),
     /// A component that counts messages.
     Sink(JausId, Place),
+    /// The same on a node at an address, which knows one peer.
+    SinkAt(JausId, SocketAddr, Peer),
+    /// A sensor at an address, and its subscribers.
+    Sensor(SocketAddr, Vec<SocketAddr>),
     /// A node for other processes, that serves this socket.
     Node(JausId, Place),
     /// An idle node with so many components.
@@ -38,8 +54,21 @@ impl Role {
     pub(crate) fn to_words(&self) -> String {
         match self {
             Self::UdpEcho => "udp-echo".into(),
-            Self::UdpSink => "udp-sink".into(),
-            Self::UnixEcho => "unix-echo".into(),
+            Self::UdpSink(Batching::Single) => "udp-sink".into(),
+            Self::UdpSink(Batching::Segments) => "udp-sink-segments".into(),
+            Self::StreamEcho(at) => format!("stream-echo {}", at.display()),
+            Self::StreamSink(at) => format!("stream-sink {}", at.display()),
+            Self::Relay(at) => format!("relay {}", at.display()),
+            Self::DatagramRelay(at, None) => format!("datagram-relay {}", at.display()),
+            Self::DatagramRelay(at, Some(to)) => format!("datagram-relay {} {to}", at.display()),
+            Self::Network(one, two, percent, seed) => {
+                format!("network {one} {two} {percent} {seed}")
+            }
+            Self::SinkAt(id, at, peer) => format!("sink-at {id} {at} {peer}"),
+            Self::Sensor(at, subscribers) => {
+                let words = subscribers.iter().map(|address| format!(" {address}"));
+                format!("sensor {at}{}", words.collect::<String>())
+            }
             Self::Echo(id, place) => format!("echo {id} {place}"),
             Self::Sink(id, place) => format!("sink {id} {place}"),
             Self::Node(id, place) => format!("node {id} {place}"),
@@ -52,8 +81,29 @@ impl Role {
         let component = |id: &str, place: &str| Some((id.parse().ok()?, place.parse().ok()?));
         Some(match words[..] {
             ["udp-echo"] => Self::UdpEcho,
-            ["udp-sink"] => Self::UdpSink,
-            ["unix-echo"] => Self::UnixEcho,
+            ["udp-sink"] => Self::UdpSink(Batching::Single),
+            ["udp-sink-segments"] => Self::UdpSink(Batching::Segments),
+            ["stream-echo", at] => Self::StreamEcho(at.into()),
+            ["stream-sink", at] => Self::StreamSink(at.into()),
+            ["relay", at] => Self::Relay(at.into()),
+            ["datagram-relay", at] => Self::DatagramRelay(at.into(), None),
+            ["datagram-relay", at, to] => Self::DatagramRelay(at.into(), Some(to.parse().ok()?)),
+            ["network", one, two, percent, seed] => Self::Network(
+                one.parse().ok()?,
+                two.parse().ok()?,
+                percent.parse().ok()?,
+                seed.parse().ok()?,
+            ),
+            ["sink-at", id, at, peer] => {
+                Self::SinkAt(id.parse().ok()?, at.parse().ok()?, peer.parse().ok()?)
+            }
+            ["sensor", at, ref subscribers @ ..] => {
+                let subscribers = subscribers.iter().map(|it| it.parse());
+                Self::Sensor(
+                    at.parse().ok()?,
+                    subscribers.collect::<Result<_, _>>().ok()?,
+                )
+            }
             ["echo", id, place] => component(id, place).map(|(id, at)| Self::Echo(id, at))?,
             ["sink", id, place] => component(id, place).map(|(id, at)| Self::Sink(id, at))?,
             ["node", id, place] => component(id, place).map(|(id, at)| Self::Node(id, at))?,

@@ -10,37 +10,30 @@ use tokio::runtime::Runtime;
 use tokio::time::timeout;
 
 use crate::Effort;
-use crate::baseline::{UdpEcho, UnixEcho};
+use crate::baseline::UdpEcho;
 use crate::child::Process;
 use crate::place::Component;
+use crate::placement::{Placement, Side};
+use crate::relay::StreamEcho;
 use crate::report::{self, median, micros, percentile, ratio, spread};
 use crate::roles::{self, CODE, Role};
 use crate::setting::Setting;
 
 const LENGTHS: [usize; 2] = [64, 1024];
 
-/// Something that goes to and fro.
+/// What answers a message.
 trait Pair {
-    fn name(&self) -> &str;
     /// So many round trips, one after the other.
     fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration>;
 }
 
 impl Pair for UdpEcho {
-    fn name(&self) -> &str {
-        "raw UDP echo"
-    }
-
     fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration> {
         (0..count).map(|_| self.round_trip(message)).collect()
     }
 }
 
-impl Pair for UnixEcho {
-    fn name(&self) -> &str {
-        "raw Unix socket echo"
-    }
-
+impl Pair for StreamEcho {
     fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration> {
         (0..count).map(|_| self.round_trip(message)).collect()
     }
@@ -48,7 +41,6 @@ impl Pair for UnixEcho {
 
 /// A component here and one in another process, which sends back what it gets.
 struct Components {
-    name: &'static str,
     runtime: Runtime,
     ours: Option<Component>,
     theirs: JausId,
@@ -56,14 +48,14 @@ struct Components {
 }
 
 impl Components {
-    fn start(setting: Setting) -> Self {
-        let (mut others, [here, there]) = setting.start();
+    fn start(setting: Setting, placement: Placement) -> Self {
+        let (mut others, [here, there]) = setting.start(placement);
         let [ours, theirs] = setting.ids();
-        others.push(Process::start(&Role::Echo(theirs, there)));
+        let echo = Role::Echo(theirs, there);
+        others.push(Process::start(&echo, &placement.of(Side::Theirs)));
         let runtime = roles::runtime();
         let ours = runtime.block_on(here.attach(ours));
         Self {
-            name: setting.name(),
             runtime,
             ours: Some(ours),
             theirs,
@@ -73,10 +65,6 @@ impl Components {
 }
 
 impl Pair for Components {
-    fn name(&self) -> &str {
-        self.name
-    }
-
     fn round_trips(&mut self, message: &Bytes, count: usize) -> Vec<Duration> {
         let mut component = self.ours.take().expect("given back after each run");
         let (theirs, message) = (self.theirs, message.clone());
@@ -107,48 +95,74 @@ async fn round_trip(port: &mut Port, theirs: JausId, message: &Bytes) -> Duratio
     }
 }
 
+/// The pairs that are compared: a name, the place of its baseline in this list, and the pair.
+fn pairs(placement: Placement) -> Vec<(&'static str, usize, Box<dyn Pair>)> {
+    let stream = |relays| Box::new(StreamEcho::start(relays, placement));
+    let components = |setting| Box::new(Components::start(setting, placement));
+    let [own, one, two] = Setting::ALL;
+    vec![
+        ("raw UDP", 0, Box::new(UdpEcho::start(placement))),
+        ("raw Unix stream", 0, stream(0)),
+        ("bare relay, one process", 2, stream(1)),
+        ("bare relay, two processes", 3, stream(2)),
+        (own.name(), 0, components(own)),
+        (one.name(), 2, components(one)),
+        (two.name(), 3, components(two)),
+    ]
+}
+
 pub(crate) fn measure(effort: Effort) {
-    for length in LENGTHS {
-        let mut message = vec![0; length];
-        message[..2].copy_from_slice(&CODE);
-        let message = Bytes::from(message);
-        let mut pairs: Vec<Box<dyn Pair>> =
-            vec![Box::new(UdpEcho::start()), Box::new(UnixEcho::start())];
-        for setting in Setting::ALL {
-            pairs.push(Box::new(Components::start(setting)));
+    for placement in Placement::all() {
+        placement.take();
+        let mut pairs = pairs(placement);
+        for length in LENGTHS {
+            measure_pairs(&mut pairs, length, placement, effort);
         }
-        let mut medians = vec![Vec::new(); pairs.len()];
-        let mut tails = vec![Vec::new(); pairs.len()];
-        for run in 0..=effort.runs {
-            for (pair, (medians, tails)) in pairs.iter_mut().zip(medians.iter_mut().zip(&mut tails))
-            {
-                let times = pair.round_trips(&message, effort.round_trips);
-                let times: Vec<_> = times.into_iter().map(micros).collect();
-                // The first run only warms up.
-                if run > 0 {
-                    medians.push(median(&times));
-                    tails.push(percentile(&times, 99));
-                }
+    }
+    Placement::Free.take();
+}
+
+fn measure_pairs(
+    pairs: &mut [(&str, usize, Box<dyn Pair>)],
+    length: usize,
+    placement: Placement,
+    effort: Effort,
+) {
+    let mut message = vec![0; length];
+    message[..2].copy_from_slice(&CODE);
+    let message = Bytes::from(message);
+    let mut medians = vec![Vec::new(); pairs.len()];
+    let mut tails = vec![Vec::new(); pairs.len()];
+    for run in 0..=effort.runs {
+        for ((_, _, pair), (medians, tails)) in
+            pairs.iter_mut().zip(medians.iter_mut().zip(&mut tails))
+        {
+            let times = pair.round_trips(&message, effort.round_trips);
+            let times: Vec<_> = times.into_iter().map(micros).collect();
+            // The first run only warms up.
+            if run > 0 {
+                medians.push(median(&times));
+                tails.push(percentile(&times, 99));
             }
         }
-        report::head(
-            &format!("Round trip, {length} octets (µs)"),
-            [
-                "between",
-                "median",
-                "p99",
-                "median to raw UDP",
-                "p99 to median",
-            ],
-        );
-        for (pair, (medians_of, tails)) in pairs.iter().zip(medians.iter().zip(&tails)) {
-            report::row([
-                pair.name(),
-                &spread(medians_of, 1),
-                &spread(tails, 1),
-                &ratio(medians_of, &medians[0]),
-                &ratio(tails, medians_of),
-            ]);
-        }
+    }
+    report::head(
+        &format!("Round trip, {length} octets, {} (µs)", placement.name()),
+        [
+            "between",
+            "median",
+            "p99",
+            "median to its baseline",
+            "baseline",
+        ],
+    );
+    for (index, (name, baseline, _)) in pairs.iter().enumerate() {
+        report::row([
+            name,
+            &spread(&medians[index], 1),
+            &spread(&tails[index], 1),
+            &ratio(&medians[index], &medians[*baseline]),
+            pairs[*baseline].0,
+        ]);
     }
 }

@@ -4,6 +4,7 @@ use jaus::address::JausId;
 
 use crate::child::Process;
 use crate::place::Place;
+use crate::placement::{Placement, Side};
 use crate::roles::Role;
 use crate::run::folder;
 
@@ -39,20 +40,22 @@ impl Setting {
     }
 
     /// Starts the nodes, and says where the two components are to live.
-    pub(crate) fn start(self) -> (Vec<Process>, [Place; 2]) {
-        let node = |id: JausId, name: &str| {
-            let place = Place::On(folder().join(format!("{self:?}-{name}.sock")));
-            (Process::start(&Role::Node(id, place.clone())), place)
+    pub(crate) fn start(self, placement: Placement) -> (Vec<Process>, [Place; 2]) {
+        let node = |id: JausId, side| {
+            let place = Place::On(folder().join(format!("{self:?}-{side:?}.sock")));
+            let role = Role::Node(id, place.clone());
+            (Process::start(&role, &placement.of(side)), place)
         };
         let [ours, theirs] = self.ids();
         match self {
             Self::OwnNodes => (Vec::new(), [Place::Own, Place::Own]),
             Self::OneNode => {
-                let (process, place) = node(ours, "one");
+                let (process, place) = node(ours, Side::Ours);
                 (vec![process], [place.clone(), place])
             }
             Self::TwoNodes => {
-                let ((one, here), (two, there)) = (node(ours, "ours"), node(theirs, "theirs"));
+                let ((one, here), (two, there)) =
+                    (node(ours, Side::Ours), node(theirs, Side::Theirs));
                 (vec![one, two], [here, there])
             }
         }

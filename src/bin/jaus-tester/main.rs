@@ -1,5 +1,5 @@
-//! `jaus-tester`: drives the whole chain of a vehicle and checks each answer; puts load on a
-//! communicator and measures.
+//! `jaus-tester`: drives the whole chain of a vehicle and checks each answer; puts load on nodes
+//! and measures.
 
 mod load;
 mod mission;
@@ -11,7 +11,7 @@ use jaus::cli::failure::{Failure, Outcome};
 use jaus::cli::logging::Logging;
 use jaus::cli::output;
 
-/// Test a vehicle: a mission through all of its components, and load on its communicator
+/// Test a vehicle: a mission through all of its components, and load on nodes
 #[derive(Parser)]
 #[command(name = "jaus-tester", version)]
 struct Program {
@@ -26,6 +26,8 @@ struct Program {
 enum Command {
     Mission(mission::MissionCommand),
     Load(load::LoadCommand),
+    #[command(name = load::SUBCOMMAND, hide = true)]
+    LoadChild(load::LoadChild),
 }
 
 fn main() -> ExitCode {
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
         .and_then(|()| match program.command {
             Command::Mission(mission) => mission.run(),
             Command::Load(load) => load.run(),
+            Command::LoadChild(child) => child.run(),
         });
     match outcome {
         Ok(Outcome::Done) | Err(Failure::OutputClosed) => ExitCode::SUCCESS,

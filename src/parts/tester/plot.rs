@@ -29,7 +29,7 @@ pub struct Plot {
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 440.0;
 const LEFT: f64 = 80.0;
-const RIGHT: f64 = 110.0;
+const RIGHT: f64 = 160.0;
 const TOP: f64 = 50.0;
 const BOTTOM: f64 = 60.0;
 /// Told apart by people who see few colours, too, and by their dashes on paper.
@@ -75,12 +75,17 @@ impl Axis {
         self.from + share * (self.to - self.from)
     }
 
-    /// 1, 2 and 5 times the powers of ten that lie within.
+    /// The powers of ten that lie within; of a short axis also 2 and 5 times those.
     fn marks(&self) -> Vec<f64> {
         let first = self.least.log10().floor() as i32;
         let last = self.most.log10().ceil() as i32;
+        let factors: &[f64] = if self.most > 300.0 * self.least {
+            &[1.0]
+        } else {
+            &[1.0, 2.0, 5.0]
+        };
         let all =
-            (first..=last).flat_map(|power| [1.0, 2.0, 5.0].map(|it| it * 10_f64.powi(power)));
+            (first..=last).flat_map(|power| factors.iter().map(move |it| it * 10_f64.powi(power)));
         let within = self.least * 0.999..=self.most * 1.001;
         all.filter(|mark| within.contains(mark)).collect()
     }

@@ -1,0 +1,154 @@
+//! What one event costs its sender with one subscriber and with a hundred, each on a node of its own.
+
+use std::net::SocketAddr;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::component::{Component, Handlers, Kind};
+use jaus::endpoint::Outgoing;
+use jaus::link::Group;
+use jaus::messages::core::{CreateEvent, Event, create_event};
+use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::node::{Config, Node, Port};
+use tokio::time::{sleep, timeout};
+
+use crate::Effort;
+use crate::child::Process;
+use crate::loss::{free_addresses, settings};
+use crate::placement::{Placement, Side};
+use crate::report::{self, ratio, spread};
+use crate::roles::{self, Role};
+
+const SENSOR: JausId = JausId::new(101, 1, 1);
+/// Subscribers are in the subsystems from this one on.
+const FIRST: u16 = 200;
+const MOST: usize = 100;
+const COUNTS: [usize; 3] = [1, 10, MOST];
+/// Between two events.
+const PERIOD: Duration = Duration::from_millis(4);
+
+pub(crate) fn measure(effort: Effort) {
+    let placement = *Placement::pinned().last().expect("one at least");
+    placement.take();
+    let time = Duration::from_secs_f64(effort.seconds);
+    let mut costs = COUNTS.map(|_| Vec::new());
+    for _ in 0..effort.runs {
+        for (costs, subscribers) in costs.iter_mut().zip(COUNTS) {
+            let cost = roles::runtime().block_on(cost(subscribers, time, placement));
+            costs.push(cost);
+        }
+    }
+    report::head(
+        &format!(
+            "One event, {} (processor time of its sender)",
+            placement.name()
+        ),
+        ["subscribers", "µs", "to one", "µs for each"],
+    );
+    for (all, subscribers) in costs.iter().zip(COUNTS) {
+        let each: Vec<_> = all.iter().map(|cost| cost / subscribers as f64).collect();
+        report::row([
+            &subscribers.to_string(),
+            &spread(all, 1),
+            &ratio(all, &costs[0]),
+            &spread(&each, 2),
+        ]);
+    }
+    Placement::Free.take();
+}
+
+/// Microseconds of the sender's processor for each event.
+async fn cost(subscribers: usize, time: Duration, placement: Placement) -> f64 {
+    let addresses = free_addresses::<{ MOST + 1 }>();
+    let (sensor, clients) = addresses.split_first().expect("some");
+    let clients = clients[..subscribers].to_vec();
+    let role = Role::Sensor(*sensor, clients.clone());
+    let process = Process::start(&role, &placement.of(Side::Theirs));
+    let mut ports = Vec::new();
+    let mut nodes = Vec::new();
+    for (subsystem, &at) in (FIRST..).zip(&clients) {
+        let peer = format!("{SENSOR}@{sensor}").parse().expect("a peer");
+        let settings = settings(JausId::new(subsystem, 1, 1), at, peer);
+        let node = Node::start(settings).expect("a node");
+        let mut port = node.attach(1).expect("a free number");
+        subscribe(&mut port).await;
+        nodes.push(node);
+        ports.push(port);
+    }
+    sleep(Duration::from_millis(300)).await;
+    let mut counted = ports.pop().expect("one subscriber");
+    for mut port in ports {
+        tokio::spawn(async move { while port.recv().await.is_some() {} });
+    }
+    while counted.try_recv().is_some() {}
+    let (start, before) = (Instant::now(), process.processor_time());
+    let mut events = 0;
+    while start.elapsed() < time {
+        if let Ok(Some(message)) = timeout(Duration::from_secs(1), counted.recv()).await {
+            events += u32::from(Event::decode(&message.payload).is_ok());
+        }
+    }
+    assert!(events > 0, "no event came to {subscribers} subscribers");
+    let used = process.processor_time() - before;
+    used.as_secs_f64() * 1e6 / f64::from(events)
+}
+
+/// Until an event has come.
+async fn subscribe(port: &mut Port) {
+    let query = QueryVelocityState { presence_vector: 1 };
+    let create = CreateEvent {
+        event_type: create_event::EventType::EVERY_CHANGE,
+        query_message: query.encode().expect("a query"),
+        ..CreateEvent::default()
+    };
+    let payload = create.encode().expect("a message");
+    for _ in 0..50 {
+        let request = Outgoing::new(port.id(), SENSOR, payload.clone());
+        port.send(request).expect("sent");
+        let answer = async {
+            while let Some(message) = port.recv().await {
+                if Event::decode(&message.payload).is_ok() {
+                    return;
+                }
+            }
+        };
+        if timeout(Duration::from_millis(500), answer).await.is_ok() {
+            return;
+        }
+    }
+    panic!("no subscription");
+}
+
+/// A child: a sensor whose value changes all the time, with its subscribers' addresses.
+pub(crate) async fn sensor(at: SocketAddr, subscribers: Vec<SocketAddr>) {
+    let mut settings = Config::loopback(SENSOR.subsystem(), SENSOR.node())
+        .port(at.port())
+        .group(Group::Off);
+    for (subsystem, address) in (FIRST..).zip(subscribers) {
+        let peer = format!("{subsystem}.1.255@{address}");
+        settings = settings.peer(peer.parse().expect("a peer"));
+    }
+    let node = Node::start(settings).expect("a node");
+    let count = AtomicU32::new(0);
+    // Each subscriber's next answer differs, or there would be no event: no number of subscribers is
+    // a multiple of 97.
+    let answer = move |_: QueryVelocityState| {
+        let speed = count.fetch_add(1, Ordering::Relaxed) % 97;
+        let mut report = ReportVelocityState::default();
+        let set = report.set_velocity_x_m_per_s(f64::from(speed) / 10.0);
+        set.expect("within its range");
+        report
+    };
+    let sensor = Handlers::new(velocity_state_sensor::LATEST).answer(answer);
+    let component = Component::builder(Kind::Vehicle, "Bench")
+        .offer(sensor)
+        .attach(&node, SENSOR.component())
+        .expect("a sensor");
+    println!("ready");
+    loop {
+        sleep(PERIOD).await;
+        component.changed::<QueryVelocityState>().await;
+    }
+}
