@@ -99,7 +99,8 @@ impl<T> Backlog<T> {
         self.items > 1 && (self.items > self.bounds.items || self.octets > self.bounds.octets)
     }
 
-    fn drop_least(&mut self) -> bool {
+    /// Drops the oldest of the least urgent items; whether there was one.
+    pub(crate) fn drop_least(&mut self) -> bool {
         let taken = self.queues.iter_mut().find_map(VecDeque::pop_front);
         self.account(taken).is_some()
     }

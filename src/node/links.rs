@@ -45,7 +45,7 @@ impl Links {
             links.open_udp()?;
         }
         if config.tcp.is_used() {
-            let link = TcpLink::open(&config.tcp.settings())?;
+            let link = TcpLink::open(&config.tcp.settings(&config.access))?;
             links.insert(Link::Tcp(link));
         }
         #[cfg(feature = "serial")]
