@@ -71,24 +71,6 @@ impl<T> Backlog<T> {
         dropped
     }
 
-    /// The oldest of the most urgent items, which [`pop`](Self::pop) would take.
-    pub(crate) fn first(&self) -> Option<&T> {
-        self.queues
-            .iter()
-            .rev()
-            .find_map(VecDeque::front)
-            .map(|(_, item)| item)
-    }
-
-    /// The same, to be changed in its place.
-    pub(crate) fn first_mut(&mut self) -> Option<&mut T> {
-        self.queues
-            .iter_mut()
-            .rev()
-            .find_map(VecDeque::front_mut)
-            .map(|(_, item)| item)
-    }
-
     /// Takes out the oldest of the most urgent items.
     pub(crate) fn pop(&mut self) -> Option<T> {
         let taken = self.queues.iter_mut().rev().find_map(take_first);
@@ -152,9 +134,8 @@ mod tests {
         ] {
             assert_eq!(push(&mut backlog, priority, text), 0);
         }
-        assert_eq!(backlog.first(), Some(&"stop"));
         assert_eq!(drain(&mut backlog), ["stop", "one", "two", "later"]);
-        assert!(backlog.is_empty() && backlog.first().is_none());
+        assert!(backlog.is_empty());
     }
 
     #[test]
