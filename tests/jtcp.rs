@@ -451,6 +451,30 @@ async fn a_peer_that_was_restarted_is_connected_to_again() {
     assert_eq!(operator.tcp().unwrap().counters.connected, 2);
 }
 
+/// Nothing is known of the peer but its address, and there is no connection yet.
+#[tokio::test]
+async fn the_first_message_to_an_unknown_id_waits_for_the_connection() {
+    let far = tokio::net::TcpListener::bind(("127.0.0.1", 0))
+        .await
+        .unwrap();
+    let operator = Node::start(connecting(102, far.local_addr().unwrap(), "")).unwrap();
+    let console = operator.attach(1).unwrap();
+    let unknown = JausId::new(101, 1, 33);
+    console
+        .send(to(&console, unknown, QUERY_HEARTBEAT))
+        .unwrap();
+    let (stream, _) = within("a connection", far.accept()).await.unwrap();
+    let mut peer = Scripted {
+        stream,
+        decoder: Decoder::new(),
+    };
+    let heard = peer.read().await.expect("the message");
+    assert_eq!(
+        (heard.destination, heard.payload),
+        (unknown, QUERY_HEARTBEAT)
+    );
+}
+
 #[tokio::test]
 async fn more_connections_than_allowed_are_refused() {
     let mut config = listening(101);

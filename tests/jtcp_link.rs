@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{LinkId, To, Transmit};
+use jaus::endpoint::{Access, LinkId, To, Transmit};
 use jaus::link::tcp::{Arrival, Closed, Counters, HANDSHAKE, STUCK, Settings, TcpLink};
 use jaus::wire::{Frame, Priority, jtcp};
 
@@ -29,6 +29,14 @@ fn listening(max_accepted: usize) -> TcpLink {
         ..Settings::default()
     };
     TcpLink::open(&settings).unwrap()
+}
+
+/// A connection from `address`, another of this host's loopback addresses.
+async fn connect_from(address: [u8; 4], to: SocketAddr) -> TcpStream {
+    let socket = tokio::net::TcpSocket::new_v4().unwrap();
+    socket.bind((address, 0).into()).unwrap();
+    let stream = tokio::time::timeout(LIMIT, socket.connect(to)).await;
+    stream.unwrap().unwrap().into_std().unwrap()
 }
 
 fn message(octets: usize) -> Bytes {
@@ -225,4 +233,127 @@ async fn a_peer_that_still_writes_when_the_link_hangs_up_is_not_cut_off() {
     drop(peer);
     turns(&mut link, now, |link| link.connections().count() == 0).await;
     assert!(link.hang_up().is_ready());
+}
+
+#[tokio::test]
+async fn idle_connections_of_one_address_do_not_keep_newcomers_out() {
+    let settings = Settings {
+        listen: Some(([127, 0, 0, 1], 0).into()),
+        max_per_address: 64,
+        ..Settings::default()
+    };
+    let mut link = TcpLink::open(&settings).unwrap();
+    let address = link.local().unwrap();
+    let now = Instant::now();
+    let mut hoard = Vec::new();
+    for count in 1..=64 {
+        let mut stream = TcpStream::connect(address).unwrap();
+        stream.write_all(&message(20)).unwrap();
+        let at = now + Duration::from_millis(count);
+        turns(&mut link, at, |link| link.counters().received == count).await;
+        hoard.push(stream);
+    }
+    let _one_more = TcpStream::connect(address).unwrap();
+    turns(&mut link, now, |link| link.counters().refused == 1).await;
+
+    let later = now + Duration::from_secs(3600);
+    let newcomer = connect_from([127, 0, 0, 2], address).await;
+    let closed = turns(&mut link, later, |link| link.counters().accepted == 65).await;
+    assert!(matches!(closed[..], [Closed::Idle]), "{closed:?}");
+    let remotes: Vec<_> = link.connections().map(|c| c.remote).collect();
+    assert!(remotes.contains(&newcomer.local_addr().unwrap()));
+    let longest_idle = hoard[0].local_addr().unwrap();
+    assert!(!remotes.contains(&longest_idle) && remotes.len() == 64);
+    let _again = TcpStream::connect(address).unwrap();
+    turns(&mut link, later, |link| link.counters().refused == 2).await;
+    assert_eq!(link.counters().displaced, 1);
+}
+
+#[tokio::test]
+async fn an_address_has_a_quota_of_its_own() {
+    let settings = Settings {
+        listen: Some(([127, 0, 0, 1], 0).into()),
+        max_per_address: 2,
+        ..Settings::default()
+    };
+    let mut link = TcpLink::open(&settings).unwrap();
+    let address = link.local().unwrap();
+    let now = Instant::now();
+    let _three = [(); 3].map(|()| TcpStream::connect(address).unwrap());
+    turns(&mut link, now, |link| link.counters().refused == 1).await;
+    let _other = connect_from([127, 0, 0, 2], address).await;
+    turns(&mut link, now, |link| link.counters().accepted == 3).await;
+}
+
+#[tokio::test]
+async fn who_may_not_speak_may_not_connect() {
+    let access = Access {
+        deny_networks: vec!["127.0.0.1".parse().unwrap()],
+        ..Access::default()
+    };
+    let settings = Settings {
+        listen: Some(([127, 0, 0, 1], 0).into()),
+        access,
+        ..Settings::default()
+    };
+    let mut link = TcpLink::open(&settings).unwrap();
+    let address = link.local().unwrap();
+    let now = Instant::now();
+    let mut denied = TcpStream::connect(address).unwrap();
+    turns(&mut link, now, |link| link.counters().denied == 1).await;
+    denied.set_read_timeout(Some(LIMIT)).unwrap();
+    assert_eq!(denied.read(&mut [0]).unwrap(), 0, "it is closed");
+    let _allowed = connect_from([127, 0, 0, 2], address).await;
+    turns(&mut link, now, |link| link.counters().accepted == 1).await;
+}
+
+#[tokio::test]
+async fn what_is_for_everyone_waits_for_the_first_connection_too() {
+    let far = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+    let settings = Settings {
+        connect: vec![far.local_addr().unwrap()],
+        ..Settings::default()
+    };
+    let mut link = TcpLink::open(&settings).unwrap();
+    let to_all = |payload: &Bytes| Transmit {
+        to: To::Group,
+        ..to(([127, 0, 0, 1], 1).into(), payload)
+    };
+    let said = message(20);
+    link.transmit(&to_all(&said));
+    let now = Instant::now();
+    turns(&mut link, now, |link| link.counters().sent == 1).await;
+    let (mut peer, _) = far.accept().unwrap();
+    peer.set_read_timeout(Some(LIMIT)).unwrap();
+    let mut heard = vec![0; said.len()];
+    peer.read_exact(&mut heard).unwrap();
+    assert_eq!(heard, said);
+
+    drop((peer, far));
+    turns(&mut link, now, |link| link.counters().closed == 1).await;
+    link.transmit(&to_all(&said));
+    assert_eq!(link.counters().not_connected, 1, "lost, and counted");
+}
+
+/// Peers that read nothing cost no more memory together than one link may have.
+#[tokio::test]
+async fn what_waits_for_all_connections_is_bounded() {
+    const MOST: usize = 16 << 20;
+    let mut link = listening(64);
+    let address = link.local().unwrap();
+    let now = Instant::now();
+    let _deaf: Vec<_> = (0..16)
+        .map(|_| TcpStream::connect(address).unwrap())
+        .collect();
+    turns(&mut link, now, |link| link.counters().accepted == 16).await;
+    let payload = message(60_000);
+    for _ in 0..200 {
+        link.transmit(&Transmit {
+            to: To::Group,
+            ..to(address, &payload)
+        });
+    }
+    let waiting: usize = link.connections().map(|c| c.waiting * payload.len()).sum();
+    assert!(waiting <= MOST, "{waiting} octets wait");
+    assert!(waiting > MOST / 2, "{waiting} octets wait: no test at all");
 }

@@ -14,7 +14,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::endpoint::{LinkId, To, Transmit};
-use jaus::link::udp::{PortTaken, Settings, UdpLink};
+use jaus::link::udp::{PortTaken, Settings, UdpLink, kernel_drops};
 use jaus::link::{Error, Group, Interface, Interfaces, Ip, Slab};
 use jaus::wire::Priority;
 
@@ -178,12 +178,12 @@ async fn what_the_kernel_drops_is_told() {
     };
     let mut slow = UdpLink::open(&loopback(), &small).unwrap();
     let mut fast = UdpLink::open(&loopback(), &settings()).unwrap();
-    assert_eq!(slow.kernel_drops(), Some(0));
+    assert_eq!(kernel_drops([slow.inodes()])[0], Some(0));
     let datagram = Bytes::from(vec![0; 1000]);
     for _ in 0..100 {
         fast.send_to(slow.local(), Priority::Standard, &datagram);
     }
-    let dropped = slow.kernel_drops().unwrap();
+    let dropped = kernel_drops([slow.inodes()])[0].unwrap();
     assert!(dropped > 0);
     for _ in dropped..100 {
         receive(&mut slow).await;
@@ -351,4 +351,66 @@ fn an_interface_that_does_not_exist_is_refused_with_a_list_of_those_that_do() {
             "{text}"
         );
     }
+}
+
+/// An event goes to many subscribers at once: a call into the kernel for each would cost most of
+/// the time.
+#[cfg(all(feature = "udp-batch", target_os = "linux"))]
+#[tokio::test]
+async fn datagrams_to_many_peers_leave_with_few_calls() {
+    let mut link = UdpLink::open(&loopback(), &settings()).unwrap();
+    let peers: Vec<_> = (0..100)
+        .map(|_| UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap())
+        .collect();
+    let payload = |number: usize| Bytes::from(vec![number as u8; 10 + number]);
+    for (number, peer) in peers.iter().enumerate() {
+        link.transmit(&Transmit {
+            link: LinkId(0),
+            to: To::Peer(peer.local_addr().unwrap().into()),
+            priority: Priority::Standard,
+            payload: payload(number),
+            segment: None,
+        });
+    }
+    assert!(link.flush());
+    for (number, peer) in peers.iter().enumerate() {
+        peer.set_read_timeout(Some(LIMIT)).unwrap();
+        let mut heard = [0; 200];
+        let (octets, from) = peer.recv_from(&mut heard).unwrap();
+        assert_eq!(
+            (&heard[..octets], from),
+            (&payload(number)[..], link.local())
+        );
+    }
+    let counters = link.counters();
+    assert_eq!((counters.sent, counters.send_errors), (100, 0));
+    assert!(counters.send_calls <= 4, "{} calls", counters.send_calls);
+}
+
+/// What the kernel refuses costs that one datagram, wherever it stands among the others.
+#[tokio::test]
+async fn a_datagram_that_is_refused_does_not_take_others_with_it() {
+    let mut link = UdpLink::open(&loopback(), &settings()).unwrap();
+    let mut peer = UdpLink::open(&loopback(), &settings()).unwrap();
+    let to = |address: SocketAddr, payload: Bytes| Transmit {
+        link: LinkId(0),
+        to: To::Peer(address.into()),
+        priority: Priority::Standard,
+        payload,
+        segment: None,
+    };
+    let too_long = Bytes::from(vec![0; 70_000]);
+    for number in 0..9_u8 {
+        let payload = if number % 3 == 1 {
+            too_long.clone()
+        } else {
+            Bytes::from(vec![number])
+        };
+        link.transmit(&to(peer.local(), payload));
+    }
+    assert!(link.flush());
+    for number in [0, 2, 3, 5, 6, 8] {
+        assert_eq!(receive(&mut peer).await.1, [number][..]);
+    }
+    assert_eq!((link.counters().sent, link.counters().send_errors), (6, 3));
 }

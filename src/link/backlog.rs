@@ -71,24 +71,6 @@ impl<T> Backlog<T> {
         dropped
     }
 
-    /// The oldest of the most urgent items, which [`pop`](Self::pop) would take.
-    pub(crate) fn first(&self) -> Option<&T> {
-        self.queues
-            .iter()
-            .rev()
-            .find_map(VecDeque::front)
-            .map(|(_, item)| item)
-    }
-
-    /// The same, to be changed in its place.
-    pub(crate) fn first_mut(&mut self) -> Option<&mut T> {
-        self.queues
-            .iter_mut()
-            .rev()
-            .find_map(VecDeque::front_mut)
-            .map(|(_, item)| item)
-    }
-
     /// Takes out the oldest of the most urgent items.
     pub(crate) fn pop(&mut self) -> Option<T> {
         let taken = self.queues.iter_mut().rev().find_map(take_first);
@@ -99,7 +81,8 @@ impl<T> Backlog<T> {
         self.items > 1 && (self.items > self.bounds.items || self.octets > self.bounds.octets)
     }
 
-    fn drop_least(&mut self) -> bool {
+    /// Drops the oldest of the least urgent items; whether there was one.
+    pub(crate) fn drop_least(&mut self) -> bool {
         let taken = self.queues.iter_mut().find_map(VecDeque::pop_front);
         self.account(taken).is_some()
     }
@@ -151,9 +134,8 @@ mod tests {
         ] {
             assert_eq!(push(&mut backlog, priority, text), 0);
         }
-        assert_eq!(backlog.first(), Some(&"stop"));
         assert_eq!(drain(&mut backlog), ["stop", "one", "two", "later"]);
-        assert!(backlog.is_empty() && backlog.first().is_none());
+        assert!(backlog.is_empty());
     }
 
     #[test]

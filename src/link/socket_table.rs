@@ -47,6 +47,19 @@ pub(super) fn file_of(inode: u64) -> String {
     format!("socket:[{inode}]")
 }
 
+/// The number in the kernel of one of our own sockets.
+#[cfg(unix)]
+pub(super) fn inode_of(socket: &impl std::os::fd::AsRawFd) -> Option<u64> {
+    let file = fs::read_link(format!("/proc/self/fd/{}", socket.as_raw_fd())).ok()?;
+    let number = file.to_str()?.strip_prefix("socket:[")?.strip_suffix(']')?;
+    number.parse().ok()
+}
+
+#[cfg(not(unix))]
+pub(super) fn inode_of<S>(_: &S) -> Option<u64> {
+    None
+}
+
 fn read(table: &str) -> impl Iterator<Item = Entry> + '_ {
     table.lines().skip(1).filter_map(|line| {
         let columns: Vec<&str> = line.split_whitespace().collect();

@@ -17,7 +17,7 @@ use super::Config;
 use super::attendance::{Attendance, Departure};
 use super::awaiting::{Awaiting, Waiter};
 use super::error::SendError;
-use super::links::{self, Links};
+use super::links::{Links, Survey};
 use super::mailbox::{Mailbox, MailboxLimits};
 use super::resident::Residents;
 use super::tap::Taps;
@@ -25,8 +25,9 @@ use crate::address::JausId;
 use crate::endpoint::{
     self, AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, first_sequence_at,
 };
-use crate::link::Slab;
 use crate::link::local::Process;
+use crate::link::udp::UdpLink;
+use crate::link::{Interface, Slab};
 use crate::wire::Priority;
 
 /// Messages of one burst that are gathered to leave together.
@@ -117,14 +118,12 @@ pub(super) struct Core {
     /// Messages sent since the last [`pump`](Self::pump).
     gathered: usize,
     driver: Option<Waker>,
-    follow_at: Option<Instant>,
     stop_at: Option<Instant>,
     stopped: bool,
 }
 
 impl Core {
     fn new(endpoint: Endpoint, links: Links, limits: MailboxLimits) -> Self {
-        let follow_at = links.follows().then(|| now() + links::INTERVAL);
         let mut core = Self {
             endpoint,
             links,
@@ -138,7 +137,6 @@ impl Core {
             busy: BTreeSet::new(),
             gathered: 0,
             driver: None,
-            follow_at,
             stop_at: None,
             stopped: false,
         };
@@ -156,17 +154,25 @@ impl Core {
         self.endpoint.set_static_peers(self.links.static_peers());
     }
 
-    /// Follows the host's interfaces, now and then.
-    fn follow(&mut self, now: Instant) {
-        if self.follow_at.is_none_or(|due| now < due) {
-            return;
+    /// Removes the links whose interfaces are gone; they, and the interfaces that want a link. None
+    /// of both after the node has stopped.
+    pub(super) fn retire_links(&mut self, survey: &Survey) -> (Vec<UdpLink>, Vec<Interface>) {
+        if self.stopped {
+            return (Vec::new(), Vec::new());
         }
-        self.follow_at = Some(now + links::INTERVAL);
-        if let Some(gone) = self.links.follow() {
-            for id in gone {
-                self.endpoint.remove_link(id);
-            }
+        let (gone, came) = self.links.retire(survey);
+        for (id, _) in &gone {
+            self.endpoint.remove_link(*id);
+        }
+        (gone.into_iter().map(|(_, link)| link).collect(), came)
+    }
+
+    /// Adds links that were opened on new interfaces, unless the node has stopped meanwhile.
+    pub(super) fn adopt_links(&mut self, links: Vec<UdpLink>, survey: Survey) {
+        if !self.stopped {
+            self.links.adopt(links, survey);
             self.announce_links();
+            self.wake_driver();
         }
     }
 
@@ -253,7 +259,6 @@ impl Core {
     pub(super) fn turn(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         self.driver = Some(cx.waker().clone());
         let now = now();
-        self.follow(now);
         let more = self.receive(now, cx);
         if self
             .endpoint
@@ -282,7 +287,6 @@ impl Core {
         [
             self.endpoint.poll_timeout(),
             self.links.poll_timeout(),
-            self.follow_at,
             self.stop_at,
         ]
         .into_iter()
@@ -301,6 +305,11 @@ impl Core {
                 link.transmit(&transmit);
             }
             transmitted = true;
+        }
+        if transmitted {
+            self.links
+                .iter_mut()
+                .for_each(|(_, link)| link.send_waiting());
         }
         self.deliver_all();
         transmitted

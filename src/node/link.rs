@@ -86,12 +86,20 @@ impl Link {
         }
     }
 
+    /// Queues what the endpoint gives out; [`send_waiting`](Self::send_waiting) comes after the last.
     pub(super) fn transmit(&mut self, transmit: &Transmit) {
         match self {
             Self::Udp(link) => link.transmit(transmit),
             Self::Tcp(link) => link.transmit(transmit),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.transmit(transmit),
+        }
+    }
+
+    /// Sends at once what does not gain by waiting for the driver's turn, which sends the rest.
+    pub(super) fn send_waiting(&mut self) {
+        if let Self::Udp(link) = self {
+            link.flush();
         }
     }
 

@@ -2,12 +2,12 @@
 //! one for all TCP connections, and one for each serial line.
 //!
 //! A board may start its node before its network is up, and Wi-Fi comes back with another
-//! address. So the node looks at the host's interfaces again every [`INTERVAL`], opens links on
-//! those that came and closes those that went.
+//! address. So a [`Follower`](super::follower::Follower) makes a [`Survey`] of the host when something
+//! has changed, without the node's lock, and gives it to the links.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::link::Link;
 use super::{Config, Peer, StartError};
@@ -18,17 +18,38 @@ use crate::link::tcp::TcpLink;
 use crate::link::udp::UdpLink;
 use crate::link::{Available, Error, Interface, Interfaces, interface};
 
-/// The time between two looks at the host's interfaces.
-pub(super) const INTERVAL: Duration = Duration::from_secs(2);
-
 /// The open links of a node.
 #[derive(Debug)]
 pub(super) struct Links {
     config: Config,
     open: BTreeMap<LinkId, Link>,
     next: LinkId,
-    /// Addresses where a link could not be opened; said once.
-    refused: BTreeSet<SocketAddr>,
+    routes: Routes,
+}
+
+/// The local address from which each configured peer is reached.
+type Routes = BTreeMap<SocketAddr, IpAddr>;
+
+/// What the host's interfaces and routes ask of a node's UDP links. It takes system calls to find
+/// out, and none to use it.
+#[derive(Debug)]
+pub(super) struct Survey {
+    wanted: Vec<Interface>,
+    routes: Routes,
+}
+
+impl Survey {
+    /// Looks at the host; `None` if it does not say which interfaces it has.
+    pub(super) fn make(config: &Config) -> Option<Self> {
+        let available = interface::list().ok()?;
+        let mut wanted = config.interfaces.present(&available, config.ip);
+        for &peer in &config.peers {
+            // Out of reach just now; it was not when the node started.
+            let _ = lead_to(peer, &config.interfaces, &mut wanted);
+        }
+        let routes = routes(config, &wanted);
+        Some(Self { wanted, routes })
+    }
 }
 
 impl Links {
@@ -39,13 +60,13 @@ impl Links {
             config: config.clone(),
             open: BTreeMap::new(),
             next: LinkId(0),
-            refused: BTreeSet::new(),
+            routes: Routes::new(),
         };
         if config.uses_udp() {
             links.open_udp()?;
         }
         if config.tcp.is_used() {
-            let link = TcpLink::open(&config.tcp.settings())?;
+            let link = TcpLink::open(&config.tcp.settings(&config.access))?;
             links.insert(Link::Tcp(link));
         }
         #[cfg(feature = "serial")]
@@ -71,8 +92,9 @@ impl Links {
             return Err(Error::NoMulticast(Available(chosen)).into());
         }
         for interface in &chosen {
-            self.add(interface)?;
+            self.insert(Link::Udp(UdpLink::open(interface, &udp)?));
         }
+        self.routes = routes(&config, &chosen);
         self.distribute_peers();
         Ok(())
     }
@@ -117,27 +139,33 @@ impl Links {
         self.config.uses_udp() && self.config.interfaces != Interfaces::Loopback
     }
 
-    /// Opens links on interfaces that came and closes those that went, which are returned;
-    /// `None` if nothing has changed.
-    pub(super) fn follow(&mut self) -> Option<Vec<LinkId>> {
-        let available = interface::list().ok()?;
-        let mut wanted = self.config.interfaces.present(&available, self.config.ip);
-        for &peer in &self.config.peers {
-            // Out of reach just now; it was not when the node started.
-            let _ = lead_to(peer, &self.config.interfaces, &mut wanted);
-        }
-        let gone = self.close_all_but(&wanted);
-        let mut came = false;
-        for interface in &wanted {
-            if !self.udp().any(|(_, link)| link.interface() == interface) {
-                came |= self.try_add(interface);
+    /// Removes the links whose interfaces are gone; they, and the interfaces that have no link yet.
+    pub(super) fn retire(&mut self, survey: &Survey) -> (Vec<(LinkId, UdpLink)>, Vec<Interface>) {
+        let is_gone = |link: &UdpLink| !survey.wanted.contains(link.interface());
+        let ids: Vec<_> = self
+            .udp()
+            .filter_map(|(id, link)| is_gone(link).then_some(id))
+            .collect();
+        let mut gone = Vec::new();
+        for id in ids {
+            if let Some(Link::Udp(link)) = self.open.remove(&id) {
+                tracing::info!(interface = %link.interface(), "link closed: the interface is gone");
+                gone.push((id, link));
             }
         }
-        if gone.is_empty() && !came {
-            return None;
+        let has_link =
+            |interface: &&Interface| !self.udp().any(|(_, link)| link.interface() == *interface);
+        let came = survey.wanted.iter().filter(has_link).cloned().collect();
+        (gone, came)
+    }
+
+    /// Adds links, and finds out again through which one each peer is reached.
+    pub(super) fn adopt(&mut self, links: Vec<UdpLink>, survey: Survey) {
+        for link in links {
+            self.insert(Link::Udp(link));
         }
+        self.routes = survey.routes;
         self.distribute_peers();
-        Some(gone)
     }
 
     /// Which peers with an id live where.
@@ -171,48 +199,12 @@ impl Links {
         by_udp.chain(by_tcp).collect()
     }
 
-    fn add(&mut self, interface: &Interface) -> Result<(), Error> {
-        let link = UdpLink::open(interface, &self.config.udp())?;
-        self.insert(Link::Udp(link));
-        Ok(())
-    }
-
     fn insert(&mut self, link: Link) {
         while self.open.contains_key(&self.next) {
             self.next = LinkId(self.next.0.wrapping_add(1));
         }
         self.open.insert(self.next, link);
         self.next = LinkId(self.next.0.wrapping_add(1));
-    }
-
-    fn try_add(&mut self, interface: &Interface) -> bool {
-        match self.add(interface) {
-            Ok(()) => {
-                self.refused.remove(&interface.at(0));
-                true
-            }
-            Err(error) => {
-                if self.refused.insert(interface.at(0)) {
-                    tracing::warn!(%interface, %error, "no link on an interface that came up");
-                }
-                false
-            }
-        }
-    }
-
-    fn close_all_but(&mut self, wanted: &[Interface]) -> Vec<LinkId> {
-        let is_gone = |link: &UdpLink| !wanted.contains(link.interface());
-        let gone: Vec<_> = self
-            .udp()
-            .filter(|(_, link)| is_gone(link))
-            .map(|(id, _)| id)
-            .collect();
-        for id in &gone {
-            if let Some(Link::Udp(link)) = self.open.remove(id) {
-                tracing::info!(interface = %link.interface(), "link closed: the interface is gone");
-            }
-        }
-        gone
     }
 
     /// Gives each link the peers without id that are reached through it.
@@ -235,17 +227,25 @@ impl Links {
         }
     }
 
-    /// The link that leads to an address; any if there is no way there just now.
-    fn link_to(&self, address: SocketAddr) -> Option<LinkId> {
-        let interfaces = || self.udp().map(|(_, link)| link.interface());
-        let local = way_to(address, interfaces());
-        let leads = |link: &UdpLink| Some(link.interface().address) == local;
+    /// The link that leads to a configured peer; any if there is no way there just now.
+    fn link_to(&self, peer: SocketAddr) -> Option<LinkId> {
+        let local = self.routes.get(&peer);
+        let leads = |link: &UdpLink| Some(&link.interface().address) == local;
         let link = self
             .udp()
             .find(|(_, link)| leads(link))
             .or_else(|| self.udp().next());
         link.map(|(id, _)| id)
     }
+}
+
+/// Through which of the interfaces each configured peer is reached.
+fn routes(config: &Config, interfaces: &[Interface]) -> Routes {
+    let route = |peer: &Peer| {
+        let address = peer.address();
+        Some((address, way_to(address, interfaces.iter())?))
+    };
+    config.peers.iter().filter_map(route).collect()
 }
 
 /// The local address from which a peer is reached: that of the interface whose network it is in,

@@ -1,7 +1,8 @@
 //! A running node: links, endpoint and attached components on tokio.
 //!
-//! A node lives in one task and starts no threads. On a current-thread runtime components,
-//! endpoint and sockets share one thread, which is the fastest way there is.
+//! A node lives in one task. On a current-thread runtime components, endpoint and sockets share one
+//! thread, which is the fastest way there is. Only what may block, a look at the host's interfaces
+//! and opening sockets and serial ports again, runs on a thread for blocking work, and rarely.
 //!
 //! ```
 //! use bytes::Bytes;
@@ -38,6 +39,7 @@ mod config;
 mod core;
 mod driver;
 mod error;
+mod follower;
 mod host;
 mod link;
 mod links;
@@ -69,6 +71,7 @@ pub use crate::link::local::{Address, Local, Process};
 
 use self::core::Shared;
 use self::driver::Driver;
+use self::follower::Follower;
 use self::links::Links;
 use self::local::Reception;
 use self::mailbox::Mailbox;
@@ -113,8 +116,12 @@ impl Node {
             Local::Off => None,
             Local::At(address) => Some(Door::open(address)?),
         };
+        let follows = links.follows();
         let shared = Arc::new(Shared::new(&config, links));
         runtime.spawn(Driver::new(shared.clone()));
+        if follows {
+            runtime.spawn(Follower::new(shared.clone(), &config).run());
+        }
         let local_place = door.as_ref().map(|door| door.place().into());
         if let Some(door) = door {
             tracing::info!(place = door.place(), "components of this host may attach");
@@ -160,19 +167,31 @@ impl Node {
         Ok(Port::new(id, mailbox, self.guard.clone()))
     }
 
-    /// The open UDP links; none after the node has stopped.
+    /// The open UDP links; none after the node has stopped. Reads the host's table of sockets:
+    /// nothing to ask many times a second.
     #[must_use]
     pub fn links(&self) -> Vec<LinkReport> {
-        let core = self.shared().lock();
         let report = |(id, link): (LinkId, &udp::UdpLink)| LinkReport {
             link: id,
             interface: link.interface().clone(),
             local: link.local(),
             group: link.group(),
             counters: *link.counters(),
-            kernel_drops: link.kernel_drops(),
+            kernel_drops: None,
         };
-        core.links.udp().map(report).collect()
+        let (mut reports, inodes): (Vec<_>, Vec<_>) = {
+            let core = self.shared().lock();
+            let links = core.links.udp();
+            links
+                .map(|(id, link)| (report((id, link)), link.inodes().to_vec()))
+                .unzip()
+        };
+        // Without the lock, which nothing may hold that asks the operating system.
+        let drops = udp::kernel_drops(inodes.iter().map(Vec::as_slice));
+        for (report, drops) in reports.iter_mut().zip(drops) {
+            report.kernel_drops = drops;
+        }
+        reports
     }
 
     /// The TCP connections, if they are configured and the node has not stopped.

@@ -1,5 +1,7 @@
 //! A component on the host's node is like one of the node's own process.
 
+use std::task::{Context, Waker};
+
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::component::{Component, Kind, Level};
@@ -225,4 +227,28 @@ async fn what_is_to_be_acknowledged_is_refused_where_there_is_no_room_for_it() {
     let outcome = within(there.deliver(message(&there, full.id(), b"x"))).await;
     assert_eq!(outcome, Err(Undelivered::Rejected(words)));
     assert_eq!(full.counters().dropped, 0);
+}
+
+#[tokio::test]
+async fn a_flush_ends_also_when_another_sender_writes_what_waits() {
+    let place = Place::new();
+    let _node = place.node();
+    let port = place.host().attach(33).await.unwrap();
+    let nobody = JausId::new(101, 1, 200);
+    // Written at once; the second waits for the task's turn.
+    port.send(message(&port, nobody, b"one")).unwrap();
+    port.send(message(&port, nobody, b"two")).unwrap();
+    let sender = port.sender();
+    let mut flushed = std::pin::pin!(sender.flushed());
+    let mut look = Context::from_waker(Waker::noop());
+    assert!(
+        flushed.as_mut().poll(&mut look).is_pending(),
+        "the second still waits"
+    );
+    // So much that its sender writes all that waits, before the task has had its turn.
+    port.send(message(&port, nobody, &[0; 20_000])).unwrap();
+    assert!(
+        flushed.as_mut().poll(&mut look).is_ready(),
+        "all is written"
+    );
 }

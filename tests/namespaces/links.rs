@@ -1,6 +1,8 @@
 //! What a node's links do on real networks: IPv6, networks without multicast, cables and addresses
 //! that come and go.
 
+use std::time::{Duration, Instant};
+
 use crate::hosts::{TwoHosts, on_two_hosts};
 use crate::roles::CARS;
 
@@ -126,6 +128,32 @@ fn a_cable_that_was_out_is_used_again() {
         let caller = hosts.start_with(1, "caller", "ip=6");
         let answer = caller.says("answered by");
         assert!(answer.starts_with("101.1.33 at [fe80::"), "{answer}");
+    });
+}
+
+#[test]
+fn an_interface_is_used_as_soon_as_it_has_an_address() {
+    const ROUNDS: usize = 5;
+    let test = "links::an_interface_is_used_as_soon_as_it_has_an_address";
+    on_two_hosts(test, |hosts| {
+        hosts.ip(0, &["address", "flush", "dev", "jaus0"]);
+        let follower = hosts.start(0, "follower");
+        follower.says("links at 127.0.0.1");
+        let started = Instant::now();
+        for round in 0..ROUNDS {
+            let address = format!("10.213.77.{}", 10 + round);
+            hosts.ip(
+                0,
+                &["address", "add", &format!("{address}/24"), "dev", "jaus0"],
+            );
+            while !follower.says("links at").contains(&address) {}
+            hosts.ip(0, &["address", "flush", "dev", "jaus0"]);
+            while follower.says("links at").contains(&address) {}
+        }
+        // Polling would take almost its interval of 2 s for each of the changes, which come when
+        // the node has just looked.
+        let each = started.elapsed() / (2 * ROUNDS as u32);
+        assert!(each < Duration::from_secs(1), "{each:?} for each change");
     });
 }
 

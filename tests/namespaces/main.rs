@@ -150,6 +150,7 @@ fn a_process_that_plays_a_node() {
     hosts::play(async |role| match role {
         "echo" => roles::echo().await,
         "caller" => roles::call().await,
+        "follower" => roles::follow().await,
         "sink" => roles::sink().await,
         "flood" => roles::flood().await,
         "listener" => roles::listen().await,

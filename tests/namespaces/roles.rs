@@ -50,6 +50,25 @@ pub(crate) async fn echo() {
     }
 }
 
+/// Says where it has links, each time that this changes.
+pub(crate) async fn follow() {
+    let node = Node::start(config(101)).unwrap();
+    let mut known = String::new();
+    loop {
+        let locals: Vec<_> = node
+            .links()
+            .iter()
+            .map(|link| link.local.to_string())
+            .collect();
+        let now = locals.join(" ");
+        if now != known {
+            println!("\nlinks at {now}");
+            known = now;
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+}
+
 /// Asks everyone until somebody answers.
 pub(crate) async fn call() {
     let node = Node::start(config(102)).unwrap();
@@ -188,6 +207,7 @@ pub(crate) async fn train() {
     link.transmit(&transmit);
     transmit.segment = Some(CAR / 3);
     link.transmit(&transmit);
+    poll_fn(|cx| link.poll_flush(cx)).await;
     println!(
         "sent {} with {} errors",
         link.counters().sent,

@@ -3,6 +3,7 @@
 //! A link is opened per interface and bound to one address of it, so choosing an interface
 //! ([`Interfaces`]) also chooses the address that peers see.
 
+mod changes;
 mod choice;
 mod place;
 
@@ -11,6 +12,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV6, UdpSocket};
 
 use if_addrs::{IfAddr, IfOperStatus};
 
+pub(crate) use changes::Changes;
 pub use choice::{Interfaces, Ip};
 pub use place::Place;
 

@@ -21,6 +21,7 @@ use std::time::{Duration, Instant};
 use bytes::{Buf, Bytes};
 use serial2_tokio::SerialPort;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::task::{JoinHandle, spawn_blocking};
 
 pub use error::{Ports, SerialError};
 pub use settings::{FlowControl, Parity, Settings};
@@ -86,8 +87,10 @@ pub struct SerialLink {
 /// A port that is gone.
 #[derive(Debug)]
 struct Away {
-    /// When it is opened again; `None` until the clock is known.
+    /// When it is opened again; `None` until the clock is known, and while an attempt is under way.
     retry_at: Option<Instant>,
+    /// The attempt to open it, on a thread of its own: a driver may take its time.
+    opening: Option<JoinHandle<io::Result<SerialPort>>>,
     pause: Duration,
     /// Whether the other side has been told.
     told: bool,
@@ -186,7 +189,7 @@ impl SerialLink {
         now: Instant,
         mut arrived: impl FnMut(Arrival),
     ) -> bool {
-        self.open_again(now);
+        self.open_again(cx, now);
         let mut more = true;
         for _ in 0..BATCH {
             if self.poll_read(cx).is_pending() {
@@ -198,7 +201,9 @@ impl SerialLink {
             }
         }
         if let Err(away) = &mut self.port {
-            away.retry_at.get_or_insert(now + away.pause);
+            if away.opening.is_none() {
+                away.retry_at.get_or_insert(now + away.pause);
+            }
             if !std::mem::replace(&mut away.told, true) {
                 arrived(Arrival::Lost);
             }
@@ -236,21 +241,36 @@ impl SerialLink {
         self.counters.port_away += self.outbox.len() as u64 + u64::from(!self.leaving.is_empty());
         self.outbox = Backlog::new(OUTBOX);
         self.leaving = Bytes::new();
-        self.port = Err(Away {
+        let away = Err(Away {
             retry_at: None,
+            opening: None,
             pause: FIRST_PAUSE,
             told: false,
         });
+        let port = std::mem::replace(&mut self.port, away);
+        // Closing waits for what the driver has not written yet.
+        spawn_blocking(move || drop(port));
     }
 
-    fn open_again(&mut self, now: Instant) {
+    fn open_again(&mut self, cx: &mut Context<'_>, now: Instant) {
         let Err(away) = &mut self.port else {
             return;
         };
-        if away.retry_at.is_none_or(|at| now < at) {
-            return;
+        if away.retry_at.is_some_and(|at| at <= now) {
+            away.retry_at = None;
+            let settings = self.settings.clone();
+            away.opening = Some(spawn_blocking(move || settings.open()));
         }
-        match self.settings.open() {
+        let opened = away
+            .opening
+            .as_mut()
+            .map(|opening| Pin::new(opening).poll(cx));
+        let Some(Poll::Ready(opened)) = opened else {
+            return;
+        };
+        away.opening = None;
+        // An attempt that the runtime gave up has failed too.
+        match opened.map_err(io::Error::from).flatten() {
             Ok(port) => {
                 tracing::info!(device = self.settings.device, "serial port is back");
                 self.port = Ok(port);

@@ -42,6 +42,10 @@ pub enum Closed {
     /// It had said nothing valid, and its place was needed.
     #[error("it had said nothing valid and its place was needed")]
     Silent,
+    /// It was idle for longest at the network address that held the most connections, and its place
+    /// was needed.
+    #[error("it was idle, others from its address hold the most places, and its place was needed")]
+    Idle,
     /// The operating system's words.
     #[error("{0}")]
     Io(io::Error),
@@ -50,11 +54,15 @@ pub enum Closed {
 #[derive(Debug)]
 pub(super) struct Connection {
     stream: TcpStream,
+    /// The address of this end, unless the connection broke as soon as it stood.
+    pub(super) local: Option<SocketAddr>,
     pub(super) dialed: bool,
     pub(super) opened: Instant,
     decoder: Decoder,
     /// Frames received.
     pub(super) received: u64,
+    /// When the latest came.
+    pub(super) heard: Option<Instant>,
     /// The version octet that our direction began with.
     spoken: Option<Version>,
     backlog: Backlog<Bytes>,
@@ -79,11 +87,13 @@ impl Connection {
             .with_interval(Duration::from_secs(5));
         SockRef::from(&stream).set_tcp_keepalive(&keepalive)?;
         Ok(Self {
+            local: stream.local_addr().ok(),
             stream,
             dialed,
             opened: now,
             decoder: Decoder::new(),
             received: 0,
+            heard: None,
             spoken: None,
             backlog: Backlog::new(BACKLOG),
             leaving: BytesMut::new(),
@@ -98,6 +108,18 @@ impl Connection {
     /// Messages that wait for the other side.
     pub(super) const fn waiting(&self) -> usize {
         self.backlog.len()
+    }
+
+    /// Octets of them.
+    pub(super) const fn waiting_octets(&self) -> usize {
+        self.backlog.octets()
+    }
+
+    /// Drops the oldest of the least urgent messages that wait.
+    pub(super) fn drop_least(&mut self) {
+        if self.backlog.drop_least() {
+            self.count_lost(1);
+        }
     }
 
     /// Queues what [`jtcp::encode`](crate::wire::jtcp::encode) wrote. Whether it could be: a
@@ -119,14 +141,18 @@ impl Connection {
         }
         let octets = message.len();
         let lost = self.backlog.push(priority, octets, message);
-        self.overflows += lost;
-        if lost > 0 {
-            self.stuck.get_or_insert(None);
-        }
+        self.count_lost(lost);
         if self.backlog.octets() >= self.write_at {
             self.write_straight();
         }
         true
+    }
+
+    fn count_lost(&mut self, messages: u64) {
+        self.overflows += messages;
+        if messages > 0 {
+            self.stuck.get_or_insert(None);
+        }
     }
 
     /// Writes what the kernel takes without asking the runtime, which learns only between tasks
@@ -202,11 +228,16 @@ impl Connection {
     }
 
     /// The next frame, or why there will be none.
-    pub(super) fn poll_recv(&mut self, cx: &mut Context<'_>) -> Poll<Result<Frame, Closed>> {
+    pub(super) fn poll_recv(
+        &mut self,
+        cx: &mut Context<'_>,
+        now: Instant,
+    ) -> Poll<Result<Frame, Closed>> {
         loop {
             match self.decoder.next_frame() {
                 Ok(Some(frame)) => {
                     self.received += 1;
+                    self.heard = Some(now);
                     return Poll::Ready(Ok(frame));
                 }
                 Ok(None) => {}
@@ -244,10 +275,5 @@ impl Connection {
                 Err(e) => return Poll::Ready(Err(Closed::Io(e))),
             }
         }
-    }
-
-    /// The address of this end.
-    pub(super) fn local(&self) -> Option<SocketAddr> {
-        self.stream.local_addr().ok()
     }
 }

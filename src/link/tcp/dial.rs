@@ -58,10 +58,18 @@ impl Dial {
         }
     }
 
-    /// Whether what is sent now may wait for a connection: before the first attempt and during
-    /// each. In the pauses it would wait for too long to be of use.
-    pub(super) const fn takes(&self) -> bool {
-        matches!(self.state, State::Connecting { .. } | State::Pausing(None))
+    /// Whether a connection stands.
+    pub(super) const fn is_connected(&self) -> bool {
+        matches!(self.state, State::Connected)
+    }
+
+    /// Keeps a message for the connection, before the first attempt and during each. In the pauses
+    /// it would wait for too long to be of use. Returns how many messages were lost, this one or
+    /// others, or `None` if none is kept.
+    pub(super) fn keep(&mut self, priority: Priority, payload: &Bytes) -> Option<u64> {
+        let keeps = matches!(self.state, State::Connecting { .. } | State::Pausing(None));
+        let waiting = (priority, payload.clone());
+        keeps.then(|| self.waiting.push(priority, payload.len(), waiting))
     }
 
     /// When to poll again, if nothing happens before.

@@ -14,13 +14,22 @@
 //! [`STUCK`] since the first loss, its connection is closed. Messages
 //! are collected until the node has nothing more to send just now, and written with one call.
 //!
+//! All backlogs together have a bound too, at which the largest gives way.
+//!
 //! # Connecting
 //!
 //! An attempt may take [`CONNECT_TIMEOUT`]. The pause after it is [`FIRST_PAUSE`] and doubles with
 //! each failure up to [`LONGEST_PAUSE`], a quarter more or less by chance; a connection on
-//! which something valid came begins anew. What is sent while an attempt is under way waits for it,
-//! and is lost when it fails; what is sent in the pauses is lost at once. Both is counted.
+//! which something valid came begins anew. What is sent while an attempt is under way, to the peer or
+//! to everyone, waits for it, and is lost when it fails; what is sent in the pauses is lost at once.
+//! Both is counted.
+//!
+//! # Accepting
+//!
+//! [`Settings::access`] is asked first. The places for accepted connections are shared between
+//! network addresses: see [`Settings::max_accepted`] and [`Settings::max_per_address`].
 
+mod admission;
 mod connection;
 mod dial;
 mod settings;
@@ -31,6 +40,7 @@ use std::net::SocketAddr;
 use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
 
+use bytes::Bytes;
 use socket2::{Domain, Protocol, Socket, Type};
 use tokio::net::{TcpListener, TcpStream};
 
@@ -38,16 +48,22 @@ pub use connection::Closed;
 pub use settings::{CONNECT_TIMEOUT, FIRST_PAUSE, HANDSHAKE, LONGEST_PAUSE, STUCK, Settings};
 
 use super::Error;
-use crate::endpoint::{Remote, To, Transmit};
-use crate::wire::Frame;
+use crate::endpoint::{Access, Remote, To, Transmit};
+use crate::wire::{Frame, Priority};
+use admission::{Admission, Place, Quota};
 use connection::Connection;
 use dial::Dial;
+use settings::MAX_WAITING;
 
-/// Frames taken from one connection before the others have their turn.
+/// Frames taken from one connection, and connections accepted, before the others have their turn.
 const BATCH: usize = 32;
 /// The pause after the operating system refused to accept a connection, such as for want of file
 /// descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_secs(1);
+/// A backlog up to so many octets is not worth adding up all of them.
+const SMALL: usize = 64 * 1024;
+/// The time between two warnings that places are scarce.
+const WARNING_PAUSE: Duration = Duration::from_secs(60);
 
 /// What a TCP link has done since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,6 +73,10 @@ pub struct Counters {
     pub accepted: u64,
     /// Connections that others wanted to open, refused because there were enough.
     pub refused: u64,
+    /// Connections that others wanted to open, refused because their network address may not.
+    pub denied: u64,
+    /// Connections closed to make room for others.
+    pub displaced: u64,
     /// Connections opened to configured peers.
     pub connected: u64,
     /// Attempts that failed.
@@ -118,7 +138,10 @@ pub enum Arrival {
 pub struct TcpLink {
     listener: Option<TcpListener>,
     local: Option<SocketAddr>,
-    max_accepted: usize,
+    quota: Quota,
+    access: Access,
+    /// When the latest warning about scarce places was written.
+    warned: Option<Instant>,
     accept_after: Option<Instant>,
     dials: Vec<Dial>,
     connections: BTreeMap<SocketAddr, Connection>,
@@ -145,7 +168,12 @@ impl TcpLink {
         Ok(Self {
             listener,
             local,
-            max_accepted: settings.max_accepted,
+            quota: Quota {
+                total: settings.max_accepted,
+                per_address: settings.max_per_address,
+            },
+            access: settings.access.clone(),
+            warned: None,
             accept_after: None,
             dials,
             connections: BTreeMap::new(),
@@ -176,7 +204,7 @@ impl TcpLink {
             .iter()
             .map(|(&remote, connection)| ConnectionReport {
                 remote,
-                local: connection.local(),
+                local: connection.local,
                 dialed: connection.dialed,
                 received: connection.received,
                 waiting: connection.waiting(),
@@ -199,12 +227,7 @@ impl TcpLink {
             To::Peer(Remote::Socket(peer)) => self.send_to(peer, transmit),
             // No peer of this link.
             To::Peer(Remote::Line) => {}
-            To::Group => {
-                for connection in self.connections.values_mut() {
-                    self.counters
-                        .count(connection.send(transmit.priority, &transmit.payload));
-                }
-            }
+            To::Group => self.send_to_all(transmit.priority, &transmit.payload),
         }
     }
 
@@ -212,12 +235,35 @@ impl TcpLink {
         let (priority, payload) = (transmit.priority, &transmit.payload);
         if let Some(connection) = self.connections.get_mut(&peer) {
             self.counters.count(connection.send(priority, payload));
-        } else if let Some(dial) = self.dial(peer).filter(|dial| dial.takes()) {
-            let waiting = (priority, payload.clone());
-            let lost = dial.waiting.push(priority, payload.len(), waiting);
-            self.counters.send_overflows += lost;
+            if connection.waiting_octets() > SMALL {
+                self.bound_waiting();
+            }
+        } else if let Some(dial) = self.dial(peer) {
+            let kept = dial.keep(priority, payload);
+            self.counters.count_kept(kept);
         } else {
             self.counters.not_connected += 1;
+        }
+    }
+
+    /// Sends on every connection, also on those that are just being opened.
+    fn send_to_all(&mut self, priority: Priority, payload: &Bytes) {
+        for connection in self.connections.values_mut() {
+            self.counters.count(connection.send(priority, payload));
+        }
+        for dial in self.dials.iter_mut().filter(|dial| !dial.is_connected()) {
+            self.counters.count_kept(dial.keep(priority, payload));
+        }
+        self.bound_waiting();
+    }
+
+    /// Keeps what waits for all connections within [`MAX_WAITING`].
+    fn bound_waiting(&mut self) {
+        let octets = |connection: &Connection| connection.waiting_octets();
+        while self.connections.values().map(octets).sum::<usize>() > MAX_WAITING
+            && let Some(most) = self.connections.values_mut().max_by_key(|c| octets(c))
+        {
+            most.drop_least();
         }
     }
 
@@ -261,16 +307,15 @@ impl TcpLink {
         now: Instant,
         mut arrived: impl FnMut(Arrival),
     ) -> bool {
-        self.accept(cx, now);
+        let mut more = self.accept(cx, now);
         self.connect(cx, now);
-        let mut more = false;
         for (&remote, connection) in &mut self.connections {
             if connection.stuck_at().is_some_and(|at| at <= now) {
                 self.closed.push_back((remote, Closed::Stuck));
                 continue;
             }
             let mut batch = 0;
-            while let Poll::Ready(result) = connection.poll_recv(cx) {
+            while let Poll::Ready(result) = connection.poll_recv(cx, now) {
                 match result {
                     Ok(frame) => arrived(Arrival::Frame {
                         remote,
@@ -306,6 +351,7 @@ impl TcpLink {
         self.counters.closed += 1;
         self.counters.malformed += u64::from(matches!(why, Closed::Malformed(_)));
         self.counters.stuck += u64::from(matches!(why, Closed::Stuck));
+        self.counters.displaced += u64::from(matches!(why, Closed::Silent | Closed::Idle));
         self.counters.send_overflows += connection.overflows;
         let dialed = connection.dialed;
         if dialed && let Some(dial) = self.dial(remote) {
@@ -314,49 +360,80 @@ impl TcpLink {
         dialed
     }
 
-    fn accept(&mut self, cx: &mut Context<'_>, now: Instant) {
+    /// Takes in connections; whether there may be more than one turn's share.
+    fn accept(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
         if self.accept_after.is_some_and(|after| now < after) {
-            return;
+            return false;
         }
         self.accept_after = None;
-        while let Some(listener) = &self.listener {
+        for _ in 0..BATCH {
+            let Some(listener) = &self.listener else {
+                return false;
+            };
             match listener.poll_accept(cx) {
-                Poll::Pending => return,
-                Poll::Ready(Ok((stream, remote))) => self.take_in(stream, remote, now),
+                Poll::Pending => return false,
+                Poll::Ready(Ok((stream, remote))) => self.admit(stream, remote, now),
                 Poll::Ready(Err(error)) if is_of_the_peer(&error) => {}
                 Poll::Ready(Err(error)) => {
                     tracing::warn!(%error, "connections cannot be accepted just now");
                     self.accept_after = Some(now + ACCEPT_PAUSE);
-                    return;
+                    return false;
                 }
             }
         }
+        true
     }
 
-    fn take_in(&mut self, stream: TcpStream, remote: SocketAddr, now: Instant) {
-        let accepted = self.connections.values().filter(|c| !c.dialed).count();
-        if accepted >= self.max_accepted && !self.make_room(now) {
-            self.counters.refused += 1;
-            tracing::debug!(%remote, limit = self.max_accepted, "connection refused");
+    /// Takes in a connection that somebody has opened, or refuses it.
+    fn admit(&mut self, stream: TcpStream, remote: SocketAddr, now: Instant) {
+        if !self.access.allows_address(remote.ip()) {
+            self.counters.denied += 1;
+            tracing::debug!(%remote, "connection denied");
             return;
+        }
+        let accepted = self
+            .connections
+            .iter()
+            .filter(|(_, connection)| !connection.dialed);
+        let places: Vec<_> = accepted
+            .map(|(&remote, connection)| Place {
+                remote,
+                opened: connection.opened,
+                heard: connection.heard,
+            })
+            .collect();
+        match self.quota.admit(remote, &places, now) {
+            Admission::Admit => {}
+            Admission::ReplaceSilent(other) => self.displace(other, Closed::Silent, now),
+            Admission::ReplaceIdle(other) => self.displace(other, Closed::Idle, now),
+            Admission::Refuse => {
+                self.counters.refused += 1;
+                self.warn_of_scarcity(now, "a connection was refused", remote);
+                return;
+            }
         }
         self.counters.accepted += 1;
         self.open_connection(stream, remote, false, now);
     }
 
-    /// Closes the oldest connection that has had its time to say something valid, and has not.
-    fn make_room(&mut self, now: Instant) -> bool {
-        let is_silent = |connection: &Connection| {
-            let age = now.saturating_duration_since(connection.opened);
-            !connection.dialed && connection.received == 0 && age >= HANDSHAKE
-        };
-        let silent = self.connections.iter().filter(|(_, c)| is_silent(c));
-        let oldest = silent.min_by_key(|(_, connection)| connection.opened);
-        let Some((&remote, _)) = oldest else {
-            return false;
-        };
-        self.close(now, remote, &Closed::Silent);
-        true
+    /// Closes a connection whose place is needed.
+    fn displace(&mut self, remote: SocketAddr, why: Closed, now: Instant) {
+        self.warn_of_scarcity(now, "a connection was closed to make room", remote);
+        self.close(now, remote, &why);
+        // For the endpoint, which has to forget the path.
+        self.closed.push_back((remote, why));
+    }
+
+    /// Warns once in a while: whoever opens connections shall not fill the log.
+    fn warn_of_scarcity(&mut self, now: Instant, what: &str, remote: SocketAddr) {
+        let limit = self.quota.total;
+        let is_due = |warned: Instant| now.saturating_duration_since(warned) >= WARNING_PAUSE;
+        if self.warned.is_none_or(is_due) {
+            self.warned = Some(now);
+            tracing::warn!(%remote, limit, "TCP connections are scarce: {what}");
+        } else {
+            tracing::debug!(%remote, limit, "TCP connections are scarce: {what}");
+        }
     }
 
     fn connect(&mut self, cx: &mut Context<'_>, now: Instant) {
@@ -408,6 +485,14 @@ impl TcpLink {
 }
 
 impl Counters {
+    /// Counts a message for a peer to which there is no connection; see [`Dial::keep`].
+    const fn count_kept(&mut self, lost: Option<u64>) {
+        match lost {
+            Some(lost) => self.send_overflows += lost,
+            None => self.not_connected += 1,
+        }
+    }
+
     /// Counts a message that a connection has taken, or has not.
     const fn count(&mut self, taken: bool) {
         if taken {

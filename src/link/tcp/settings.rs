@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
+use crate::endpoint::Access;
 use crate::link::backlog::Bounds;
 
 /// How a [`TcpLink`](super::TcpLink) is set up.
@@ -13,8 +14,14 @@ pub struct Settings {
     /// Whom to connect to, again and again when a connection is lost.
     pub connect: Vec<SocketAddr>,
     /// The most connections that others may open. With so many, one that has not said anything
-    /// valid for [`HANDSHAKE`] gives way to a new one; else the new one is refused.
+    /// valid for [`HANDSHAKE`] gives way to a new one, or else the longest idle connection of the
+    /// network address that holds the most, if that is not the newcomer's own.
     pub max_accepted: usize,
+    /// The most connections that may be opened from one IPv4 address, or from the 64-bit network of
+    /// an IPv6 address.
+    pub max_per_address: usize,
+    /// Whose connections are accepted; those of other network addresses are closed at once.
+    pub access: Access,
 }
 
 impl Default for Settings {
@@ -23,6 +30,8 @@ impl Default for Settings {
             listen: None,
             connect: Vec::new(),
             max_accepted: 64,
+            max_per_address: 32,
+            access: Access::default(),
         }
     }
 }
@@ -43,6 +52,10 @@ pub const LONGEST_PAUSE: Duration = Duration::from_secs(15);
 
 /// How long a peer may take nothing while messages for it are lost, before its connection is closed.
 pub const STUCK: Duration = Duration::from_secs(10);
+
+/// The most octets that may wait for all connections together. Then the one for which the most waits
+/// loses the oldest of its least urgent messages.
+pub(super) const MAX_WAITING: usize = 16 << 20;
 
 /// How much may wait for one connection. Then the oldest of the least urgent goes.
 pub(super) const BACKLOG: Bounds = Bounds {

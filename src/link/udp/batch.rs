@@ -1,9 +1,9 @@
 //! Several datagrams with one call into the kernel: Linux's generic segmentation and receive
-//! offload (GSO, GRO) and `recvmmsg`.
+//! offload (GSO, GRO), `sendmmsg` and `recvmmsg`.
 //!
-//! A call costs far more than a datagram's octets. So a large message leaves as one train of equal
+//! A call costs far more than a datagram's octets. So a large message leaves as one batch of equal
 //! datagrams, which the kernel (or the network card) takes apart, and arrives as one, which we take
-//! apart; and small datagrams are fetched several at a time.
+//! apart; small datagrams to several peers leave together; and several are fetched at a time.
 
 use std::collections::VecDeque;
 use std::io::{self, IoSlice, IoSliceMut};
@@ -17,32 +17,35 @@ use nix::sys::socket::{
     recvmmsg, sendmsg, setsockopt, sockopt,
 };
 
+use rustix::net::{MMsgHdr, SendAncillaryBuffer, SendFlags, SocketAddrAny, sendmmsg};
+
+use super::send::GsoBatch;
 use super::socket::Socket;
 use crate::link::Slab;
 use crate::link::slab::LONGEST;
 
-/// Datagrams, or trains of them, that one call fetches. Each needs room for the longest.
+/// Datagrams, or batches of them, that one call fetches. Each needs room for the longest.
 const FETCHED: usize = 8;
 
-/// Lets the kernel hand over datagrams of one sender in trains.
+/// Lets the kernel hand over datagrams of one sender in batches.
 pub(super) fn prepare(socket: &UdpSocket) {
     if let Err(error) = setsockopt(socket, sockopt::UdpGroSegment, &true) {
         // Linux before 5.0. They come one by one then.
-        tracing::debug!(%error, "no trains of datagrams are received");
+        tracing::debug!(%error, "no batches of datagrams are received");
     }
 }
 
-/// Sends a train of datagrams of `segment` octets each, of which the last may be shorter. All of
+/// Sends a batch of datagrams of `segment` octets each, of which the last may be shorter. All of
 /// it goes or nothing.
 pub(super) fn send(
     socket: &UdpSocket,
     peer: SocketAddr,
-    train: &[u8],
+    batch: &[u8],
     segment: u16,
 ) -> io::Result<usize> {
     let peer = SockaddrStorage::from(peer);
     let segment = ControlMessage::UdpGsoSegments(&segment);
-    let octets = [IoSlice::new(train)];
+    let octets = [IoSlice::new(batch)];
     let flags = MsgFlags::MSG_DONTWAIT;
     Ok(sendmsg(
         socket.as_raw_fd(),
@@ -53,8 +56,32 @@ pub(super) fn send(
     )?)
 }
 
-/// If the error means that a train was refused because it is one: the most octets of each datagram
-/// of trains that may yet be taken.
+/// Sends batches of one datagram each with one call; how many were taken, which is at least one.
+///
+/// # Errors
+/// Of the first; the kernel reports that of a later one with the next call.
+pub(super) fn send_many<'a>(
+    socket: &UdpSocket,
+    datagrams: impl Iterator<Item = &'a GsoBatch> + Clone,
+) -> io::Result<usize> {
+    let octets: Vec<_> = datagrams
+        .clone()
+        .map(|d| [IoSlice::new(&d.octets)])
+        .collect();
+    let peers: Vec<SocketAddrAny> = datagrams.map(|d| d.peer.into()).collect();
+    let mut controls: Vec<_> = peers
+        .iter()
+        .map(|_| SendAncillaryBuffer::default())
+        .collect();
+    let parts = peers.iter().zip(&octets).zip(&mut controls);
+    let mut headers: Vec<_> = parts
+        .map(|((peer, octets), control)| MMsgHdr::new_with_addr(peer, octets, control))
+        .collect();
+    Ok(sendmmsg(socket, &mut headers, SendFlags::DONTWAIT)?)
+}
+
+/// If the error means that a batch was refused because it is one: the most octets of each datagram
+/// of batches that may yet be taken.
 pub(super) fn limit_after(error: &io::Error, segment: usize) -> Option<usize> {
     match Errno::from_raw(error.raw_os_error()?) {
         // A network card without checksums; an old kernel.
@@ -65,7 +92,7 @@ pub(super) fn limit_after(error: &io::Error, segment: usize) -> Option<usize> {
     }
 }
 
-/// Fetches what has arrived, up to [`FETCHED`] trains.
+/// Fetches what has arrived, up to [`FETCHED`] batches.
 ///
 /// # Errors
 /// `WouldBlock` if nothing has arrived.
@@ -105,13 +132,13 @@ fn fetch(
         None,
     )?;
     let mut count = 0;
-    for train in fetched {
+    for batch in fetched {
         count += 1;
-        let Some(peer) = train.address.as_ref().and_then(address) else {
+        let Some(peer) = batch.address.as_ref().and_then(address) else {
             continue;
         };
-        let segment = segment(&train);
-        let octets = train.iovs().next().unwrap_or_default();
+        let segment = segment(&batch);
+        let octets = batch.iovs().next().unwrap_or_default();
         if octets.is_empty() {
             arrived.push_back((peer, Bytes::new()));
         }
@@ -127,15 +154,15 @@ fn slots(room: &mut [u8]) -> [[IoSliceMut<'_>; 1]; FETCHED] {
     std::array::from_fn(|_| [IoSliceMut::new(parts.next().unwrap_or_default())])
 }
 
-/// The octets of each datagram of a train but the last.
-fn segment(train: &RecvMsg<'_, '_, SockaddrStorage>) -> usize {
-    let told = train.cmsgs().ok().and_then(|mut messages| {
+/// The octets of each datagram of a batch but the last.
+fn segment(batch: &RecvMsg<'_, '_, SockaddrStorage>) -> usize {
+    let segment = batch.cmsgs().ok().and_then(|mut messages| {
         messages.find_map(|message| match message {
             ControlMessageOwned::UdpGroSegments(octets) => usize::try_from(octets).ok(),
             _ => None,
         })
     });
-    told.filter(|&octets| octets > 0).unwrap_or(LONGEST)
+    segment.filter(|&octets| octets > 0).unwrap_or(LONGEST)
 }
 
 fn address(storage: &SockaddrStorage) -> Option<SocketAddr> {

@@ -16,7 +16,6 @@ mod socket;
 use std::collections::VecDeque;
 use std::io;
 use std::net::SocketAddr;
-use std::path::PathBuf;
 
 use bytes::Bytes;
 
@@ -25,7 +24,7 @@ use socket::Socket;
 pub use settings::{Broadcasts, PortTaken, Settings};
 
 use super::backlog::{Backlog, Bounds};
-use super::socket_table::{self, Entry};
+use super::socket_table;
 use super::{Error, Interface};
 
 /// What a link has done since it was opened.
@@ -42,6 +41,8 @@ pub struct Counters {
     pub sent: u64,
     /// Octets in them.
     pub sent_octets: u64,
+    /// Calls into the operating system for all that.
+    pub send_calls: u64,
     /// Errors while receiving, such as ICMP answers to what we sent.
     pub receive_errors: u64,
     /// Datagrams that the operating system refused to send.
@@ -58,22 +59,29 @@ const OUTBOX: Bounds = Bounds {
 
 const CAN_BATCH: bool = cfg!(all(feature = "udp-batch", target_os = "linux"));
 
-/// The most datagrams that Linux takes with one call.
-const LONGEST_TRAIN: usize = 64;
+/// The most datagrams to one peer that Linux takes as one batch.
+const MAX_SEGMENTS: usize = 64;
 
 /// The sockets of one interface. Must be opened within a tokio runtime.
 #[derive(Debug)]
 pub struct UdpLink {
     interface: Interface,
     local: SocketAddr,
-    /// The unicast socket, which sends everything, and then those of `groups`, which only hear.
+    /// The unicast socket, which is always there and sends everything, and then those of `groups`,
+    /// which only hear.
     sockets: Vec<Socket>,
     groups: Vec<SocketAddr>,
+    /// Of the sockets, where the kernel numbers them.
+    inodes: Vec<u64>,
     peers: Vec<SocketAddr>,
-    outbox: Backlog<send::Train>,
+    outbox: Backlog<send::GsoBatch>,
+    /// On its way into the kernel; nothing overtakes it.
+    leaving: VecDeque<send::GsoBatch>,
+    /// Whether the kernel has no room for the next of `leaving`.
+    full: bool,
     /// Several datagrams to one peer leave with one call if each has no more octets than this.
-    train_limit: usize,
-    /// Whether several datagrams are fetched with one call.
+    gso_limit: usize,
+    /// Whether several datagrams are sent and fetched with one call.
     batch: bool,
     /// Fetched already; all from one call.
     arrived: VecDeque<(SocketAddr, Bytes)>,
@@ -112,14 +120,20 @@ impl UdpLink {
                 .for_each(|socket| batch::prepare(socket.get()));
         }
         tracing::info!(%interface, %local, ?groups, "link opened");
+        let inodes = sockets
+            .iter()
+            .filter_map(|s| socket_table::inode_of(s.get()));
         Ok(Self {
+            inodes: inodes.collect(),
             interface: interface.clone(),
             local,
             sockets,
             groups,
             peers: Vec::new(),
             outbox: Backlog::new(OUTBOX),
-            train_limit: if batch { usize::MAX } else { 0 },
+            leaving: VecDeque::new(),
+            full: false,
+            gso_limit: if batch { usize::MAX } else { 0 },
             batch,
             arrived: VecDeque::new(),
             turn: 0,
@@ -156,29 +170,19 @@ impl UdpLink {
     /// How many datagrams to one peer are best given to [`transmit`](Self::transmit) at once.
     #[must_use]
     pub const fn max_segments(&self) -> usize {
-        if self.batch { LONGEST_TRAIN } else { 1 }
+        if self.batch { MAX_SEGMENTS } else { 1 }
     }
 
-    /// How many datagrams the kernel dropped because this process did not read them in time, if
-    /// it tells (Linux does). Reads a table of all sockets: nothing to ask every second.
+    /// The kernel's numbers of its sockets, for [`kernel_drops`]; none where it has no such numbers.
     #[must_use]
-    pub fn kernel_drops(&self) -> Option<u64> {
-        let files: Vec<PathBuf> = self.sockets.iter().filter_map(file).collect();
-        let ours = |entry: &Entry| files.contains(&socket_table::file_of(entry.inode).into());
-        let table = socket_table::all();
-        let drops: Vec<u64> = table.iter().filter(|e| ours(e)).map(|e| e.drops).collect();
-        (!drops.is_empty()).then(|| drops.iter().sum())
+    pub fn inodes(&self) -> &[u64] {
+        &self.inodes
     }
 
     /// Names the peers that get a unicast copy of everything sent to the group, for networks that
     /// do not carry multicast.
     pub fn set_peers(&mut self, peers: Vec<SocketAddr>) {
         self.peers = peers;
-    }
-
-    fn unicast(&mut self) -> &mut Socket {
-        // The first, which `open` put there.
-        &mut self.sockets[0]
     }
 
     /// Warns when the kind of error is a new one, so that a broken network cannot fill a log.
@@ -192,14 +196,16 @@ impl UdpLink {
     }
 }
 
-/// What the socket's file descriptor links to: its number in the kernel.
-#[cfg(unix)]
-fn file(socket: &Socket) -> Option<PathBuf> {
-    use std::os::fd::AsRawFd;
-    std::fs::read_link(format!("/proc/self/fd/{}", socket.get().as_raw_fd())).ok()
-}
-
-#[cfg(not(unix))]
-fn file(_: &Socket) -> Option<PathBuf> {
-    None
+/// How many datagrams for each of several links, named by their [`inodes`](UdpLink::inodes), the
+/// kernel dropped because the process did not read them in time, if it says so (Linux does). Reads
+/// a table of all sockets of the host.
+#[must_use]
+pub fn kernel_drops<'a>(links: impl IntoIterator<Item = &'a [u64]>) -> Vec<Option<u64>> {
+    let table = socket_table::all();
+    let drops = |inodes: &[u64]| {
+        let ours = table.iter().filter(|entry| inodes.contains(&entry.inode));
+        let drops: Vec<u64> = ours.map(|entry| entry.drops).collect();
+        (!drops.is_empty()).then(|| drops.iter().sum())
+    };
+    links.into_iter().map(drops).collect()
 }

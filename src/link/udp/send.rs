@@ -1,4 +1,8 @@
-//! The sending half of a UDP link.
+//! The sending half of a UDP link: one queue, emptied with as few calls into the kernel as it takes.
+//!
+//! Datagrams wait, the urgent first, until the node has nothing more to send just now, or until
+//! enough have come together. Then those to different peers leave with one call (`sendmmsg`), and
+//! several of equal length to one peer as one batch that the kernel segments (GSO).
 
 use std::io;
 use std::net::SocketAddr;
@@ -8,7 +12,7 @@ use bytes::{Buf, Bytes};
 use socket2::SockRef;
 
 use super::socket::Socket;
-use super::{LONGEST_TRAIN, UdpLink};
+use super::{MAX_SEGMENTS, UdpLink};
 use crate::endpoint::{Remote, To, Transmit};
 use crate::wire::Priority;
 
@@ -16,23 +20,26 @@ use crate::wire::Priority;
 /// for IPv6's longer headers.
 const MOST_OCTETS: usize = 65_000;
 
+/// So many messages leave at once, and with one call if they are datagrams to different peers.
+const BURST: usize = 64;
+
 /// Datagrams to one peer, of `segment` octets each, of which the last may be shorter.
 #[derive(Clone, Debug)]
-pub(super) struct Train {
-    peer: SocketAddr,
-    octets: Bytes,
+pub(super) struct GsoBatch {
+    pub(super) peer: SocketAddr,
+    pub(super) octets: Bytes,
     segment: usize,
 }
 
 impl UdpLink {
-    /// Sends what the endpoint gives out.
+    /// Queues what the endpoint gives out, for [`flush`](Self::flush).
     pub fn transmit(&mut self, transmit: &Transmit) {
         let (priority, octets) = (transmit.priority, &transmit.payload);
         match transmit.to {
             To::Peer(Remote::Socket(peer)) => {
-                self.send_train(peer, priority, octets, transmit.segment);
+                self.enqueue(peer, priority, octets, transmit.segment);
             }
-            To::Group => self.send_to_all(priority, octets, transmit.segment),
+            To::Group => self.enqueue_for_all(priority, octets, transmit.segment),
             // No peer of this link.
             To::Peer(Remote::Line) => {}
         }
@@ -41,100 +48,152 @@ impl UdpLink {
     /// Sends a datagram to one peer. If the network takes nothing just now, the urgent go first
     /// when it does again.
     pub fn send_to(&mut self, peer: SocketAddr, priority: Priority, datagram: &Bytes) {
-        self.send_train(peer, priority, datagram, None);
+        self.enqueue(peer, priority, datagram, None);
+        self.flush();
     }
 
     /// Sends a datagram to the group, and a copy to each peer of [`set_peers`](Self::set_peers).
     pub fn send_to_group(&mut self, priority: Priority, datagram: &Bytes) {
-        self.send_to_all(priority, datagram, None);
+        self.enqueue_for_all(priority, datagram, None);
+        self.flush();
     }
 
-    fn send_to_all(&mut self, priority: Priority, octets: &Bytes, segment: Option<usize>) {
+    fn enqueue_for_all(&mut self, priority: Priority, octets: &Bytes, segment: Option<usize>) {
         for i in 0..self.groups.len() {
-            self.send_train(self.groups[i], priority, octets, segment);
+            self.enqueue(self.groups[i], priority, octets, segment);
         }
         for i in 0..self.peers.len() {
-            self.send_train(self.peers[i], priority, octets, segment);
+            self.enqueue(self.peers[i], priority, octets, segment);
         }
     }
 
-    fn send_train(
+    fn enqueue(
         &mut self,
         peer: SocketAddr,
         priority: Priority,
         octets: &Bytes,
         segment: Option<usize>,
     ) {
-        let mut train = Train {
+        let batch = GsoBatch {
             peer,
             octets: octets.clone(),
             segment: segment.unwrap_or(octets.len()).max(1),
         };
-        if !self.outbox.is_empty() || !self.try_send(&mut train) {
-            let octets = train.octets.len();
-            self.counters.send_overflows += self.outbox.push(priority, octets, train);
+        self.counters.send_overflows += self.outbox.push(priority, octets.len(), batch);
+        if self.outbox.len() >= BURST {
+            self.flush();
         }
+    }
+
+    /// Sends what waits, unless the kernel has no room; whether nothing waits any more.
+    pub fn flush(&mut self) -> bool {
+        while !self.full {
+            if self.leaving.is_empty() {
+                let next = std::iter::from_fn(|| self.outbox.pop());
+                self.leaving.extend(next.take(BURST));
+            }
+            if self.leaving.is_empty() {
+                return true;
+            }
+            self.send_once();
+        }
+        false
     }
 
     /// Sends what waits for the network; ready when nothing waits.
     pub fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<()> {
-        while let Some(mut train) = self.outbox.first().cloned() {
-            if self.try_send(&mut train) {
-                self.outbox.pop();
-                continue;
-            }
-            if let Some(first) = self.outbox.first_mut() {
-                *first = train;
-            }
-            if ready!(self.unicast().poll_room(cx)).is_err() {
+        while !self.flush() {
+            if ready!(self.sockets[0].poll_room(cx)).is_err() {
                 // The runtime is shutting down.
                 return Poll::Ready(());
             }
+            self.full = false;
         }
-        self.unicast().rest();
+        self.sockets[0].rest();
         Poll::Ready(())
     }
 
-    /// Whether all of the train is dealt with: sent, or refused for good. `false` is "not now",
-    /// and then what is left of it is what was not sent.
-    fn try_send(&mut self, train: &mut Train) -> bool {
-        loop {
-            let part = train.part(self.train_limit);
-            let datagrams = part.len().div_ceil(train.segment) as u64;
-            match send(self.unicast(), train.peer, part, train.segment) {
-                Ok(octets) => {
-                    self.counters.sent += datagrams;
-                    self.counters.sent_octets += octets as u64;
-                }
-                Err(e) if e.kind() == io::ErrorKind::WouldBlock => return false,
-                Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
-                Err(e) => {
-                    let limit = limit_after(&e, train.segment).filter(|_| datagrams > 1);
-                    if let Some(limit) = limit {
-                        self.shorten_trains(limit, &e);
-                        continue;
-                    }
-                    self.counters.send_errors += datagrams;
-                    self.report("sending", Some(train.peer), &e);
-                }
+    /// Gives the kernel what it takes with one call.
+    fn send_once(&mut self) {
+        let single = |batch: &&GsoBatch| batch.octets.len() <= batch.segment;
+        let singles = self.leaving.iter().take_while(single).count();
+        self.counters.send_calls += 1;
+        if CAN_SEND_MANY && self.batch && singles > 1 {
+            match self.send_many(singles) {
+                Ok(sent) => (0..sent).for_each(|_| self.complete_first(1)),
+                Err(error) => self.handle_refusal(1, &error),
             }
-            let done = part.len();
-            train.octets.advance(done);
-            if train.octets.is_empty() {
-                return true;
+        } else if let Some(first) = self.leaving.front() {
+            let part = first.part(self.gso_limit);
+            let datagrams = part.len().div_ceil(first.segment).max(1);
+            match send(&self.sockets[0], first.peer, part, first.segment) {
+                Ok(_) => self.complete_first(datagrams),
+                Err(error) => self.handle_refusal(datagrams, &error),
             }
         }
     }
 
+    /// Sends the first `count` batches, of one datagram each; how many the kernel has taken.
+    fn send_many(&self, count: usize) -> io::Result<usize> {
+        #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+        return super::batch::send_many(self.sockets[0].get(), self.leaving.range(..count));
+        #[cfg(not(all(feature = "udp-batch", target_os = "linux")))]
+        Ok(count)
+    }
+
+    /// The kernel has taken so many datagrams of the first batch.
+    fn complete_first(&mut self, datagrams: usize) {
+        let octets = self.drop_first(datagrams);
+        self.counters.sent += datagrams as u64;
+        self.counters.sent_octets += octets as u64;
+    }
+
+    /// The kernel has not taken so many datagrams of the first batch: not now, not together, or not
+    /// at all.
+    fn handle_refusal(&mut self, datagrams: usize, error: &io::Error) {
+        let Some(first) = self.leaving.front() else {
+            return;
+        };
+        let (peer, segment) = (first.peer, first.segment);
+        match error.kind() {
+            io::ErrorKind::WouldBlock => self.full = true,
+            io::ErrorKind::Interrupted => {}
+            _ => match limit_after(error, segment).filter(|_| datagrams > 1) {
+                Some(limit) => self.lower_gso_limit(limit, error),
+                None => {
+                    self.counters.send_errors += datagrams as u64;
+                    self.report("sending", Some(peer), error);
+                    self.drop_first(datagrams);
+                }
+            },
+        }
+    }
+
+    /// Removes so many datagrams from the first batch; how many octets that were.
+    fn drop_first(&mut self, datagrams: usize) -> usize {
+        let Some(first) = self.leaving.front_mut() else {
+            return 0;
+        };
+        let octets = first.octets.len().min(datagrams * first.segment);
+        first.octets.advance(octets);
+        if first.octets.is_empty() {
+            self.leaving.pop_front();
+        }
+        octets
+    }
+
     /// Longer datagrams leave one by one from now on.
-    fn shorten_trains(&mut self, limit: usize, error: &io::Error) {
-        self.train_limit = limit;
+    fn lower_gso_limit(&mut self, limit: usize, error: &io::Error) {
+        self.gso_limit = limit;
         let interface = &self.interface.name;
         tracing::info!(interface, limit, %error, "datagrams above the limit leave one by one");
     }
 }
 
-/// If the error means that trains of such datagrams cannot be sent: the most octets of those that
+/// Whether datagrams to several peers leave with one call.
+const CAN_SEND_MANY: bool = cfg!(all(feature = "udp-batch", target_os = "linux"));
+
+/// If the error means that batches of such datagrams cannot be sent: the most octets of those that
 /// can, perhaps.
 fn limit_after(error: &io::Error, segment: usize) -> Option<usize> {
     #[cfg(all(feature = "udp-batch", target_os = "linux"))]
@@ -146,11 +205,11 @@ fn limit_after(error: &io::Error, segment: usize) -> Option<usize> {
     }
 }
 
-impl Train {
+impl GsoBatch {
     /// What leaves with one call, if datagrams of up to `limit` octets may leave together.
     fn part(&self, limit: usize) -> &[u8] {
         let datagrams = if self.segment <= limit {
-            (MOST_OCTETS / self.segment).clamp(1, LONGEST_TRAIN)
+            (MOST_OCTETS / self.segment).clamp(1, MAX_SEGMENTS)
         } else {
             1
         };
@@ -163,7 +222,7 @@ impl Train {
 fn send(socket: &Socket, peer: SocketAddr, part: &[u8], segment: usize) -> io::Result<usize> {
     #[cfg(all(feature = "udp-batch", target_os = "linux"))]
     if part.len() > segment {
-        // Longer ones make no trains: see `MOST_OCTETS`.
+        // Longer ones are not segmented: see `MOST_OCTETS`.
         let segment = u16::try_from(segment).unwrap_or(u16::MAX);
         return super::batch::send(socket.get(), peer, part, segment);
     }

@@ -281,7 +281,8 @@ impl Config {
                 longest,
             });
         }
-        if self.tcp.listen.is_some() && self.tcp.max_accepted == 0 {
+        let most = self.tcp.max_accepted.min(self.tcp.max_per_address);
+        if self.tcp.listen.is_some() && most == 0 {
             return Err(ConfigError::MaxAccepted);
         }
         #[cfg(feature = "serial")]
@@ -380,7 +381,10 @@ pub enum ConfigError {
         burst: u32,
     },
     /// A listener that lets nobody in.
-    #[error("tcp.max_accepted 0 lets nobody connect: choose 1 or more, or leave tcp.listen out")]
+    #[error(
+        "tcp.max_accepted or tcp.max_per_address 0 lets nobody connect: choose 1 or more, or leave \
+             tcp.listen out"
+    )]
     MaxAccepted,
     /// Nothing is on a serial line at 0 bits per second.
     #[error(

@@ -5,6 +5,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::str::FromStr;
 
 use super::Peer;
+use crate::endpoint::Access;
 use crate::link::{STANDARD_PORT, tcp};
 
 /// TCP connections of a node. By default there are none.
@@ -26,14 +27,18 @@ pub struct Tcp {
     pub connect: Vec<Peer>,
     /// The most connections that others may open.
     pub max_accepted: usize,
+    /// The most of them from one IPv4 address, or from the 64-bit network of an IPv6 address.
+    pub max_per_address: usize,
 }
 
 impl Default for Tcp {
     fn default() -> Self {
+        let usual = tcp::Settings::default();
         Self {
             listen: None,
             connect: Vec::new(),
-            max_accepted: tcp::Settings::default().max_accepted,
+            max_accepted: usual.max_accepted,
+            max_per_address: usual.max_per_address,
         }
     }
 }
@@ -44,11 +49,14 @@ impl Tcp {
         self.listen.is_some() || !self.connect.is_empty()
     }
 
-    pub(in crate::node) fn settings(&self) -> tcp::Settings {
+    /// How the link is set up, on which only these may connect.
+    pub(in crate::node) fn settings(&self, access: &Access) -> tcp::Settings {
         tcp::Settings {
             listen: self.listen.map(|listen| listen.0),
             connect: self.connect.iter().map(|peer| peer.address()).collect(),
             max_accepted: self.max_accepted,
+            max_per_address: self.max_per_address,
+            access: access.clone(),
         }
     }
 }
@@ -130,7 +138,7 @@ mod tests {
         let read = |text: &str| toml::from_str::<Tcp>(text).map_err(|error| error.to_string());
         let both =
             read("listen = \"0.0.0.0\"\nconnect = [\"10.0.0.7\", \"102.255.255@10.0.0.8:9\"]");
-        let settings = both.unwrap().settings();
+        let settings = both.unwrap().settings(&Access::default());
         assert_eq!(settings.listen, Some(([0, 0, 0, 0], 3794).into()));
         let expected = [([10, 0, 0, 7], 3794).into(), ([10, 0, 0, 8], 9).into()];
         assert_eq!(settings.connect, expected);

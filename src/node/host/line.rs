@@ -86,8 +86,10 @@ pub(in super::super) struct Line {
     pub(super) mailbox: Arc<Mailbox>,
     events: broadcast::Sender<HostEvent>,
     pub(super) connected: watch::Sender<bool>,
-    /// Told when the component goes.
+    /// Signalled when the component goes.
     leaving: Notify,
+    /// Signalled when nothing waits any more: all is written, or there is no connection.
+    pub(super) emptied: Notify,
 }
 
 #[derive(Debug)]
@@ -126,6 +128,7 @@ impl Line {
             events: broadcast::Sender::new(EVENTS),
             connected: watch::Sender::new(false),
             leaving: Notify::new(),
+            emptied: Notify::new(),
         }
     }
 
@@ -173,19 +176,24 @@ impl Line {
             payload: message.payload,
         }));
         inner.flush_perhaps();
+        if inner.outbox.is_empty() {
+            self.emptied.notify_waiters();
+        }
         inner.wake_task();
         Ok(MessageHandle(handle))
     }
 
     /// Ready when the node has taken all that was sent, or is lost.
     pub(in super::super) async fn flushed(&self) {
-        let mut connected = self.connected.subscribe();
-        loop {
-            if self.lock().outbox.is_empty() || !*connected.borrow_and_update() {
-                return;
-            }
-            // The task says so when it has written all.
-            let _ = connected.changed().await;
+        // Created before the look, so that nothing is missed; once nothing waits, what was sent
+        // before is written, whatever others have added since.
+        let emptied = self.emptied.notified();
+        let waits = {
+            let inner = self.lock();
+            inner.write.is_some() && !inner.outbox.is_empty()
+        };
+        if waits {
+            emptied.await;
         }
     }
 
@@ -231,6 +239,7 @@ impl Line {
     /// The component has gone, and the node knows it, if it listens.
     pub(super) fn handle_left(&self) {
         self.lock().write = None;
+        self.emptied.notify_waiters();
         self.connected.send_replace(false);
     }
 
@@ -242,6 +251,7 @@ impl Line {
             inner.outbox = Outbox::default();
             inner.awaited.clear();
         }
+        self.emptied.notify_waiters();
         self.connected.send_replace(false);
         self.announce(HostEvent::Lost { why });
     }

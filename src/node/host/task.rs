@@ -143,17 +143,13 @@ impl Task {
         let Some(write) = &mut inner.write else {
             return Poll::Ready(Err(Error::Closed));
         };
-        let waited = !inner.outbox.is_empty();
         let flushed = inner.outbox.poll_flush(write, cx);
         inner.full = flushed.is_pending();
         inner.direct = !inner.full;
         match flushed {
             Poll::Ready(Ok(())) if inner.left => Poll::Ready(Ok(())),
             Poll::Ready(Ok(())) => {
-                if waited {
-                    // Whoever waits for that looks again.
-                    self.line.connected.send_modify(|_| {});
-                }
+                self.line.emptied.notify_waiters();
                 Poll::Pending
             }
             Poll::Ready(Err(error)) => Poll::Ready(Err(Error::io("writing to the node")(error))),

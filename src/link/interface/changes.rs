@@ -1,0 +1,108 @@
+//! Word from the operating system that interfaces or their addresses have changed: on Linux from
+//! rtnetlink; other systems are not asked.
+
+#[cfg(not(target_os = "linux"))]
+pub(crate) use elsewhere::Changes;
+#[cfg(target_os = "linux")]
+pub(crate) use linux::Changes;
+
+#[cfg(target_os = "linux")]
+mod linux {
+    use std::io;
+    use std::os::fd::OwnedFd;
+
+    use rustix::io::Errno;
+    use rustix::net::netlink::SocketAddrNetlink;
+    use rustix::net::{AddressFamily, RecvFlags, SocketFlags, SocketType, bind, recv, socket_with};
+    use tokio::io::Interest;
+    use tokio::io::unix::AsyncFd;
+
+    use crate::link::watch::watch;
+
+    /// `RTMGRP_LINK`, `RTMGRP_IPV4_IFADDR` and `RTMGRP_IPV6_IFADDR`: interfaces that come, go, or
+    /// change their state, and addresses.
+    const GROUPS: u32 = 0x1 | 0x10 | 0x100;
+
+    /// A listener to changes.
+    #[derive(Debug)]
+    pub(crate) struct Changes(Option<AsyncFd<OwnedFd>>);
+
+    impl Changes {
+        /// Listens from now on, if the operating system lets us. Must be called within a tokio
+        /// runtime.
+        pub(crate) fn open() -> Self {
+            let socket = listen();
+            if let Err(error) = &socket {
+                tracing::info!(%error, "no word of changes of interfaces; they are polled");
+            }
+            Self(socket.ok())
+        }
+
+        /// Whether the operating system announces changes.
+        pub(crate) const fn are_announced(&self) -> bool {
+            self.0.is_some()
+        }
+
+        /// Waits until something has changed.
+        pub(crate) async fn next(&mut self) {
+            if let Some(socket) = &self.0 {
+                // What has changed is looked up afterwards; an error is as good a reason to look.
+                let _ = socket.readable().await;
+            } else {
+                std::future::pending().await
+            }
+        }
+
+        /// Forgets the changes that were announced until now.
+        pub(crate) fn forget(&mut self) {
+            let Some(socket) = &self.0 else {
+                return;
+            };
+            let read = |socket: &OwnedFd| {
+                let mut message = [0; 4096];
+                match recv(socket, &mut message[..], RecvFlags::DONTWAIT) {
+                    // More was announced than we have read, or a signal came.
+                    Err(Errno::NOBUFS | Errno::INTR) => Ok(()),
+                    other => other.map(|_| ()).map_err(io::Error::from),
+                }
+            };
+            while socket.try_io(Interest::READABLE, read).is_ok() {}
+        }
+    }
+
+    fn listen() -> io::Result<AsyncFd<OwnedFd>> {
+        let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
+        let (family, kind) = (AddressFamily::NETLINK, SocketType::RAW);
+        // Protocol 0, the usual one, is rtnetlink.
+        let socket = socket_with(family, kind, flags, None)?;
+        bind(&socket, &SocketAddrNetlink::new(0, GROUPS))?;
+        watch(socket, Interest::READABLE)
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod elsewhere {
+    /// A listener to changes, to which nothing is said.
+    #[derive(Debug)]
+    pub(crate) struct Changes;
+
+    impl Changes {
+        /// Listens to nothing.
+        pub(crate) const fn open() -> Self {
+            Self
+        }
+
+        /// Whether the operating system announces changes.
+        pub(crate) const fn are_announced(&self) -> bool {
+            false
+        }
+
+        /// Waits for ever.
+        pub(crate) async fn next(&mut self) {
+            std::future::pending().await
+        }
+
+        /// Does nothing.
+        pub(crate) const fn forget(&mut self) {}
+    }
+}
