@@ -6,13 +6,17 @@ cd "$(dirname "$0")"
 
 seconds=${1:-15}
 [ $# -eq 0 ] || shift
-[ $# -gt 0 ] || set -- judp fragments ra_node jtcp jserial local generated dynamic jsidl_text
+[ $# -gt 0 ] || set -- judp fragments ra_node jtcp jserial local \
+    service gateway capture generated dynamic jsidl_text
 
 cargo +nightly run --quiet --bin seeds
 for target in "$@"; do
     options="-max_total_time=$seconds -print_final_stats=1 -verbosity=0 -print_funcs=0"
     [ ! -f "dictionaries/$target.dict" ] || options="$options -dict=dictionaries/$target.dict"
     echo "== $target for $seconds s"
-    # shellcheck disable=SC2086 # several options
-    cargo +nightly fuzz run "$target" -- $options
+    mkdir -p "corpus/$target"
+    seeds=
+    [ ! -d "seeds/$target" ] || seeds=seeds/$target
+    # shellcheck disable=SC2086 # several options, and maybe no seeds
+    cargo +nightly fuzz run "$target" "corpus/$target" $seeds -- $options
 done

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
+use bytes::Bytes;
 use jaus::codec::MessageInfo;
-use jsidl::dynamic::{Limits, decode_with, encode_with};
+use jsidl::dynamic::{Limits, arbitrary, decode_with, encode, encode_with};
 use jsidl::model::{Id, Message};
 
 /// A message of the embedded definitions, and a service that declares it.
@@ -51,6 +52,17 @@ pub fn generated((id, message): &Declared) -> Option<&'static MessageInfo> {
 /// Octets of a message: its code and these.
 pub fn with_code(code: u16, body: &[u8]) -> Vec<u8> {
     [&code.to_le_bytes(), body].concat()
+}
+
+/// A payload: the octets as they are, or the message that they choose, filled with the rest of them.
+/// `None` if they are too few for a message code.
+pub fn message(is_chosen: bool, octets: &[u8]) -> Option<Bytes> {
+    if !is_chosen {
+        return (octets.len() >= 2).then(|| Bytes::copy_from_slice(octets));
+    }
+    let ((_, message), entropy) = choose(octets)?;
+    let octets = encode(message, &arbitrary(message, entropy)).ok()?;
+    Some(octets.into())
 }
 
 /// Reads octets by their definition; what is accepted must encode back to the same octets.

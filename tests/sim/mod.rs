@@ -3,8 +3,9 @@
 //!
 //! Used by several test binaries (`mod sim;`). Each node is an [`Endpoint`] with an [`Owner`] that
 //! takes its events: [`Mailbox`] keeps them for the test to look at, and whoever builds on the
-//! endpoint (a service, a component) puts its own state machine there. Nothing waits for real time,
-//! and the same seed gives the same run.
+//! endpoint (a service, a component) puts its own state machine there. A node has a link on one
+//! network or on several, by which it may forward. Nothing waits for real time, and the same seed
+//! gives the same run.
 
 #![allow(
     clippy::expect_used,
@@ -36,9 +37,9 @@ pub use clock::WallClock;
 pub use random::Random;
 pub use trace::Trace;
 use wire::{Backlog, Flight, Wire};
-pub use wire::{Conditions, Socket};
+pub use wire::{Conditions, Harm, Socket};
 
-/// The only link of each node.
+/// The first link of each node, and the only one of most.
 pub const WIRE: LinkId = LinkId(0);
 
 /// What takes the events of a simulated node, and may wake up and send by itself.
@@ -97,8 +98,20 @@ pub struct Host(pub usize);
 struct Node<O> {
     endpoint: Endpoint,
     owner: O,
-    address: SocketAddr,
+    attachments: Vec<Attachment>,
+    /// Datagrams that its links take at once.
+    max_segments: usize,
+    /// Whether its owner takes the events.
+    is_read: bool,
     process: Process,
+}
+
+/// A link of a node: the network that it is on, and its address there.
+#[derive(Clone, Copy)]
+struct Attachment {
+    link: LinkId,
+    network: u8,
+    address: SocketAddr,
 }
 
 /// What a node's process does.
@@ -113,6 +126,17 @@ impl<O> Node<O> {
     const fn is_running(&self) -> bool {
         matches!(self.process, Process::Running)
     }
+
+    /// Tells the endpoint which links it has.
+    fn add_links(&mut self) {
+        for attachment in &self.attachments {
+            let profile = LinkProfile {
+                max_segments: self.max_segments,
+                ..LinkProfile::judp([attachment.address])
+            };
+            self.endpoint.add_link(attachment.link, profile);
+        }
+    }
 }
 
 /// The network. See the [module](self).
@@ -126,6 +150,8 @@ pub struct Network<O = Mailbox> {
     clocks: Vec<WallClock>,
     carried: u64,
     multicast: u64,
+    segmented: u64,
+    packed: u64,
     trace: Trace,
 }
 
@@ -146,6 +172,8 @@ impl<O: Owner> Network<O> {
             clocks: Vec::new(),
             carried: 0,
             multicast: 0,
+            segmented: 0,
+            packed: 0,
             trace: Trace::new(now),
         }
     }
@@ -156,36 +184,79 @@ impl<O: Owner> Network<O> {
     }
 
     /// Puts a node on the wire whose owner goes by the wall clock of its host.
-    pub fn join_with(
-        &mut self,
-        mut endpoint: Endpoint,
-        owner: impl FnOnce(WallClock) -> O,
-    ) -> Host {
-        let host = self.nodes.len();
+    pub fn join_with(&mut self, endpoint: Endpoint, owner: impl FnOnce(WallClock) -> O) -> Host {
         let clock = self.time.clock();
         let owner = owner(clock.clone());
         self.clocks.push(clock);
-        let address = SocketAddr::from(([10, 0, 0, host as u8 + 1], judp::PORT));
-        endpoint.add_link(WIRE, LinkProfile::judp([address]));
+        self.join_networks(&[0], endpoint, owner)
+    }
+
+    /// Puts a node on several networks, with a link on each, at 10.network.0.n:3794.
+    pub fn join_networks(&mut self, networks: &[u8], endpoint: Endpoint, owner: O) -> Host {
+        let host = self.nodes.len();
+        if self.clocks.len() == host {
+            self.clocks.push(self.time.clock());
+        }
+        let attachment = |(link, &network): (usize, &u8)| Attachment {
+            link: LinkId(link as u16),
+            network,
+            address: SocketAddr::from(([10, network, 0, host as u8 + 1], judp::PORT)),
+        };
         self.nodes.push(Node {
             endpoint,
             owner,
-            address,
+            attachments: networks.iter().enumerate().map(attachment).collect(),
+            max_segments: 1,
+            is_read: true,
             process: Process::Running,
         });
+        self.nodes[host].add_links();
         Host(host)
     }
 
     /// Replaces a node by a new one at the same address, as after a crash and a restart.
-    pub fn restart(&mut self, host: Host, mut endpoint: Endpoint, owner: O) {
-        let address = self.nodes[host.0].address;
-        endpoint.add_link(WIRE, LinkProfile::judp([address]));
-        self.nodes[host.0] = Node {
-            endpoint,
-            owner,
-            address,
-            process: Process::Running,
-        };
+    pub fn restart(&mut self, host: Host, endpoint: Endpoint, owner: O) {
+        let node = &mut self.nodes[host.0];
+        node.endpoint = endpoint;
+        node.owner = owner;
+        node.is_read = true;
+        node.process = Process::Running;
+        node.add_links();
+    }
+
+    /// Gives a node other addresses, as a DHCP server may.
+    pub fn readdress(&mut self, host: Host) {
+        let node = &mut self.nodes[host.0];
+        for attachment in &mut node.attachments {
+            let std::net::IpAddr::V4(ip) = attachment.address.ip() else {
+                continue;
+            };
+            let [ten, network, generation, number] = ip.octets();
+            let octets = [ten, network, generation.wrapping_add(1), number];
+            attachment.address.set_ip(octets.into());
+        }
+        node.add_links();
+    }
+
+    /// How many datagrams the links of a node take at once.
+    pub fn set_max_segments(&mut self, host: Host, max_segments: usize) {
+        let node = &mut self.nodes[host.0];
+        node.max_segments = max_segments;
+        node.add_links();
+    }
+
+    /// Whether the owner of a node takes its events; what waits meanwhile is taken afterwards.
+    pub fn set_read(&mut self, host: Host, is_read: bool) {
+        self.nodes[host.0].is_read = is_read;
+        self.settle(host.0);
+    }
+
+    /// Puts a datagram of somebody who is no node on the wire to a node's first link.
+    pub fn inject(&mut self, from: SocketAddr, to: Host, datagram: &Bytes) {
+        let what = format_args!("{from} sends {} octets to {to:?}", datagram.len());
+        self.trace.note(self.now, what);
+        self.wire
+            .launch(self.now, (None, from), (to.0, WIRE), datagram);
     }
 
     /// Kills a node: it neither receives nor sends any more.
@@ -259,9 +330,9 @@ impl<O: Owner> Network<O> {
         &mut self.nodes[host.0].owner
     }
 
-    /// The address of a node.
+    /// The address of a node on its first network.
     pub fn address(&self, host: Host) -> SocketAddr {
-        self.nodes[host.0].address
+        self.nodes[host.0].attachments[0].address
     }
 
     /// How many datagrams were put on the wire; a multicast counts once.
@@ -274,9 +345,24 @@ impl<O: Owner> Network<O> {
         self.multicast
     }
 
+    /// How many transmits were several datagrams at once.
+    pub fn segmented(&self) -> u64 {
+        self.segmented
+    }
+
+    /// How many datagrams held more than one message.
+    pub fn packed(&self) -> u64 {
+        self.packed
+    }
+
     /// How many datagrams were lost because a receiver's socket was full.
     pub fn overflowed(&self) -> u64 {
-        self.wire.overflowed
+        self.wire.harm.overflowed
+    }
+
+    /// What the wire has done to datagrams.
+    pub fn harm(&self) -> Harm {
+        self.wire.harm
     }
 
     /// What has happened.
@@ -365,7 +451,7 @@ impl<O: Owner> Network<O> {
         let what = format_args!("{to} gets {length} octets from {from}");
         self.trace.note(self.now, what);
         let path = Path {
-            link: WIRE,
+            link: flight.link,
             peer: flight.from.into(),
         };
         node.endpoint
@@ -394,7 +480,7 @@ impl<O: Owner> Network<O> {
             let node = &mut self.nodes[host];
             if let Some(transmit) = node.endpoint.poll_transmit() {
                 self.carry_all(host, &transmit);
-            } else if let Some(event) = node.endpoint.poll_event() {
+            } else if let Some(event) = next_event(node) {
                 note_event(&mut self.trace, self.now, host, &event);
                 node.owner.handle_event(self.now, &mut node.endpoint, event);
             } else {
@@ -407,33 +493,57 @@ impl<O: Owner> Network<O> {
     fn carry_all(&mut self, from: usize, transmit: &Transmit) {
         let whole = transmit.payload.len();
         let length = transmit.segment.unwrap_or(whole).max(1);
+        self.segmented += u64::from(length < whole);
         for start in (0..whole).step_by(length) {
             let end = whole.min(start + length);
-            self.carry(from, transmit.to, &transmit.payload.slice(start..end));
+            let datagram = transmit.payload.slice(start..end);
+            self.carry(from, transmit.link, transmit.to, &datagram);
         }
     }
 
-    /// Puts a datagram on the wire. The group is everybody, the sender included.
-    fn carry(&mut self, from: usize, to: To, datagram: &Bytes) {
+    /// Puts a datagram on the network of a link. The group is everybody there, the sender included.
+    fn carry(&mut self, from: usize, link: LinkId, to: To, datagram: &Bytes) {
         if !self.nodes[from].is_running() {
             return;
         }
         self.carried += 1;
         self.multicast += u64::from(to == To::Group);
+        self.packed += u64::from(holds_several(datagram));
         let (length, head) = (datagram.len(), &datagram[..datagram.len().min(17)]);
         let what = format_args!("{from} sends {length} octets to {to:?}: {head:02x?}");
         self.trace.note(self.now, what);
-        for host in 0..self.nodes.len() {
-            let meant = match to {
-                To::Group => true,
-                To::Peer(peer) => peer == self.nodes[host].address,
-            };
-            if meant {
-                let sender = (from, self.nodes[from].address);
-                self.wire.launch(self.now, sender, host, datagram);
+        let sender = self.nodes[from].attachments.iter();
+        let Some(&sender) = sender.clone().find(|it| it.link == link) else {
+            return;
+        };
+        for (host, node) in self.nodes.iter().enumerate() {
+            for receiver in &node.attachments {
+                let is_meant = match to {
+                    To::Group => true,
+                    To::Peer(peer) => peer == receiver.address,
+                };
+                if is_meant && receiver.network == sender.network {
+                    let from = (Some(from), sender.address);
+                    let to = (host, receiver.link);
+                    self.wire.launch(self.now, from, to, datagram);
+                }
             }
         }
     }
+}
+
+/// The next event of a node whose owner takes them.
+fn next_event<O>(node: &mut Node<O>) -> Option<Event> {
+    if node.is_read {
+        node.endpoint.poll_event()
+    } else {
+        None
+    }
+}
+
+/// Whether a datagram holds more than one message.
+fn holds_several(datagram: &Bytes) -> bool {
+    judp::frames(datagram.clone()).is_ok_and(|frames| frames.count() > 1)
 }
 
 fn note_event(trace: &mut Trace, now: Instant, host: usize, event: &Event) {

@@ -4,6 +4,7 @@
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
 use std::io::Write;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,13 +22,35 @@ pub(crate) fn is_traced() -> bool {
     std::env::var_os("JAUS_TRACE").is_some_and(|value| value != "0")
 }
 
-/// Runs `JAUS_SEED` if it is set, or else the first `JAUS_SEEDS` (or `usual`) seeds.
-pub(crate) fn for_each_seed(
+/// Runs `JAUS_SEED` if it is set, or else the seeds that `kept` holds for the test and
+/// `JAUS_SEEDS` (or `usual`) seeds that no run before had: they are printed.
+///
+/// `kept` has a line for each seed that once failed: the test, the seed, and after `#` what failed.
+/// Whether all of the fresh seeds were run, so that their totals say something.
+pub(crate) fn for_kept_and_fresh_seeds(
     test: &str,
+    kept: &str,
     usual: u64,
     run: impl Fn(u64) -> Result<(), String> + Sync,
-) {
-    run_seeds(test, 0, usual, run);
+) -> bool {
+    for seed in kept_seeds(test, kept) {
+        run_seeds(test, seed..seed + 1, &run);
+    }
+    for_fresh_seeds(test, usual, &run);
+    number_in("JAUS_SEED").is_none() && number_in("JAUS_SEEDS").is_none_or(|seeds| seeds >= usual)
+}
+
+/// None if `JAUS_SEED` chooses one.
+fn kept_seeds(test: &str, kept: &str) -> Vec<u64> {
+    let lines = kept.lines().filter(|_| number_in("JAUS_SEED").is_none());
+    let lines = lines.map(|line| line.split('#').next().unwrap_or_default());
+    let words = lines.map(|line| line.split_whitespace().collect::<Vec<_>>());
+    let seed = |words: Vec<&str>| match words[..] {
+        [] => None,
+        [name, seed] => (name == test).then(|| seed.parse().expect("a seed")),
+        _ => panic!("a test and a seed are expected: {words:?}"),
+    };
+    words.filter_map(seed).collect()
 }
 
 /// Runs `JAUS_SEED` if it is set, or else `JAUS_SEEDS` (or `usual`) seeds that no run before had:
@@ -39,7 +62,16 @@ pub(crate) fn for_fresh_seeds(
 ) {
     // The hasher's keys are the operating system's randomness. Fewer digits are easier to type.
     let first = RandomState::new().hash_one(test) % 1_000_000_000_000;
-    run_seeds(test, first, usual, run);
+    let seeds = match number_in("JAUS_SEED") {
+        Some(seed) => seed..seed + 1,
+        None => first..first + number_in("JAUS_SEEDS").unwrap_or(usual),
+    };
+    announce(&format!(
+        "{test}: seeds {} to {}",
+        seeds.start,
+        seeds.end - 1
+    ));
+    run_seeds(test, seeds, run);
 }
 
 /// Prints a line past the test harness, which keeps the output of tests that pass.
@@ -48,15 +80,9 @@ pub(crate) fn announce(line: &str) {
     let _written = writeln!(std::io::stderr().lock(), "{line}");
 }
 
-fn run_seeds(test: &str, first: u64, usual: u64, run: impl Fn(u64) -> Result<(), String> + Sync) {
-    let (first, end) = match number_in("JAUS_SEED") {
-        Some(seed) => (seed, seed + 1),
-        None => (first, first + number_in("JAUS_SEEDS").unwrap_or(usual)),
-    };
-    if first > 0 {
-        announce(&format!("{test}: seeds {first} to {}", end - 1));
-    }
-    let (next, failed) = (AtomicU64::new(first), Mutex::new(Vec::new()));
+fn run_seeds(test: &str, seeds: Range<u64>, run: impl Fn(u64) -> Result<(), String> + Sync) {
+    let end = seeds.end;
+    let (next, failed) = (AtomicU64::new(seeds.start), Mutex::new(Vec::new()));
     let work = || {
         loop {
             let seed = next.fetch_add(1, Ordering::Relaxed);

@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use jaus::endpoint::LinkId;
 
 use super::random::Random;
 
@@ -23,6 +24,8 @@ pub struct Conditions {
     pub detoured: u32,
     /// How long the longest detour takes.
     pub detour: Duration,
+    /// In how many of 1000 copies one bit changes, unnoticed by checksums.
+    pub corrupted: u32,
     /// The longest datagram, in octets, that gets through.
     pub mtu: usize,
     /// The socket of each receiver; `None` for one that is read at once.
@@ -47,6 +50,7 @@ impl Conditions {
             repeated: 0,
             detoured: 0,
             detour: Duration::ZERO,
+            corrupted: 0,
             mtu: usize::MAX,
             socket: None,
         }
@@ -69,6 +73,8 @@ pub(super) struct Flight {
     pub(super) arrival: Instant,
     number: u64,
     pub(super) to: usize,
+    /// The link of the receiver by which it comes.
+    pub(super) link: LinkId,
     pub(super) from: SocketAddr,
     pub(super) datagram: Bytes,
     /// It is in the receiver's socket already, and will be read.
@@ -104,7 +110,24 @@ pub(super) struct Wire {
     cut: HashSet<(usize, usize)>,
     buffers: Vec<Buffer>,
     launched: u64,
-    pub(super) overflowed: u64,
+    pub(super) harm: Harm,
+}
+
+/// What the wire has done to datagrams.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Harm {
+    /// Copies that were lost, or too long.
+    pub lost: u64,
+    /// Copies that could not leave because the way was cut.
+    pub cut: u64,
+    /// Copies that arrive twice.
+    pub repeated: u64,
+    /// Copies that make a detour.
+    pub detoured: u64,
+    /// Copies of which a bit has changed.
+    pub corrupted: u64,
+    /// Copies that were lost because a receiver's socket was full.
+    pub overflowed: u64,
 }
 
 impl Wire {
@@ -116,7 +139,7 @@ impl Wire {
             cut: HashSet::new(),
             buffers: Vec::new(),
             launched: 0,
-            overflowed: 0,
+            harm: Harm::default(),
         }
     }
 
@@ -133,34 +156,44 @@ impl Wire {
         self.flights.peek().map(|Reverse(flight)| flight.arrival)
     }
 
-    /// A datagram leaves for one receiver.
+    /// A datagram leaves for one receiver, who gets it by `link`.
     pub(super) fn launch(
         &mut self,
         now: Instant,
-        (from, address): (usize, SocketAddr),
-        to: usize,
+        (from, address): (Option<usize>, SocketAddr),
+        (to, link): (usize, LinkId),
         datagram: &Bytes,
     ) {
         let conditions = &self.conditions;
-        if self.cut.contains(&(from, to))
-            || datagram.len() > conditions.mtu
-            || self.random.happens(conditions.lost)
-        {
+        if from.is_some_and(|from| self.cut.contains(&(from, to))) {
+            self.harm.cut += 1;
+            return;
+        }
+        if datagram.len() > conditions.mtu || self.random.happens(conditions.lost) {
+            self.harm.lost += 1;
             return;
         }
         let copies = 1 + u32::from(self.random.happens(conditions.repeated));
+        self.harm.repeated += u64::from(copies - 1);
         for _copy in 0..copies {
             let mut arrival = now + self.random.between(&conditions.latency);
             if self.random.happens(conditions.detoured) {
                 arrival += self.random.between(&(Duration::ZERO..conditions.detour));
+                self.harm.detoured += 1;
+            }
+            let mut datagram = datagram.clone();
+            if conditions.corrupted > 0 && self.random.happens(conditions.corrupted) {
+                datagram = flip_a_bit(&datagram, &mut self.random);
+                self.harm.corrupted += 1;
             }
             self.launched += 1;
             self.flights.push(Reverse(Flight {
                 arrival,
                 number: self.launched,
                 to,
+                link,
                 from: address,
-                datagram: datagram.clone(),
+                datagram,
                 buffered: false,
             }));
         }
@@ -187,7 +220,7 @@ impl Wire {
         let length = flight.datagram.len();
         let buffer = self.buffer(flight.to);
         if buffer.octets + length > socket.buffer {
-            self.overflowed += 1;
+            self.harm.overflowed += 1;
             return;
         }
         let begun = buffer
@@ -207,7 +240,7 @@ impl Wire {
         let room = socket.map_or(Backlog::ROOM, |socket| socket.buffer);
         let length = flight.datagram.len();
         if backlog.octets + length > room {
-            self.overflowed += 1;
+            self.harm.overflowed += 1;
             return;
         }
         backlog.octets += length;
@@ -220,4 +253,18 @@ impl Wire {
         }
         &mut self.buffers[host]
     }
+}
+
+/// Headers are corrupted as often as all the rest: what lies in them matters more.
+fn flip_a_bit(datagram: &Bytes, random: &mut Random) -> Bytes {
+    const HEADER: usize = 16;
+    let mut octets = datagram.to_vec();
+    let reach = match random.happens(500) {
+        true => octets.len().min(HEADER),
+        false => octets.len(),
+    };
+    if reach > 0 {
+        octets[random.below(reach)] ^= 1 << random.below(8);
+    }
+    octets.into()
 }

@@ -1,6 +1,7 @@
 //! Operators that contend for a vehicle while the wire is bad and everybody restarts: there are
 //! never two controllers, only the one in control makes the vehicle act, an emergency stops it
-//! whoever is in control, and who has lost control knows it soon.
+//! whoever is in control, who has lost control knows it soon, and once the wire is good control can
+//! be taken.
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -13,17 +14,27 @@ use jaus::messages::core::{
 };
 use jaus::service::{
     AccessControl, ControlId, ControlNews, Discovery, Event, Handlers, Kind, Management, Patience,
-    Profile, Scope, Service, Stack, Timing,
+    Profile, Scope, Service, Stack, State, Timing,
 };
 
 use crate::rules::Rules;
 use crate::sim::{Conditions, Host, Network, Owner, Random};
+use crate::totals::Counts;
 
 const VEHICLE: JausId = JausId::new(101, 1, 1);
 const OPERATORS: [JausId; 3] = [
     JausId::new(42, 1, 1),
     JausId::new(43, 1, 1),
     JausId::new(44, 1, 1),
+];
+/// What is counted.
+const NAMES: [&str; 6] = [
+    "requests",
+    "restarts",
+    "times in control",
+    "emergencies",
+    "commands obeyed",
+    "controls taken after healing",
 ];
 const TROUBLE: Duration = Duration::from_secs(120);
 const ACTIONS: usize = 150;
@@ -33,8 +44,12 @@ const REST: Duration = Duration::from_secs(10);
 /// confirmation may have been under way for a moment.
 const DELUSION: Duration = Duration::from_millis(5500);
 
+/// Once the wire is good, an operator with the greatest authority gets control of a vehicle without
+/// an emergency within this time, and is obeyed.
+const TAKEN: Duration = Duration::from_secs(5);
+
 /// Runs the scenario of a seed; tells which promise was broken.
-pub(crate) fn run(seed: u64) -> Result<(), String> {
+pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     let mut world = World::new(seed);
     let start = world.network.now();
     let mut times: Vec<_> = (0..ACTIONS)
@@ -46,7 +61,9 @@ pub(crate) fn run(seed: u64) -> Result<(), String> {
         world.run_for((start + time).saturating_duration_since(now))?;
         world.act();
     }
-    world.come_to_rest()
+    world.come_to_rest()?;
+    world.take_control()?;
+    Ok(world.counts)
 }
 
 /// The vehicle, with what an onlooker on the wire knows of it.
@@ -55,6 +72,8 @@ struct Vehicle {
     rules: Rules,
     /// Whose commands it has acted on since the last look.
     acted: Arc<Mutex<Vec<JausId>>>,
+    /// How many commands it has acted on since they were counted last.
+    obeyed: u64,
     /// The first promise that it has broken.
     broken: Option<String>,
 }
@@ -95,6 +114,7 @@ impl Vehicle {
             stack,
             rules: Rules::new(now, Duration::from_secs(timeout.into())),
             acted,
+            obeyed: 0,
             broken: None,
         }))
     }
@@ -108,6 +128,7 @@ impl Vehicle {
         }
         while self.stack.poll_event().is_some() {}
         let acted_for = std::mem::take(&mut *self.acted.lock().expect("no panic"));
+        self.obeyed += acted_for.len() as u64;
         let standing = self.stack.standing();
         let outcome = outcome.and_then(|()| self.rules.judge(now, standing, &acted_for));
         if let Err(reason) = outcome {
@@ -137,9 +158,14 @@ impl Operator {
             if let Event::Control(id, news) = event
                 && self.asked == Some(id)
             {
-                self.holds = news == ControlNews::Granted;
-                if let ControlNews::Refused(_) | ControlNews::Released = news {
-                    self.asked = None;
+                match news {
+                    ControlNews::Granted => self.holds = true,
+                    ControlNews::Status(_) => {}
+                    ControlNews::Lost(_) => self.holds = false,
+                    ControlNews::Refused(_) | ControlNews::Released => {
+                        self.holds = false;
+                        self.asked = None;
+                    }
                 }
             }
         }
@@ -206,6 +232,9 @@ struct World {
     timeout: u8,
     vehicle: Host,
     operators: [Host; 3],
+    /// Who was in control at the last look, and whether there was an emergency.
+    seen: (Option<JausId>, bool),
+    counts: Counts,
 }
 
 fn endpoint(id: JausId) -> Endpoint {
@@ -236,14 +265,23 @@ impl World {
             timeout,
             vehicle,
             operators,
+            seen: (None, false),
+            counts: NAMES.map(|name| (name, 0)).into(),
         }
+    }
+
+    fn count(&mut self, name: &'static str) {
+        *self.counts.entry(name).or_default() += 1;
     }
 
     fn act(&mut self) {
         let place = self.random.below(OPERATORS.len());
         let (host, now) = (self.operators[place], self.network.now());
         match self.random.below(40) {
-            0..8 => self.request(host),
+            0..8 => {
+                let authority = self.random.choose(&[50, 100, 200]);
+                self.request(host, authority);
+            }
             8..11 => self.with(host, |stack, now, asked| {
                 if let Some(id) = asked.take() {
                     stack.release_control(now, id);
@@ -256,11 +294,13 @@ impl World {
             32 => self.say(host, &SetEmergency::default()),
             33..36 => self.say(host, &ClearEmergency::default()),
             36 => {
+                self.count("restarts");
                 let vehicle = Vehicle::party(now, self.timeout);
                 self.network
                     .restart(self.vehicle, endpoint(VEHICLE), vehicle);
             }
             37 => {
+                self.count("restarts");
                 let id = OPERATORS[place];
                 self.network
                     .restart(host, endpoint(id), Operator::party(now, id));
@@ -283,8 +323,8 @@ impl World {
         });
     }
 
-    fn request(&mut self, host: Host) {
-        let authority = self.random.choose(&[50, 100, 200]);
+    fn request(&mut self, host: Host, authority: u8) {
+        self.count("requests");
         self.with(host, |stack, now, asked| {
             // What was lost is let go before it is asked for again.
             if let Some(id) = *asked {
@@ -322,11 +362,22 @@ impl World {
             let left = end.saturating_duration_since(self.network.now());
             self.network.run_for(left.min(step));
             let now = self.network.now();
+            let before = self.seen;
             let vehicle = self.vehicle();
             let controller = vehicle.stack.standing().controller.map(|it| it.id);
+            let is_emergency = vehicle.stack.standing().state == State::Emergency;
+            let obeyed = std::mem::take(&mut vehicle.obeyed);
             if let Some(broken) = &vehicle.broken {
                 return Err(format!("{VEHICLE} {broken}"));
             }
+            self.seen = (controller, is_emergency);
+            if controller.is_some() && controller != before.0 {
+                self.count("times in control");
+            }
+            if is_emergency && !before.1 {
+                self.count("emergencies");
+            }
+            *self.counts.entry("commands obeyed").or_default() += obeyed;
             for host in self.operators {
                 self.operator(host).check(now, controller)?;
             }
@@ -350,6 +401,38 @@ impl World {
                     "{id} believes to be in control, and {controller:?} is"
                 ));
             }
+        }
+        Ok(())
+    }
+
+    /// With a good wire and no emergency, the greatest authority gets control and is obeyed.
+    fn take_control(&mut self) -> Result<(), String> {
+        for host in self.operators {
+            self.say(host, &ClearEmergency::default());
+            self.with(host, |stack, now, asked| {
+                if let Some(id) = asked.take() {
+                    stack.release_control(now, id);
+                }
+            });
+        }
+        self.run_for(Duration::from_secs(1))?;
+        let host = self.operators[self.random.below(OPERATORS.len())];
+        self.request(host, u8::MAX);
+        self.run_for(TAKEN)?;
+        let id = self.operator(host).stack.id();
+        if !self.operator(host).holds {
+            let standing = *self.vehicle().stack.standing();
+            return Err(format!("{id} does not get control: {standing:?}"));
+        }
+        self.count("controls taken after healing");
+        self.say(host, &Resume {});
+        self.run_for(Duration::from_secs(1))?;
+        let before = self.counts["commands obeyed"];
+        self.say(host, &DeleteElement::default());
+        self.run_for(Duration::from_secs(1))?;
+        if self.counts["commands obeyed"] == before {
+            let standing = *self.vehicle().stack.standing();
+            return Err(format!("{id} is not obeyed: {standing:?}"));
         }
         Ok(())
     }

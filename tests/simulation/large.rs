@@ -4,16 +4,17 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event, Outgoing};
+use jaus::endpoint::{Config, Counter, Endpoint, Event, Outgoing};
 
 use crate::sim::{Conditions, Mailbox, Network};
+use crate::totals::Counts;
 
 const FROM: JausId = JausId::new(101, 1, 1);
 const TO: JausId = JausId::new(102, 1, 1);
 const LENGTH: u32 = 1 << 20;
 
 /// Sends one message of a MiB; tells if it does not arrive whole or is not acknowledged.
-pub(crate) fn run(seed: u64) -> Result<(), String> {
+pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     let conditions = Conditions {
         latency: Duration::from_micros(200)..Duration::from_millis(3),
         lost: 50,
@@ -50,7 +51,16 @@ pub(crate) fn run(seed: u64) -> Result<(), String> {
     };
     let news = network.owner(from).take_news();
     if news.contains(&acknowledged) {
-        Ok(())
+        let again = network
+            .endpoint(from)
+            .counters()
+            .get(Counter::Retransmissions);
+        Ok([
+            ("fragments sent again", again),
+            ("lost", network.harm().lost),
+            ("overtaken", network.harm().detoured),
+        ]
+        .into())
     } else {
         Err(format!("it arrived, but: {news:?}"))
     }

@@ -1,4 +1,4 @@
-//! What was sent, and the judgement about what comes out.
+//! What was promised: which messages were sent, for whom, and what has become of them.
 //!
 //! Each message of a scenario has a code of its own, so that every copy of it is known, whatever its
 //! length.
@@ -12,6 +12,10 @@ use jaus::address::JausId;
 use jaus::endpoint::{Event, MessageHandle, Outgoing, Received};
 
 use crate::sim::Random;
+use crate::totals::Counts;
+
+/// The message code of all that is forged.
+pub(crate) const FORGED: u16 = 0xFFFF;
 
 /// One life of a node, from its start or restart on: the node and how often it was restarted.
 pub(crate) type Life = (usize, u32);
@@ -24,31 +28,54 @@ struct Sent {
     /// For whom it may be: components and the lives that they had when it was sent.
     receivers: Vec<(JausId, Life)>,
     /// The shortest time after which the same message may be delivered once more.
-    window: Option<Duration>,
-    /// When it was delivered to whom.
-    delivered: HashMap<(JausId, Life), Instant>,
-    /// Whether the result was told.
-    told: bool,
+    window: Duration,
+    /// When it was delivered last to whom, and how often.
+    delivered: HashMap<(JausId, Life), (Instant, u32)>,
+    /// Whether it was acknowledged, once that is known.
+    result: Option<bool>,
+    /// Whether bits changed on the wire when it was sent, so that nothing is promised.
+    is_at_risk: bool,
 }
 
 /// What was sent. See the [module](self).
-#[derive(Default)]
 pub(crate) struct Ledger {
     sent: Vec<Sent>,
     handles: HashMap<(Life, MessageHandle), usize>,
     noise: Bytes,
-    pub(crate) acknowledged: u64,
-    pub(crate) given_up: u64,
-    pub(crate) delivered: u64,
+    /// Whether bits change on the wire now.
+    is_at_risk: bool,
+    /// From this message on all has to be fulfilled.
+    calm: usize,
+    pub(crate) counts: Counts,
 }
 
 impl Ledger {
-    pub(crate) fn new(random: &mut Random, longest: usize) -> Self {
+    /// What is counted.
+    const NAMES: [&str; 8] = [
+        "delivered",
+        "delivered again",
+        "delivered corrupted",
+        "delivered forged",
+        "acknowledged",
+        "given up",
+        "peers moved",
+        "delivered after healing",
+    ];
+
+    pub(crate) fn new(random: &mut Random, longest: usize, is_at_risk: bool) -> Self {
         let noise = (0..longest / 4).flat_map(|_| random.number().to_le_bytes());
         Self {
+            sent: Vec::new(),
+            handles: HashMap::new(),
             noise: noise.collect(),
-            ..Self::default()
+            is_at_risk,
+            calm: usize::MAX,
+            counts: Self::NAMES.map(|name| (name, 0)).into(),
         }
+    }
+
+    fn count(&mut self, name: &'static str) {
+        *self.counts.entry(name).or_default() += 1;
     }
 
     /// A payload of so many octets, at least 2, that no other message has.
@@ -69,7 +96,7 @@ impl Ledger {
         (by, handle): (Life, MessageHandle),
         message: Outgoing,
         receivers: Vec<(JausId, Life)>,
-        window: Option<Duration>,
+        window: Duration,
     ) {
         self.handles.insert((by, handle), self.sent.len());
         self.sent.push(Sent {
@@ -79,8 +106,16 @@ impl Ledger {
             receivers,
             window,
             delivered: HashMap::new(),
-            told: false,
+            result: None,
+            is_at_risk: self.is_at_risk,
         });
+    }
+
+    /// From now on every message has to be fulfilled: delivered once to each receiver, and
+    /// acknowledged if it asks for that.
+    pub(crate) fn expect_all(&mut self) {
+        self.is_at_risk = false;
+        self.calm = self.sent.len();
     }
 
     /// Judges a message that was delivered in one life of a node.
@@ -91,54 +126,66 @@ impl Ledger {
         received: &Received,
     ) -> Result<(), String> {
         let code = u16::from_le_bytes([received.payload[0], received.payload[1]]);
-        let sent = usize::from(code).checked_sub(1);
-        let Some(sent) = sent.and_then(|sent| self.sent.get_mut(sent)) else {
-            return Err(format!("message {code} was delivered and never sent"));
-        };
-        let message = &sent.message;
-        if received.payload != message.payload {
-            let (is, was) = (received.payload.len(), message.payload.len());
-            return Err(format!(
-                "message {code} changed: {is} octets, sent were {was}"
-            ));
+        if code == FORGED {
+            self.count("delivered forged");
+            return Ok(());
         }
-        let same = (received.source, received.destination, received.priority)
-            == (message.source, message.destination, message.priority);
-        if !same
-            || !sent
-                .receivers
-                .iter()
-                .any(|(id, (host, _))| (*id, *host) == (received.to, life.0))
-        {
-            return Err(format!(
-                "message {code} was delivered to {} of node {}",
-                received.to, life.0
-            ));
-        }
-        self.delivered += 1;
-        if let Some(before) = sent.delivered.insert((received.to, life), at) {
-            let since = at - before;
-            if sent.window.is_none_or(|window| since < window) {
-                return Err(format!(
-                    "message {code} was delivered again after {since:?}"
-                ));
+        let place = usize::from(code).wrapping_sub(1);
+        match self.identify(place, life, received) {
+            Ok(()) => {}
+            Err(_) if self.is_at_risk => {
+                self.count("delivered corrupted");
+                return Ok(());
             }
+            Err(reason) => return Err(format!("message {code} {reason}")),
         }
+        self.count("delivered");
+        if place >= self.calm {
+            self.count("delivered after healing");
+        }
+        let sent = &mut self.sent[place];
+        let Some((before, times)) = sent.delivered.get_mut(&(received.to, life)) else {
+            sent.delivered.insert((received.to, life), (at, 1));
+            return Ok(());
+        };
+        let since = at - std::mem::replace(before, at);
+        *times += 1;
+        if since < sent.window && !sent.is_at_risk {
+            return Err(format!(
+                "message {code} was delivered again after {since:?}"
+            ));
+        }
+        self.count("delivered again");
         Ok(())
     }
 
-    /// Judges a result that was told in one life of a node. `forgetful` tells which nodes have
-    /// forgotten fragments for want of room or time.
-    pub(crate) fn learn(
-        &mut self,
-        life: Life,
-        event: &Event,
-        forgetful: impl Fn(usize) -> bool,
-        lives: &[u32],
-    ) -> Result<(), String> {
+    /// Whether what was delivered is what was sent, to whom it was sent.
+    fn identify(&self, place: usize, life: Life, received: &Received) -> Result<(), String> {
+        let sent = self.sent.get(place).ok_or("was never sent")?;
+        let message = &sent.message;
+        if received.payload != message.payload {
+            let (is, was) = (received.payload.len(), message.payload.len());
+            return Err(format!("changed: {is} octets, sent were {was}"));
+        }
+        let same = (received.source, received.destination, received.priority)
+            == (message.source, message.destination, message.priority);
+        let mut receivers = sent.receivers.iter();
+        if same && receivers.any(|(id, (node, _))| (*id, *node) == (received.to, life.0)) {
+            return Ok(());
+        }
+        let (to, node) = (received.to, life.0);
+        Err(format!("was delivered to {to} of node {node}"))
+    }
+
+    /// Judges a result that was told in one life of a node.
+    pub(crate) fn learn(&mut self, life: Life, event: &Event) -> Result<(), String> {
         let (handle, acknowledged) = match event {
             Event::Acknowledged { message, .. } => (*message, true),
             Event::NotAcknowledged { message, .. } => (*message, false),
+            Event::PeerMoved { .. } => {
+                self.count("peers moved");
+                return Ok(());
+            }
             _ => return Ok(()),
         };
         let Some(&number) = self.handles.get(&(life, handle)) else {
@@ -147,38 +194,88 @@ impl Ledger {
                 life.0
             ));
         };
+        self.count(if acknowledged {
+            "acknowledged"
+        } else {
+            "given up"
+        });
         let sent = &mut self.sent[number];
         let code = number + 1;
-        if !sent.message.acknowledge || std::mem::replace(&mut sent.told, true) {
+        if !sent.message.acknowledge || sent.result.replace(acknowledged).is_some() {
             return Err(format!("message {code} has a result too many"));
         }
-        if !acknowledged {
-            self.given_up += 1;
-            return Ok(());
+        Ok(())
+    }
+
+    /// Judges what has become of everything when nothing happens any more: `is_forgetful` tells which
+    /// nodes forget fragments for want of room, `is_reached` which have to have got all that was
+    /// for them.
+    pub(crate) fn close(
+        &self,
+        lives: &[u32],
+        is_forgetful: impl Fn(usize) -> bool,
+        is_reached: impl Fn(usize) -> bool,
+    ) -> Result<(), String> {
+        for (number, sent) in self.sent.iter().enumerate() {
+            let judged = sent.check_result(lives, &is_forgetful).and_then(|()| {
+                let is_calm = number >= self.calm;
+                if is_calm {
+                    sent.check_fulfilled(&is_reached)
+                } else {
+                    Ok(())
+                }
+            });
+            judged.map_err(|reason| format!("message {} {reason}", number + 1))?;
         }
-        self.acknowledged += 1;
-        let [(receiver, (host, life))] = sent.receivers[..] else {
-            return Err(format!("message {code} is acknowledged by nobody known"));
-        };
-        let restarted = lives[host] != life;
-        let there = sent.delivered.contains_key(&(receiver, (host, life)));
-        if there || restarted || forgetful(host) {
-            Ok(())
-        } else {
-            Err(format!(
-                "message {code} is acknowledged and was not delivered"
-            ))
+        Ok(())
+    }
+}
+
+impl Sent {
+    /// Whether its sender knows what has become of it, and what it knows is true. A component may
+    /// read later what was acknowledged, so that this is judged in the end.
+    fn check_result(
+        &self,
+        lives: &[u32],
+        is_forgetful: impl Fn(usize) -> bool,
+    ) -> Result<(), String> {
+        let has_ended = |(node, life): Life| lives[node] != life;
+        match self.result {
+            None if self.message.acknowledge && !has_ended(self.by) => {
+                Err(format!("of {:?} has no result", self.at))
+            }
+            Some(true) if !self.is_at_risk => {
+                let [receiver] = self.receivers[..] else {
+                    return Err("is acknowledged by nobody known".to_owned());
+                };
+                let (_, life) = receiver;
+                let is_there = self.delivered.contains_key(&receiver);
+                if is_there || has_ended(life) || is_forgetful(life.0) {
+                    Ok(())
+                } else {
+                    Err("is acknowledged and was not delivered".to_owned())
+                }
+            }
+            _ => Ok(()),
         }
     }
 
-    /// Judges what is left when nothing happens any more.
-    pub(crate) fn close(&self, lives: &[u32]) -> Result<(), String> {
-        for (number, sent) in self.sent.iter().enumerate() {
-            let alive = lives[sent.by.0] == sent.by.1;
-            if sent.message.acknowledge && alive && !sent.told {
-                let code = number + 1;
-                return Err(format!("message {code} of {:?} has no result", sent.at));
+    /// Whether it was delivered once to each receiver, and acknowledged if it asks for that.
+    fn check_fulfilled(&self, is_reached: impl Fn(usize) -> bool) -> Result<(), String> {
+        let to = self.message.destination;
+        for receiver in self.receivers.iter().filter(|it| is_reached(it.1.0)) {
+            let times = self.delivered.get(receiver).map_or(0, |it| it.1);
+            if times != 1 {
+                let id = receiver.0;
+                return Err(format!(
+                    "for {to} reached {id} {times} times on a good wire"
+                ));
             }
+        }
+        let mut receivers = self.receivers.iter();
+        let is_reached = receivers.all(|it| is_reached(it.1.0));
+        if self.message.acknowledge && is_reached && self.result != Some(true) {
+            return Err(format!("for {to} is not acknowledged on a good wire"));
         }
         Ok(())
     }

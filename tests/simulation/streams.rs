@@ -13,10 +13,13 @@ use jaus::service::{
 
 use crate::producer::{Habits, Producer};
 use crate::sim::{Conditions, Host, Network, Owner, Random};
+use crate::totals::Counts;
 use crate::vehicle::Vehicle;
 
 const PRODUCER: JausId = JausId::new(101, 1, 1);
 const CLIENTS: [JausId; 2] = [JausId::new(42, 1, 1), JausId::new(43, 1, 1)];
+/// What is counted.
+const NAMES: [&str; 4] = ["times up", "times down", "reports", "ended"];
 /// How long things go wrong.
 const TROUBLE: Duration = Duration::from_secs(120);
 /// How long it may take until all is well: the longest pause of a client, and the time in which a
@@ -27,7 +30,7 @@ const MEASURED: Duration = Duration::from_secs(20);
 const ACTIONS: usize = 40;
 
 /// Runs the scenario of a seed; tells which promise was broken.
-pub(crate) fn run(seed: u64) -> Result<(), String> {
+pub(crate) fn run(seed: u64) -> Result<Counts, String> {
     let mut world = World::new(seed);
     let start = world.network.now();
     let mut times: Vec<_> = (0..ACTIONS)
@@ -39,13 +42,15 @@ pub(crate) fn run(seed: u64) -> Result<(), String> {
         world.run_for((start + time).saturating_duration_since(now))?;
         world.act();
     }
-    world.come_to_rest()
+    world.come_to_rest()?;
+    Ok(world.counts())
 }
 
 /// A client with its notes about its subscriptions.
 struct Client {
     stack: Stack,
     streams: BTreeMap<SubscriptionId, Stream>,
+    counts: Counts,
     /// Whether it has subscribed to anything; before that it leaves events alone.
     has_subscribed: bool,
 }
@@ -84,6 +89,7 @@ impl Client {
         Party::Client(Box::new(Self {
             stack,
             streams: BTreeMap::new(),
+            counts: NAMES.map(|name| (name, 0)).into(),
             has_subscribed: false,
         }))
     }
@@ -104,6 +110,13 @@ impl Client {
         let Some(stream) = self.streams.get_mut(&id) else {
             return;
         };
+        let name = match news {
+            SubscriptionNews::Up { .. } => "times up",
+            SubscriptionNews::Report { .. } => "reports",
+            SubscriptionNews::Down { .. } => "times down",
+            SubscriptionNews::Ended(_) => "ended",
+        };
+        *self.counts.entry(name).or_default() += 1;
         match news {
             SubscriptionNews::Up { .. } => {
                 stream.up = true;
@@ -313,6 +326,19 @@ impl World {
             }
         }
         Ok(())
+    }
+
+    /// What the clients have been told in their last lives, and how the streams are in the end.
+    fn counts(&mut self) -> Counts {
+        let mut counts = Counts::new();
+        for host in self.clients {
+            let client = self.client(host);
+            for (&name, &count) in &client.counts {
+                *counts.entry(name).or_default() += count;
+            }
+            *counts.entry("streams after healing").or_default() += client.streams.len() as u64;
+        }
+        counts
     }
 
     /// With a good wire, every stream runs at its rate and no event is left over.

@@ -11,6 +11,7 @@
     reason = "these are tests, with processes that are killed at random instants"
 )]
 
+mod flipped;
 mod killed;
 mod ledger;
 mod torn;

@@ -35,8 +35,7 @@ fn first_image() -> Vec<u8> {
     let mut world = World::on(disk.clone()).unwrap();
     ledger::begin(&mut world);
     drop(world);
-    let state = disk.0.lock().unwrap();
-    state.seen.clone()
+    disk.seen()
 }
 
 /// The last step that was acknowledged.
@@ -55,7 +54,7 @@ fn write_until_cut(disk: &Disk, before: u32) -> u32 {
 
 /// A disk in memory.
 #[derive(Debug, Clone)]
-struct Disk(Arc<Mutex<State>>);
+pub(crate) struct Disk(Arc<Mutex<State>>);
 
 #[derive(Debug)]
 struct State {
@@ -76,13 +75,18 @@ enum Write {
 }
 
 impl Disk {
-    fn new(image: Vec<u8>, left: u64) -> Self {
+    pub(crate) fn new(image: Vec<u8>, left: u64) -> Self {
         Self(Arc::new(Mutex::new(State {
             kept: image.clone(),
             seen: image,
             unsure: Vec::new(),
             left,
         })))
+    }
+
+    /// What reads see.
+    pub(crate) fn seen(&self) -> Vec<u8> {
+        self.0.lock().unwrap().seen.clone()
     }
 
     /// What is found once there is power again.

@@ -1,0 +1,283 @@
+//! Components that look for each other while the wire is bad and nodes restart and die: once it is
+//! good, all of them know the same, which is the truth.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::endpoint::{Config, Endpoint, Event as EndpointEvent};
+use jaus::service::{
+    Change, Directory, Discovery, Event, Kind, Liveness, Profile, Scope, Service, Stack, Timing,
+};
+
+use crate::sim::{Conditions, Host, Network, Owner, Random};
+use crate::totals::Counts;
+
+/// How long things go wrong.
+const TROUBLE: Duration = Duration::from_secs(60);
+const ACTIONS: usize = 15;
+/// With a good wire, all directories tell the truth within this time.
+const AGREED: Duration = Duration::from_secs(240);
+/// How often that is looked at.
+const LOOK: Duration = Duration::from_secs(1);
+/// What is counted.
+const NAMES: [&str; 8] = [
+    "cuts",
+    "restarts",
+    "deaths",
+    "routed runs",
+    "components found",
+    "components lost",
+    "directories that agree",
+    "seconds until they did",
+];
+
+/// Runs the scenario of a seed; tells which directory is wrong.
+pub(crate) fn run(seed: u64) -> Result<Counts, String> {
+    let mut world = World::new(seed);
+    let start = world.network.now();
+    let mut times: Vec<_> = (0..ACTIONS)
+        .map(|_| world.random.up_to_millis(TROUBLE.as_millis() as u64))
+        .collect();
+    times.sort_unstable();
+    for time in times {
+        let now = world.network.now();
+        world
+            .network
+            .run_for((start + time).saturating_duration_since(now));
+        world.act();
+    }
+    world.heal();
+    world.run_until_agreed()?;
+    Ok(world.counts())
+}
+
+/// What a directory tells of components: their services.
+type Told = BTreeMap<JausId, Vec<String>>;
+
+/// The two components of a node.
+struct Components {
+    stacks: Vec<Stack>,
+    counts: Counts,
+}
+
+struct World {
+    random: Random,
+    network: Network<Components>,
+    is_routed: bool,
+    /// How many nodes there are, and which of them are dead.
+    is_dead: Vec<bool>,
+    counts: Counts,
+}
+
+fn ids(node: usize) -> [JausId; 2] {
+    let subsystem = 101 + node as u16 / 2;
+    let node = 1 + (node % 2) as u8;
+    [1, 7].map(|component| JausId::new(subsystem, node, component))
+}
+
+impl Components {
+    fn new(now: Instant, node: usize, seed: u64) -> Self {
+        let stack = |id: JausId| {
+            let mut profile = Profile::new(Kind::Vehicle, format!("Rover {}", id.subsystem()));
+            profile.component = format!("Component {id}");
+            let discovery = Discovery::new(id, profile, Scope::System, Timing::default(), seed);
+            let services: Vec<Box<dyn Service>> = match id.component() {
+                1 => vec![Box::new(Liveness::new())],
+                _ => Vec::new(),
+            };
+            let mut stack = Stack::new(discovery, services);
+            stack.start(now);
+            stack
+        };
+        Self {
+            stacks: ids(node).map(stack).into(),
+            counts: Counts::new(),
+        }
+    }
+
+    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        for stack in &mut self.stacks {
+            while let Some(message) = stack.poll_transmit() {
+                // The other may have gone.
+                let _ = endpoint.send(now, message);
+            }
+            while let Some(event) = stack.poll_event() {
+                let name = match event {
+                    Event::Change(Change::Found(_)) => "components found",
+                    Event::Change(Change::Lost(..)) => "components lost",
+                    _ => continue,
+                };
+                *self.counts.entry(name).or_default() += 1;
+            }
+        }
+    }
+}
+
+impl Owner for Components {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+        if let EndpointEvent::Received(message) = event {
+            let mut stacks = self.stacks.iter_mut();
+            if let Some(stack) = stacks.find(|stack| stack.id() == message.to) {
+                stack.handle_message(now, &message);
+            }
+            self.settle(now, endpoint);
+        }
+    }
+
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+        let is_due = |stack: &&mut Stack| stack.poll_timeout().is_some_and(|due| due <= now);
+        for stack in self.stacks.iter_mut().filter(is_due) {
+            stack.handle_timeout(now);
+        }
+        self.settle(now, endpoint);
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        self.stacks.iter().filter_map(Stack::poll_timeout).min()
+    }
+}
+
+fn told(directory: &Directory) -> Told {
+    let components = directory.components().map(|component| {
+        let mut services: Vec<_> = component.offered().map(|it| it.urn.clone()).collect();
+        services.sort_unstable();
+        (component.id, services)
+    });
+    components.collect()
+}
+
+impl World {
+    fn new(seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let conditions = Conditions {
+            lost: random.choose(&[0, 50, 200]),
+            repeated: random.choose(&[0, 100]),
+            ..Conditions::poor()
+        };
+        let mut network = Network::new(random.number(), conditions);
+        if crate::sim::seeds::is_traced() {
+            network.trace().print();
+        }
+        let is_routed = random.happens(400);
+        let count = 3 + random.below(3);
+        for node in 0..count {
+            let networks: &[u8] = match (is_routed, node) {
+                (false, _) => &[0],
+                (true, 0) => &[0, 1],
+                (true, _) => &[(node % 2) as u8],
+            };
+            let components = Components::new(network.now(), node, random.number());
+            network.join_networks(networks, endpoint(node, networks.len() > 1), components);
+        }
+        let mut counts: Counts = NAMES.map(|name| (name, 0)).into();
+        counts.insert("routed runs", is_routed.into());
+        Self {
+            random,
+            network,
+            is_routed,
+            is_dead: vec![false; count],
+            counts,
+        }
+    }
+
+    fn any(&mut self) -> usize {
+        self.random.below(self.is_dead.len())
+    }
+
+    fn count(&mut self, name: &'static str) {
+        *self.counts.entry(name).or_default() += 1;
+    }
+
+    fn act(&mut self) {
+        let (node, other) = (self.any(), self.any());
+        match self.random.below(8) {
+            0..4 if node != other => {
+                self.count("cuts");
+                let is_cut = self.random.happens(700);
+                self.network.set_cut(Host(node), Host(other), is_cut);
+            }
+            4..6 => {
+                self.count("restarts");
+                self.restart(node);
+            }
+            // A router that is dead would leave two networks.
+            6 if node > 0 => {
+                self.count("deaths");
+                self.is_dead[node] = true;
+                self.network.kill(Host(node));
+            }
+            _ => {}
+        }
+    }
+
+    fn restart(&mut self, node: usize) {
+        self.keep_counts(node);
+        let components = Components::new(self.network.now(), node, self.random.number());
+        let forwarding = self.is_routed && node == 0;
+        self.network
+            .restart(Host(node), endpoint(node, forwarding), components);
+        self.is_dead[node] = false;
+    }
+
+    /// Ends all trouble; who is dead stays dead.
+    fn heal(&mut self) {
+        self.network.set_conditions(Conditions::good());
+        let count = self.is_dead.len();
+        for (one, other) in (0..count).flat_map(|one| (0..one).map(move |other| (one, other))) {
+            self.network.set_cut(Host(one), Host(other), false);
+        }
+    }
+
+    fn run_until_agreed(&mut self) -> Result<(), String> {
+        let end = self.network.now() + AGREED;
+        loop {
+            self.network.run_for(LOOK);
+            *self.counts.entry("seconds until they did").or_default() += LOOK.as_secs();
+            match self.check() {
+                Err(_) if self.network.now() < end => {}
+                judged => return judged,
+            }
+        }
+    }
+
+    /// Whether every directory of the living tells the truth.
+    fn check(&mut self) -> Result<(), String> {
+        let living = (0..self.is_dead.len()).filter(|&node| !self.is_dead[node]);
+        let living: Vec<_> = living.collect();
+        let mut known = Vec::new();
+        for node in living {
+            let stacks = &self.network.owner(Host(node)).stacks;
+            known.extend(stacks.iter().map(|it| (it.id(), told(it.directory()))));
+        }
+        let own = |(id, told): &(JausId, Told)| (*id, told[id].clone());
+        let truth: Told = known.iter().map(own).collect();
+        if let Some((id, told)) = known.iter().find(|(_, told)| *told != truth) {
+            return Err(format!("{id} knows {told:?}, and the truth is {truth:?}"));
+        }
+        *self.counts.entry("directories that agree").or_default() += known.len() as u64;
+        Ok(())
+    }
+
+    fn keep_counts(&mut self, node: usize) {
+        for (name, count) in std::mem::take(&mut self.network.owner(Host(node)).counts) {
+            *self.counts.entry(name).or_default() += count;
+        }
+    }
+
+    fn counts(mut self) -> Counts {
+        (0..self.is_dead.len()).for_each(|node| self.keep_counts(node));
+        self.counts
+    }
+}
+
+fn endpoint(node: usize, forwarding: bool) -> Endpoint {
+    let mut endpoint = Endpoint::new(Config {
+        forwarding,
+        ..Config::default()
+    });
+    for id in ids(node) {
+        endpoint.attach(id).expect("a component");
+    }
+    endpoint
+}

@@ -1,0 +1,63 @@
+//! What every endpoint keeps to, whatever goes wrong: its bounds, and rest once all is quiet.
+
+use jaus::endpoint::Counter;
+
+use crate::nodes::{Nodes, components};
+use crate::sim::Host;
+
+/// So many packets may be on their way above the window when they are urgent.
+const URGENT: usize = 32;
+/// Each packet of a message and each answer may be tried that often, and to many.
+const TRIES: u64 = 80;
+
+/// Whether tables, buffers and windows keep their bounds.
+pub(crate) fn check_bounds(nodes: &mut Nodes) -> Result<(), String> {
+    (0..nodes.len()).try_for_each(|node| check_bounds_of(nodes, node))
+}
+
+fn check_bounds_of(nodes: &mut Nodes, node: usize) -> Result<(), String> {
+    let count = nodes.len();
+    let config = &nodes.plan.nodes[node].config;
+    let endpoint = nodes.network.endpoint(Host(node));
+    let peers = endpoint.peers().count();
+    if peers > config.max_peers {
+        return Err(format!("node {node} knows {peers} peers"));
+    }
+    let unfinished = endpoint.unfinished();
+    if unfinished > config.max_reassembly {
+        return Err(format!("node {node} keeps {unfinished} octets"));
+    }
+    for id in (0..count).flat_map(components) {
+        let Some(flow) = endpoint.flow(id) else {
+            continue;
+        };
+        if flow.window > config.max_window || flow.in_flight > config.max_window + URGENT {
+            return Err(format!("node {node} sends too much at once: {flow:?}"));
+        }
+    }
+    Ok(())
+}
+
+/// Whether nothing is left of `packets` packets that nodes were given to send, and no more was sent
+/// for them than is sensible.
+pub(crate) fn check_rest(nodes: &mut Nodes, packets: u64) -> Result<(), String> {
+    let links: usize = nodes.plan.nodes.iter().map(|it| it.networks.len()).sum();
+    // A router sends on each of its other links what comes by one.
+    let hops = (1 + links - nodes.len()) as u64;
+    let (carried, most) = (nodes.network.carried(), 100 + packets * TRIES * hops);
+    if carried > most {
+        return Err(format!("{carried} datagrams for {packets} packets"));
+    }
+    for node in 0..nodes.len() {
+        let endpoint = nodes.network.endpoint(Host(node));
+        let unfinished = endpoint.unfinished();
+        if unfinished > 0 {
+            return Err(format!("node {node} keeps {unfinished} octets for ever"));
+        }
+        let malformed = endpoint.counters().get(Counter::Malformed);
+        if malformed > 0 && !nodes.plan.is_corrupting {
+            return Err(format!("node {node} got what it cannot read"));
+        }
+    }
+    Ok(())
+}
