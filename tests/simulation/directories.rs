@@ -248,7 +248,7 @@ impl World {
         let mut known = Vec::new();
         for node in living {
             let stacks = &self.network.owner(Host(node)).stacks;
-            known.extend(stacks.iter().map(|it| (it.id(), told(it.directory()))));
+            known.extend(stacks.iter().map(|it| (it.id(), told(&it.directory()))));
         }
         let own = |(id, told): &(JausId, Told)| (*id, told[id].clone());
         let truth: Told = known.iter().map(own).collect();
