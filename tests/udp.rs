@@ -226,6 +226,7 @@ async fn a_train_arrives_as_the_datagrams_that_it_is_made_of() {
         // Shorter than a datagram of the train, and as long as one.
         a.transmit(&train(&b, octets.slice(..999), 1000));
         a.transmit(&train(&b, octets.slice(..1000), 1000));
+        a.flush();
         for datagram in octets.chunks(1000).chain([&octets[..999], &octets[..1000]]) {
             let (from, received) = receive(&mut b).await;
             assert_eq!(from, a.local());
@@ -247,6 +248,7 @@ async fn a_train_to_everyone_reaches_everyone_whole() {
         ..train(&b, octets, 1000)
     };
     a.transmit(&to_all);
+    a.flush();
     for length in [[1000; 10].as_slice(), &[100]].concat() {
         assert_eq!(receive(&mut b).await.1.len(), length);
     }
