@@ -28,6 +28,8 @@ const REST: Duration = Duration::from_secs(70);
 /// How long streams are then measured.
 const MEASURED: Duration = Duration::from_secs(20);
 const ACTIONS: usize = 40;
+/// The first report of a stream may be followed by a pause.
+const BEGINNING: Duration = Duration::from_millis(2500);
 
 /// Runs the scenario of a seed; tells which promise was broken.
 pub(crate) fn run(seed: u64) -> Result<Counts, String> {
@@ -59,6 +61,8 @@ struct Client {
 struct Stream {
     topic: Topic,
     up: bool,
+    /// Since when it is up, or was.
+    since: Instant,
     sign: Instant,
     reports: u32,
     broken: Option<String>,
@@ -120,7 +124,7 @@ impl Client {
         match news {
             SubscriptionNews::Up { .. } => {
                 stream.up = true;
-                stream.sign = now;
+                (stream.since, stream.sign) = (now, now);
             }
             SubscriptionNews::Report { .. } => {
                 if !stream.up {
@@ -138,7 +142,8 @@ impl Client {
 }
 
 impl Stream {
-    /// A stream that is up is not silent for longer than four periods, nor than half a second.
+    /// A stream that is up is not silent for longer than four periods, nor than half a second,
+    /// except when it begins.
     fn check(&self, now: Instant) -> Result<(), String> {
         if let Some(broken) = &self.broken {
             return Err(broken.clone());
@@ -149,7 +154,8 @@ impl Stream {
         let limit = Duration::from_secs_f64(4.0 / hz).max(Duration::from_millis(500));
         let silent = now.saturating_duration_since(self.sign);
         // A renewal is a sign, too, and nobody is told of it.
-        if self.up && silent > 2 * limit {
+        let has_begun = now.saturating_duration_since(self.since) > BEGINNING;
+        if self.up && has_begun && silent > 2 * limit {
             return Err(format!(
                 "{:?} is silent for {silent:?} and not down",
                 self.topic
@@ -290,6 +296,7 @@ impl World {
                 let stream = Stream {
                     topic,
                     up: false,
+                    since: now,
                     sign: now,
                     reports: 0,
                     broken: None,

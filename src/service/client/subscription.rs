@@ -49,8 +49,8 @@ pub(super) struct Subscription {
     lifetime_asked: u32,
     /// When the last sign of the event came.
     heard: Instant,
-    /// When the peer confirmed the event last.
-    confirmed: Instant,
+    /// When the peer first confirmed the event, or another rate for it.
+    begun: Instant,
     /// When the peer said anything last.
     peer_heard: Instant,
     /// The last report's number, since the last confirmation.
@@ -85,7 +85,7 @@ impl Subscription {
     const SILENT_PERIODS: f64 = 4.0;
     /// … but not sooner than this after its last report.
     const LEAST_SILENCE: Duration = Duration::from_millis(500);
-    /// … nor sooner than this after its confirmation: JAUS++ sends a first report at once, and begins
+    /// … nor sooner than this after it was first confirmed: JAUS++ sends a first report at once, and begins
     /// with its periods some time later.
     const SETTLING: Duration = Duration::from_secs(2);
     /// Numbers may be so far ahead of what the rate explains: JAUS++ sends at the fastest rate of all
@@ -115,7 +115,7 @@ impl Subscription {
             lifetime: None,
             lifetime_asked: 0,
             heard: now,
-            confirmed: now,
+            begun: now,
             peer_heard: now,
             sequence: None,
             early: None,
@@ -184,7 +184,6 @@ impl Subscription {
         self.hz = confirmed;
         self.asked = 0;
         self.heard = now;
-        self.confirmed = now;
         self.sequence = None;
         self.next_ask = self.refresh().map(|pause| now + pause);
         if unasked {
@@ -196,6 +195,7 @@ impl Subscription {
             return;
         }
         if is_news {
+            self.begun = now;
             news.push(SubscriptionNews::Up { hz: confirmed });
         }
         let early = self.early.take();
@@ -355,7 +355,7 @@ impl Subscription {
         let hz = self.hz.filter(|_| self.state == State::Up)?;
         let periods = Duration::try_from_secs_f64(Self::SILENT_PERIODS / hz).ok()?;
         let silent = self.heard.checked_add(periods.max(Self::LEAST_SILENCE))?;
-        Some(silent.max(self.confirmed + Self::SETTLING))
+        Some(silent.max(self.begun + Self::SETTLING))
     }
 
     /// How many reports were lost if the next one's number is so far ahead: none if there cannot have
