@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::Discovery;
+use super::known::Known;
 use crate::address::JausId;
 use crate::codec::{Composite, Message, Text};
 use crate::endpoint::Received;
@@ -85,7 +86,9 @@ impl Discovery {
         let nodes = nodes
             .flat_map(Subsystem::nodes)
             .filter(|(id, _)| whole || *id == self.own.node());
-        let node_list = nodes.map(|(id, node)| configuration_of(id, node)).collect();
+        let known = self.known.lock();
+        let nodes = nodes.filter_map(|(id, node)| configuration_of(id, node, &known));
+        let node_list = nodes.collect();
         out.reply(received, &ReportConfiguration { node_list });
     }
 
@@ -128,8 +131,8 @@ impl Discovery {
         let together = received.destination.has_wildcard();
         let wanted = |id: JausId| query_services_wants(&query, id);
         let directory = self.directory();
-        let mine = self.speaks_for(&directory, together);
-        let mut asked: Vec<&Component> = mine.filter(|c| wanted(c.id)).collect();
+        let mut asked = self.speaks_for(&directory, together);
+        asked.retain(|component| wanted(component.id));
         // Who reads one report only gets that of the component it asked.
         asked.sort_by_key(|component| component.id != self.own);
         let mut reports = Vec::new();
@@ -182,15 +185,13 @@ impl Discovery {
     }
 
     /// The components that we speak for: ourselves, or all that we know of our subsystem.
-    fn speaks_for<'d>(
-        &self,
-        directory: &'d Directory,
-        together: bool,
-    ) -> impl Iterator<Item = &'d Component> {
+    fn speaks_for<'d>(&self, directory: &'d Directory, together: bool) -> Vec<&'d Component> {
         let own = self.own;
+        let known = self.known.lock();
         let subsystem = directory.subsystem(own.subsystem()).into_iter();
         let members = subsystem.flat_map(Subsystem::components);
-        members.filter(move |component| !together || component.id == own)
+        let told = |it: &&Component| it.id == own || !together && known.is_heard(it.id);
+        members.filter(told).collect()
     }
 }
 
@@ -212,17 +213,18 @@ pub(super) fn tell_services(
     }
 }
 
-fn configuration_of(id: u8, node: &Node) -> report_configuration::NodeSeq {
-    let components = node
-        .components()
-        .map(|component| report_configuration::ComponentRec {
-            component_id: component.id.component(),
-            instance_id: 0,
-        });
-    report_configuration::NodeSeq {
+/// What we know ourselves of a node; `None` if that is nothing.
+fn configuration_of(id: u8, node: &Node, known: &Known) -> Option<report_configuration::NodeSeq> {
+    let components = node.components().filter(|it| known.is_heard(it.id));
+    let components = components.map(|component| report_configuration::ComponentRec {
+        component_id: component.id.component(),
+        instance_id: 0,
+    });
+    let component_list: Vec<_> = components.collect();
+    (!component_list.is_empty()).then(|| report_configuration::NodeSeq {
         node_rec: report_configuration::NodeRec { node_id: id },
-        component_list: components.collect(),
-    }
+        component_list,
+    })
 }
 
 /// Whether a Query Services asks for this component. An empty list asks for everything, and so

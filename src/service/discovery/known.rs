@@ -176,6 +176,13 @@ impl Known {
         in_scope && id.is_unicast() && !self.members.contains_key(&id)
     }
 
+    /// Whether a component is of this node or was heard itself. Only those are told to others: two nodes
+    /// that repeat what the other lists would keep the dead alive for ever.
+    pub(super) fn is_heard(&self, id: JausId) -> bool {
+        let speaks = |peer: &super::peers::Peer| peer.listed_by.is_none();
+        self.members.contains_key(&id) || self.peers.get(id).is_some_and(speaks)
+    }
+
     /// Wants to know something, as far as the share of the component's address goes.
     pub(super) fn wonder(&mut self, now: Instant, about: JausId, what: What, share: Share) {
         let is_wanted = self.scope != Scope::Nobody;

@@ -64,7 +64,7 @@ impl Known {
                     self.ask_who_it_is(now, id, share);
                 }
             }
-            Some(_) => {}
+            Some(_) => self.peers.list(now, id),
         }
         true
     }
@@ -87,7 +87,10 @@ impl Known {
                 return false;
             }
         }
-        let interval = self.timing.refresh_interval(self.peers.confirmed() + 1);
+        let interval = match listed_by {
+            Some(_) => self.timing.longest_silence,
+            None => self.timing.refresh_interval(self.peers.confirmed() + 1),
+        };
         let refresh = now + self.jitter.around(interval);
         self.peers
             .insert(now, id, (listed_by, share), (look, refresh));

@@ -11,7 +11,7 @@ use crate::service::share::{Share, Shares};
 /// A component of which we know.
 #[derive(Debug)]
 pub(super) struct Peer {
-    /// When it was heard last.
+    /// When it was heard last, or listed if it does not speak for itself.
     pub(super) heard: Instant,
     /// Who listed it; `None` if it speaks for itself.
     pub(super) listed_by: Option<JausId>,
@@ -139,6 +139,13 @@ impl Peers {
             self.look_again(now, id);
         }
         true
+    }
+
+    /// A component is listed once more.
+    pub(super) fn list(&mut self, now: Instant, id: JausId) {
+        if let Some(peer) = self.all.get_mut(&id).filter(|it| it.listed_by.is_some()) {
+            peer.heard = now;
+        }
     }
 
     /// A component that was only listed speaks for itself.

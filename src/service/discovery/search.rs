@@ -14,6 +14,8 @@ use crate::service::{Level, Outbox};
 const FIRST_CALL: Duration = Duration::from_millis(50);
 /// One query asks for the services of so many components at most, if one of them speaks for them.
 const MOST_TOGETHER: usize = 128;
+/// A listed component leaves when whoever listed it was asked so often and did not list it again.
+const LISTED_IN_VAIN: u32 = 4;
 
 impl Known {
     pub(super) fn handle_timeout(&mut self, now: Instant, out: &mut Outbox) {
@@ -86,19 +88,26 @@ impl Known {
         }
     }
 
-    /// Asks again what may have changed.
+    /// Asks again what may have changed, and whoever lists a component whether it still does.
     fn refresh(&mut self, now: Instant) {
-        let interval = self.timing.refresh_interval(self.peers.confirmed());
+        let refresh = self.timing.refresh_interval(self.peers.confirmed());
         while let Some((due, id)) = self.peers.first_refresh()
             && due <= now
             && let Some(peer) = self.peers.get(id)
         {
-            let (share, speaks) = (peer.share, peer.listed_by.is_none());
+            let (share, listed_by) = (peer.share, peer.listed_by);
+            let silence = now.saturating_duration_since(peer.heard);
+            let interval = listed_by.map_or(refresh, |_| self.timing.longest_silence);
+            if listed_by.is_some() && silence > LISTED_IN_VAIN * interval {
+                self.lose(now, id, Loss::Unlisted);
+                continue;
+            }
             let next = now + self.jitter.around(interval);
             self.peers.refresh_again(next, id);
             self.wonder(now, id, What::Services, share);
-            if speaks {
-                self.ask_who_it_is(now, id, share);
+            match listed_by {
+                Some(reporter) => self.wonder(now, reporter, What::Configuration, share),
+                None => self.ask_who_it_is(now, id, share),
             }
             if self.reporters.get(&id.subsystem()) == Some(&id) {
                 self.wonder(now, id, What::Configuration, share);
