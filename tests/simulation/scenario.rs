@@ -23,9 +23,9 @@ const LONGEST_AFTER_HEALING: usize = 20_000;
 const TROUBLE: u64 = 3000;
 /// What happens until then, at the most.
 const MOST_ACTIONS: usize = 40;
-/// After the last action the network rests by then: a packet is tried for some time, 20 times, with
-/// up to 2 seconds between.
-const REST: Duration = Duration::from_secs(60);
+/// After the last action the network rests by then: each packet of a large message is tried for some
+/// time, 20 times, with up to 2 seconds between.
+const REST: Duration = Duration::from_secs(240);
 /// When all is mended, so much time passes before anything is sent again: windows and memories of
 /// what was heard before are over.
 const PAUSE: Duration = Duration::from_secs(10);

@@ -123,7 +123,9 @@ struct Sender {
     /// Where it is.
     origin: Origin,
     cost: usize,
-    /// When none of its runs was older, the last time that somebody looked.
+    /// When one of its runs has grown last, or a fragment came again.
+    grown: Instant,
+    /// The same, the last time that somebody looked.
     listed: Instant,
     /// The latest number, and how far it is from the first that was heard.
     latest: u16,
@@ -138,6 +140,7 @@ impl Sender {
             ends: BTreeSet::new(),
             origin,
             cost: 0,
+            grown: now,
             listed: now,
             latest: sequence,
             position: 0,
@@ -226,7 +229,7 @@ struct Share {
 #[derive(Debug)]
 pub(in crate::endpoint) struct Reassembly {
     senders: HashMap<JausId, Sender>,
-    /// The senders by the time of their oldest run, or earlier.
+    /// The senders by when one of their runs has grown last, or earlier.
     listed: BTreeSet<(Instant, JausId)>,
     cost: usize,
     /// The share of each network address, and the addresses in the order of their shares.
@@ -273,6 +276,9 @@ impl Reassembly {
         let sender = self.senders.entry(source).or_insert_with(new);
         let before = sender.cost;
         let inserted = sender.take_in(now, frame, held, self.max_message, counters);
+        if inserted.is_ok() {
+            sender.grown = now;
+        }
         let (after, runs, origin) = (sender.cost, sender.runs.len(), sender.origin);
         self.account(origin, before, after);
         match inserted {
@@ -288,6 +294,15 @@ impl Reassembly {
                 self.drop_if_empty(source);
                 Err(reason)
             }
+        }
+    }
+
+    /// Takes note of a fragment that came again: its sender is still at it.
+    pub(in crate::endpoint) fn keep(&mut self, now: Instant, frame: &Frame) {
+        if frame.flags.data() != DataControl::Single
+            && let Some(sender) = self.senders.get_mut(&frame.source)
+        {
+            sender.grown = now;
         }
     }
 
@@ -354,15 +369,14 @@ impl Reassembly {
         while self.cost > self.max_octets
             && let Some((listed, source)) = self.oldest_of_most()
         {
-            let oldest = self.senders.get(&source).and_then(Sender::oldest);
-            match oldest {
-                Some((updated, _)) if updated > listed => self.list(source),
+            match self.senders.get(&source) {
+                Some(sender) if sender.grown > listed => self.list(source),
                 _ => self.forget_oldest_of(source, counters),
             }
         }
     }
 
-    /// Of the network address that holds most, the sender with the oldest run.
+    /// Of the network address that holds most, the sender that has not grown for longest.
     fn oldest_of_most(&self) -> Option<(Instant, JausId)> {
         let (_, origin) = self.ranking.last()?;
         self.shares.get(origin)?.listed.first().copied()
@@ -407,31 +421,32 @@ impl Reassembly {
         self.list(source);
     }
 
-    /// Lists a sender by the time of its oldest run, or forgets it if it has none.
+    /// Lists a sender by when it has grown last, or forgets it if it has no run.
     fn list(&mut self, source: JausId) {
         let Some(sender) = self.senders.get_mut(&source) else {
             return;
         };
-        let (origin, before, oldest) = (sender.origin, sender.listed, sender.oldest());
-        if let Some((updated, _)) = oldest {
-            sender.listed = updated;
-            self.enlist(origin, updated, source);
-        } else {
+        let (origin, before, grown) = (sender.origin, sender.listed, sender.grown);
+        let is_empty = sender.runs.is_empty();
+        if is_empty {
             self.senders.remove(&source);
+        } else {
+            sender.listed = grown;
+            self.enlist(origin, grown, source);
         }
-        if oldest.is_none_or(|(updated, _)| updated != before) {
+        if is_empty || grown != before {
             self.strike(origin, before, source);
         }
     }
 
-    /// Forgets what has not grown for too long.
+    /// Forgets the runs of senders that have sent no fragment for too long. A run may rest longer than
+    /// that, while its sender tries in vain to send one fragment and the others are acknowledged.
     pub(in crate::endpoint) fn expire(&mut self, now: Instant, counters: &mut Counters) {
         while let Some(&(listed, source)) = self.listed.first()
             && listed + self.timeout <= now
         {
             while let Some(sender) = self.senders.get(&source)
-                && let Some((updated, _)) = sender.oldest()
-                && updated + self.timeout <= now
+                && sender.grown + self.timeout <= now
             {
                 self.forget_oldest_of(source, counters);
             }

@@ -175,6 +175,23 @@ fn messages_of_two_senders_do_not_mix() {
     assert_eq!(payloads(&mut rig), [one, other]);
 }
 
+/// What was acknowledged is not sent again, however long its sender tries in vain to send the rest.
+#[test]
+fn a_part_of_a_message_waits_for_the_rest_while_its_sender_sends_fragments() {
+    let mut rig = Rig::new();
+    let message = large(600);
+    let of_message = fragments(1, &message, 200);
+    of_message[..2].iter().for_each(|frame| rig.hear(frame));
+    for other in &fragments(100, &large(900), 200)[..4] {
+        rig.pass(Config::default().reassembly_timeout * 2 / 3);
+        rig.hear(other);
+    }
+    rig.hear(&of_message[2]);
+    assert_eq!(payloads(&mut rig), [message]);
+    rig.pass(Config::default().reassembly_timeout);
+    assert_eq!(rig.count(Counter::FragmentsForgotten), 1);
+}
+
 #[test]
 fn a_repeated_fragment_changes_nothing() {
     let mut rig = Rig::new();
