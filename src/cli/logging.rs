@@ -23,7 +23,7 @@ const LOG: &str = "JAUS_LOG";
 
 impl Logging {
     /// Sends the library's tracing to standard error. `usual` is what is told without a flag, such
-    /// as `error`.
+    /// as `warn`.
     ///
     /// # Errors
     /// If the environment variable cannot be read.

@@ -88,6 +88,17 @@ pub struct Path {
     pub peer: Remote,
 }
 
+impl Path {
+    /// Whether both lead to the same host, as far as the network tells.
+    pub(super) fn is_near(self, other: Self) -> bool {
+        match (self.peer.socket(), other.peer.socket()) {
+            (Some(one), Some(two)) => one.ip().to_canonical() == two.ip().to_canonical(),
+            (None, None) => self.link == other.link,
+            _ => false,
+        }
+    }
+}
+
 /// Whereto on a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum To {

@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 use std::hash::Hash;
-use std::net::IpAddr;
+use std::net::{IpAddr, Ipv6Addr};
 use std::time::{Duration, Instant};
 
 use super::{Counter, LinkId, Path};
@@ -161,7 +161,19 @@ impl<K: Eq + Hash> Buckets<K> {
     }
 }
 
-/// Where something comes from, as far as the network tells.
+/// What shares one quota: an IPv4 address, or the 64 bits of an IPv6 network, in which one host may
+/// take any number of addresses. Hosts on one cable share the network of link-local addresses, so
+/// there it is the address.
+pub(crate) fn quota_address(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V6(v6) if !v6.is_unicast_link_local() => {
+            Ipv6Addr::from_bits(v6.to_bits() >> 64 << 64).into()
+        }
+        other => other,
+    }
+}
+
+/// Where something comes from, as far as the network tells: what shares one quota.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Origin {
     Address(IpAddr),
@@ -171,7 +183,7 @@ pub(super) enum Origin {
 impl From<Path> for Origin {
     fn from(path: Path) -> Self {
         match path.peer.socket() {
-            Some(address) => Self::Address(address.ip().to_canonical()),
+            Some(address) => Self::Address(quota_address(address.ip())),
             None => Self::Line(path.link),
         }
     }
@@ -244,6 +256,16 @@ mod tests {
 
     fn taken<K: Eq + Hash + Copy>(buckets: &mut Buckets<K>, now: Instant, source: K) -> usize {
         (0..1000).filter(|_| buckets.take(now, source)).count()
+    }
+
+    #[test]
+    fn the_addresses_of_one_ipv6_network_share_a_quota_and_those_of_a_cable_do_not() {
+        let quota = |text: &str| quota_address(text.parse().unwrap());
+        assert_eq!(quota("2001:db8::1"), quota("2001:db8::ffff:1"));
+        assert_ne!(quota("2001:db8::1"), quota("2001:db8:0:1::1"));
+        assert_ne!(quota("fe80::1"), quota("fe80::2"));
+        assert_ne!(quota("10.0.0.1"), quota("10.0.0.2"));
+        assert_eq!(quota("10.0.0.1"), quota("::ffff:10.0.0.1"));
     }
 
     #[test]

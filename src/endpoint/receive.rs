@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use tracing::{debug, trace, warn};
 
+use super::peers::is_challenge;
 use super::recent::{Class, Fingerprint};
-use super::verify::{Warning, is_challenge};
+use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Path, Received};
 use crate::address::JausId;
 use crate::peer;
@@ -207,6 +208,7 @@ impl Endpoint {
             novelty => novelty,
         };
         if novelty != Novelty::New {
+            self.reassembly.keep(now, frame);
             self.peers.note(frame.source, |peer| peer.duplicates += 1);
             if passes && novelty == Novelty::Repeated {
                 self.pass_on(now, path, frame);
@@ -228,7 +230,8 @@ impl Endpoint {
         self.put_together(arrival, frame, broadcast, &receivers)
     }
 
-    /// Takes an acknowledgement. One that nobody waits for teaches nothing and moves nobody.
+    /// Takes an acknowledgement. One that nobody waits for teaches nothing and moves nobody, and
+    /// numbers can be guessed: so one from elsewhere than where the peer has proven to be is none.
     fn receive_acknowledgement(
         &mut self,
         now: Instant,
@@ -239,7 +242,7 @@ impl Endpoint {
         if self.calls.take(now, peer, local, number) {
             return self.learn(now, from, frame);
         }
-        if self.awaits_answer(peer, local, number) {
+        if self.awaits_answer(peer, local, number) && !self.peers.is_proven_elsewhere(peer, from) {
             self.learn(now, from, frame)?;
             self.receive_answer(now, frame)?;
             let from = self.where_it_reads(peer, from);

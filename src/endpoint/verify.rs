@@ -12,21 +12,18 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use tracing::{debug, warn};
 
-use super::peers::{Answer, Challenge, Doubt, Finding, Heard, Probe, Sighting};
+use super::peers::{
+    Answer, CHALLENGE, CHALLENGE_FLAGS, Challenge, Doubt, Finding, Heard, Probe, Sighting,
+};
 use super::rate::{Bucket, Buckets, Origin};
 use super::{Config, Counter, Endpoint, Event, Path, Rate};
 use crate::address::JausId;
-use crate::wire::{Acknowledgement, Flags, Frame, Framing, Priority};
+use crate::wire::{Frame, Framing};
 
 /// A challenge has a number that was used before, at least so many and at most twice as many
 /// numbers ago: none that a message waits for, and none that a peer's memory of numbers would
 /// confuse with those of messages to come.
 const NUMBERS_AGO: u16 = 1 << 14;
-/// A challenge is a Query Heartbeat Pulse, which every peer understands and which changes nothing.
-/// Its priority tells an endpoint that the query is not for the component, which never sees it.
-const CHALLENGE: &[u8] = b"\x02\x22";
-const CHALLENGE_FLAGS: Flags =
-    Flags::new(Priority::High).with_acknowledgement(Acknowledgement::Request);
 /// The shortest time between two warnings of a kind.
 const WARNING_INTERVAL: Duration = Duration::from_secs(10);
 
@@ -84,11 +81,6 @@ impl Warnings {
         }
         due
     }
-}
-
-/// Whether a message is a challenge, and not for the component that it is addressed to.
-pub(super) fn is_challenge(frame: &Frame) -> bool {
-    frame.flags == CHALLENGE_FLAGS && frame.payload == CHALLENGE && frame.destination.is_unicast()
 }
 
 impl Endpoint {

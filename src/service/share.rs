@@ -2,16 +2,16 @@
 //! host cannot fill it.
 
 use std::collections::BTreeMap;
-use std::net::{IpAddr, Ipv6Addr};
+use std::net::IpAddr;
 
-use crate::endpoint::{LinkId, Received, Remote};
+use crate::endpoint::{LinkId, Received, Remote, quota_address};
 
 /// Where an entry comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Share {
     /// A component of the same node.
     Here,
-    /// A network address. Of IPv6 addresses the network of 64 bits counts: a host has all of it.
+    /// A network address, or a network that one host may have all of.
     Address(IpAddr),
     /// A serial line.
     Line(LinkId),
@@ -25,13 +25,7 @@ impl Share {
         };
         match path.peer {
             Remote::Line => Self::Line(path.link),
-            Remote::Socket(address) => match address.ip().to_canonical() {
-                IpAddr::V6(ip) => {
-                    let network = ip.to_bits() & (u128::MAX << 64);
-                    Self::Address(Ipv6Addr::from_bits(network).into())
-                }
-                ip => Self::Address(ip),
-            },
+            Remote::Socket(address) => Self::Address(quota_address(address.ip())),
         }
     }
 }

@@ -41,6 +41,8 @@ pub use wire::{Conditions, Harm, Socket};
 
 /// The first link of each node, and the only one of most.
 pub const WIRE: LinkId = LinkId(0);
+/// So often can nothing honest happen at one time.
+const MOST_STEPS: u32 = 100_000;
 
 /// What takes the events of a simulated node, and may wake up and send by itself.
 pub trait Owner {
@@ -143,6 +145,8 @@ impl<O> Node<O> {
 pub struct Network<O = Mailbox> {
     start: Instant,
     now: Instant,
+    /// How often something has happened at this very time.
+    steps: u32,
     time: VirtualTime,
     wire: Wire,
     nodes: Vec<Node<O>>,
@@ -166,6 +170,7 @@ impl<O: Owner> Network<O> {
         Self {
             start: now,
             now,
+            steps: 0,
             time: VirtualTime::default(),
             wire: Wire::new(seed, conditions),
             nodes: Vec::new(),
@@ -413,6 +418,9 @@ impl<O: Owner> Network<O> {
 
     /// Goes to the next time at which something happens, and lets it happen. False if nothing is
     /// left.
+    ///
+    /// # Panics
+    /// If time does not go on.
     pub fn step(&mut self) -> bool {
         let Some(next) = self.next_time() else {
             return false;
@@ -428,6 +436,8 @@ impl<O: Owner> Network<O> {
     }
 
     fn set_now(&mut self, now: Instant) {
+        self.steps = if now > self.now { 0 } else { self.steps + 1 };
+        assert!(self.steps < MOST_STEPS, "somebody wakes again and again");
         self.now = now;
         self.time.set(now.saturating_duration_since(self.start));
     }

@@ -122,9 +122,10 @@ impl Nodes {
         let mut news = Vec::new();
         for node in 0..self.len() {
             let life = self.life(node);
+            let is_strict = self.plan.nodes[node].config.max_peers >= 4 * self.len();
             for (at, event) in std::mem::take(&mut self.network.owner(Host(node)).events) {
                 match event {
-                    Event::Received(received) => ledger.receive(at, life, &received)?,
+                    Event::Received(received) => ledger.receive(at, life, &received, is_strict)?,
                     event => news.push((life, event)),
                 }
             }

@@ -34,7 +34,7 @@ fn main() -> ExitCode {
     let program = Program::parse();
     let outcome = program
         .logging
-        .start("error")
+        .start("warn")
         .and_then(|()| match program.command {
             Command::Mission(mission) => mission.run(),
             Command::Load(load) => load.run(),

@@ -105,7 +105,7 @@ impl Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let ended = cli.logging.start("error").and_then(|()| cli.command.run());
+    let ended = cli.logging.start("warn").and_then(|()| cli.command.run());
     match ended {
         Ok(status) => status,
         // Whoever read our output has seen enough, as `head` does.

@@ -22,7 +22,10 @@ use crate::peer::{Assignment, Recogniser};
 use crate::wire::{Frame, Version};
 use places::{Places, Standing};
 pub use route::RouteState;
-pub(super) use route::{Answer, Challenge, Doubt, Finding, Probe};
+use route::has_own_number;
+pub(super) use route::{
+    Answer, CHALLENGE, CHALLENGE_FLAGS, Challenge, Doubt, Finding, Probe, is_challenge,
+};
 use state::PeerState;
 pub use state::{Peer, Traffic};
 
@@ -136,8 +139,14 @@ impl Peers {
     /// Whether an id is configured to be at another network address.
     pub(super) fn is_pinned_elsewhere(&self, id: JausId, from: Path) -> bool {
         let mut pins = self.configured.iter().filter(|pin| pin.id.matches(id));
-        let origin = Origin::from(from);
-        self.pin(id).is_some() && !pins.any(|pin| Origin::from(pin.path) == origin)
+        self.pin(id).is_some() && !pins.any(|pin| pin.path.is_near(from))
+    }
+
+    /// Whether it is proven that a peer is at another host than the one at the end of this path.
+    pub(super) fn is_proven_elsewhere(&self, id: JausId, from: Path) -> bool {
+        self.states.get(&id).is_some_and(|state| {
+            state.peer.route == RouteState::Verified && !state.peer.path.is_near(from)
+        })
     }
 
     /// Whether somebody at the other end of a path has shown to be there, or is configured to be.
@@ -181,10 +190,13 @@ impl Peers {
         if state.settled_until.is_some_and(|until| now < until) {
             return Heard::Elsewhere;
         }
-        let is_near = Origin::from(from) == Origin::from(path);
+        let is_near = from.is_near(path);
         let was_verified = state.peer.route == RouteState::Verified;
+        // A connection shows that somebody is there, not that the id is theirs.
+        let is_free =
+            is_near || now.saturating_duration_since(state.heard_on_route) >= route::SILENT;
         let (route, contested) = match state.peer.route {
-            RouteState::Unverified if seen.is_stream => (RouteState::Verified, false),
+            RouteState::Unverified if seen.is_stream && is_free => (RouteState::Verified, false),
             RouteState::Unverified => (RouteState::Unverified, can_challenge),
             RouteState::Stale => (RouteState::of(seen.is_stream), false),
             RouteState::Verified if is_near && seen.is_stream => (RouteState::Verified, false),
@@ -206,7 +218,13 @@ impl Peers {
         }
     }
 
-    fn take_in(&mut self, seen: Sighting<'_>, path: Path, number: u32, pinned: bool) -> Heard {
+    fn take_in(
+        &mut self,
+        seen: Sighting<'_>,
+        path: Path,
+        number: Option<u32>,
+        pinned: bool,
+    ) -> Heard {
         let Sighting { now, frame, .. } = seen;
         let evicted = if self.states.len() >= self.limit {
             let Some(evicted) = self.next_to_go(now, path.into()) else {
@@ -312,7 +330,7 @@ impl Peers {
             return;
         };
         let silence = now.saturating_duration_since(state.heard_on_route);
-        let is_near = |rival: Probe| Origin::from(rival.path) == Origin::from(incumbent.path);
+        let is_near = |rival: Probe| rival.path.is_near(incumbent.path);
         let due = now + route::TRY_INTERVAL;
         state.challenge = Some(Challenge {
             doubt,
@@ -385,7 +403,7 @@ impl Peers {
         let before = challenge.incumbent.path;
         let (path, route) = match (finding, challenge.rival) {
             (Finding::Moves { verified }, Some(rival)) => {
-                if Origin::from(rival.path) != Origin::from(before) {
+                if !rival.path.is_near(before) {
                     state.recogniser = Recogniser::new();
                 }
                 (rival.path, RouteState::of(verified))
@@ -408,23 +426,24 @@ impl Peers {
         Some(challenge)
     }
 
-    /// The round of its sequence numbers in which a sender is with this frame.
+    /// The round of its sequence numbers in which a sender is with this frame; 0 if its number is not
+    /// the sender's next.
     pub(super) fn round(&self, frame: &Frame) -> u16 {
-        (self.counted_on(frame) >> 16) as u16
+        self.counted_on(frame)
+            .map_or(0, |number| (number >> 16) as u16)
     }
 
-    /// The frame's sequence number, counted on over all rounds: of the numbers that it can stand
-    /// for the one nearest to the sender's latest.
-    fn counted_on(&self, frame: &Frame) -> u32 {
+    /// The frame's sequence number, counted on over all rounds, if it is its sender's next: of the
+    /// numbers that it can stand for the one nearest to the sender's latest.
+    fn counted_on(&self, frame: &Frame) -> Option<u32> {
         const FIRST_ROUND: u32 = 1 << 16;
         let latest = self
             .states
             .get(&frame.source)
-            .map_or(FIRST_ROUND | u32::from(frame.sequence), |state| {
-                state.latest
-            });
+            .and_then(|state| state.latest);
+        let latest = latest.unwrap_or(FIRST_ROUND | u32::from(frame.sequence));
         let ahead = frame.sequence.wrapping_sub(latest as u16) as i16;
-        latest.wrapping_add_signed(ahead.into())
+        has_own_number(frame).then(|| latest.wrapping_add_signed(ahead.into()))
     }
 
     /// Whether somebody is known or could be: there is room, or somebody can go.

@@ -21,8 +21,7 @@ impl Standing {
     /// How long a peer must have been silent to be forgotten for a newcomer.
     pub(super) const fn silence(self) -> Duration {
         match self {
-            Self::Heard => Duration::ZERO,
-            Self::SpokenTo => Duration::from_secs(5),
+            Self::Heard | Self::SpokenTo => Duration::ZERO,
             Self::Answered => Duration::from_secs(60),
         }
     }

@@ -9,7 +9,13 @@ use std::time::{Duration, Instant};
 
 use crate::address::JausId;
 use crate::endpoint::Path;
+use crate::wire::{Acknowledgement, Flags, Frame, Priority};
 
+/// A challenge is a Query Heartbeat Pulse, which every peer understands and which changes nothing.
+/// Its priority tells an endpoint that the query is not for the component, which never sees it.
+pub(in crate::endpoint) const CHALLENGE: &[u8] = b"\x02\x22";
+pub(in crate::endpoint) const CHALLENGE_FLAGS: Flags =
+    Flags::new(Priority::High).with_acknowledgement(Acknowledgement::Request);
 /// How often a challenge is sent before it counts as not answered.
 const TRIES: u32 = 3;
 /// The time between two tries; the decision comes as long after the last.
@@ -128,4 +134,15 @@ pub(in crate::endpoint) enum Answer {
     /// It was waited for, and the other path has time to answer yet.
     Counts,
     Decides(Finding),
+}
+
+/// Whether a message is a challenge, and not for the component that it is addressed to.
+pub(in crate::endpoint) fn is_challenge(frame: &Frame) -> bool {
+    frame.flags == CHALLENGE_FLAGS && frame.payload == CHALLENGE && frame.destination.is_unicast()
+}
+
+/// Whether a frame has its sender's next number: an acknowledgement has that of what it
+/// acknowledges, and a challenge an old one.
+pub(super) fn has_own_number(frame: &Frame) -> bool {
+    !frame.flags.acknowledgement().is_answer() && !is_challenge(frame)
 }

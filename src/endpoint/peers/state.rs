@@ -82,8 +82,8 @@ pub(super) struct PeerState {
     pub(super) peer: Peer,
     /// Its place in the order of eviction.
     pub(super) place: Place,
-    /// Its latest sequence number, counted on over all rounds.
-    pub(super) latest: u32,
+    /// Its latest sequence number, counted on over all rounds, once one was heard.
+    pub(super) latest: Option<u32>,
     /// Who it is.
     pub(super) recogniser: Recogniser,
     /// When it was heard last where it is.
@@ -94,7 +94,13 @@ pub(super) struct PeerState {
 }
 
 impl PeerState {
-    pub(super) fn new(now: Instant, path: Path, frame: &Frame, number: u32, place: Place) -> Self {
+    pub(super) fn new(
+        now: Instant,
+        path: Path,
+        frame: &Frame,
+        number: Option<u32>,
+        place: Place,
+    ) -> Self {
         let mut received = Traffic::default();
         received.add(frame.payload.len());
         let mut recogniser = Recogniser::new();
@@ -124,17 +130,21 @@ impl PeerState {
         }
     }
 
-    /// A frame came from where the peer is, after `silence`.
-    pub(super) fn hear_on_route(&mut self, frame: &Frame, number: u32, silence: Duration) {
+    /// A frame came from where the peer is, after `silence`; `number` is where its sender is in its
+    /// own numbers, if it tells.
+    pub(super) fn hear_on_route(&mut self, frame: &Frame, number: Option<u32>, silence: Duration) {
         self.heard_on_route = self.peer.last_heard;
         self.peer.version = frame.version;
-        let latest = self.latest as u16;
-        let restarted = frame.sequence < FIRST_NUMBERS
-            && (frame.sequence.saturating_add(STEP_BACK)..LAST_NUMBERS).contains(&latest);
+        let restarted = number.is_some()
+            && frame.sequence < FIRST_NUMBERS
+            && self.latest.is_some_and(|latest| {
+                (frame.sequence.saturating_add(STEP_BACK)..LAST_NUMBERS).contains(&(latest as u16))
+            });
         if restarted || silence >= EVIDENCE_LIFE {
             return self.begin_anew(frame, number);
         }
-        if number.wrapping_sub(self.latest) as i32 > 0 {
+        let is_before = |latest: u32| number.is_none_or(|it| it.wrapping_sub(latest) as i32 <= 0);
+        if !self.latest.is_some_and(is_before) {
             self.latest = number;
         }
         // Whoever may not be the peer teaches nothing about it.
@@ -147,8 +157,8 @@ impl PeerState {
     }
 
     /// The peer begins anew: what was seen of it before says nothing about it.
-    pub(super) fn begin_anew(&mut self, frame: &Frame, number: u32) {
-        self.latest = number;
+    pub(super) fn begin_anew(&mut self, frame: &Frame, number: Option<u32>) {
+        self.latest = number.or(self.latest);
         self.heard_on_route = self.peer.last_heard;
         self.recogniser = Recogniser::new();
         self.recogniser.handle_frame(frame, 0);

@@ -169,7 +169,7 @@ fn who_is_denied_is_not_heard() {
 }
 
 #[test]
-fn a_table_full_of_conversations_takes_in_nobody_until_one_falls_silent() {
+fn a_table_full_of_peers_that_answer_takes_in_nobody_until_one_falls_silent() {
     let mut rig = Rig::with(Config {
         max_peers: 2,
         ..Config::default()
@@ -180,11 +180,7 @@ fn a_table_full_of_conversations_takes_in_nobody_until_one_falls_silent() {
     };
     for component in [1, 2] {
         rig.hear(&peer(component));
-        let answer = Outgoing {
-            destination: JausId::new(42, 1, component),
-            ..to_peer()
-        };
-        rig.send(answer).unwrap();
+        rig.vouch_for(JausId::new(42, 1, component));
     }
     rig.events();
     rig.hear(&peer(3));
@@ -192,7 +188,7 @@ fn a_table_full_of_conversations_takes_in_nobody_until_one_falls_silent() {
         (rig.received().len(), rig.count(Counter::PeersFull)),
         (0, 1)
     );
-    rig.pass(Duration::from_secs(6));
+    rig.pass(Duration::from_secs(61));
     rig.hear(&Frame {
         sequence: 2,
         ..peer(2)
@@ -204,6 +200,31 @@ fn a_table_full_of_conversations_takes_in_nobody_until_one_falls_silent() {
         .map(|peer| peer.id.component())
         .collect();
     assert_eq!(known, [2, 3]);
+}
+
+#[test]
+fn ids_that_prove_nothing_lock_nobody_out_however_many_addresses_they_have() {
+    let mut rig = Rig::with(Config {
+        max_peers: 60,
+        ..Config::default()
+    });
+    for component in 1..=60 {
+        let invented = JausId::new(42, 2, component);
+        let query = Frame {
+            source: invented,
+            ..from_peer(QUERY_HEARTBEAT)
+        };
+        rig.hear_from(50 + component % 6, &query);
+        let answer = Outgoing {
+            destination: invented,
+            ..to_peer()
+        };
+        rig.send(answer).unwrap();
+    }
+    rig.received();
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    assert_eq!(rig.received().len(), 1);
+    assert!(rig.endpoint.route(PEER).is_some());
 }
 
 #[test]
@@ -255,6 +276,28 @@ fn equal_messages_are_told_apart_when_the_numbers_have_gone_round() {
         let _ = rig.transmits();
     }
     assert_eq!((delivered, rig.count(Counter::Duplicate)), (140_000, 0));
+}
+
+#[test]
+fn a_duplicate_is_one_whatever_numbers_were_acknowledged_in_between() {
+    let mut rig = Rig::new();
+    let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    let positive = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    let message = Frame {
+        flags: ask,
+        sequence: 100,
+        ..from_peer(QUERY_HEARTBEAT)
+    };
+    rig.hear(&message);
+    for acknowledged in (0..=u16::MAX).step_by(0x3000) {
+        rig.hear(&Frame {
+            flags: positive,
+            sequence: acknowledged,
+            ..from_peer(b"")
+        });
+        rig.hear(&message);
+    }
+    assert_eq!(rig.received().len(), 1);
 }
 
 #[test]

@@ -70,6 +70,26 @@ fn a_forged_sender_steals_nothing_from_a_peer_that_answers() {
 }
 
 #[test]
+fn only_where_a_peer_has_proven_to_be_can_it_acknowledge() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    let message = Outgoing {
+        acknowledge: true,
+        ..to_peer()
+    };
+    rig.send(message).unwrap();
+    let (_, sent) = rig.sent().pop().unwrap();
+    let acknowledged = |rig: &mut Rig| {
+        let is_it = |event: &Event| matches!(event, Event::Acknowledged { .. });
+        rig.events().iter().any(is_it)
+    };
+    rig.hear_from(ELSEWHERE, &acknowledgement_of(&sent));
+    assert!(!acknowledged(&mut rig));
+    rig.hear_from(PEER_HOST, &acknowledgement_of(&sent));
+    assert!(acknowledged(&mut rig));
+}
+
+#[test]
 fn a_peer_with_another_address_is_followed_within_a_second() {
     let mut rig = Rig::new();
     rig.meet_peer();

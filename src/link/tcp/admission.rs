@@ -7,10 +7,11 @@
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
-use std::net::{IpAddr, Ipv6Addr, SocketAddr};
+use std::net::{IpAddr, SocketAddr};
 use std::time::Instant;
 
 use super::settings::HANDSHAKE;
+use crate::endpoint::quota_address;
 
 /// The most connections that others may open.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +48,7 @@ pub(super) enum Admission {
 impl Quota {
     /// Decides about a newcomer at `remote`, given the connections that others have opened.
     pub(super) fn admit(self, remote: SocketAddr, places: &[Place], now: Instant) -> Admission {
-        let newcomer = source(remote.ip());
+        let newcomer = quota_address(remote.ip());
         let mut held = BTreeMap::<IpAddr, usize>::new();
         for place in places {
             *held.entry(place.source()).or_default() += 1;
@@ -82,20 +83,11 @@ impl Quota {
 
 impl Place {
     fn source(&self) -> IpAddr {
-        source(self.remote.ip())
+        quota_address(self.remote.ip())
     }
 
     fn is_silent(&self, now: Instant) -> bool {
         self.heard.is_none() && now.saturating_duration_since(self.opened) >= HANDSHAKE
-    }
-}
-
-/// What shares one quota: an IPv4 address, or the 64 bits of an IPv6 network, in which one host may
-/// take any number of addresses.
-fn source(address: IpAddr) -> IpAddr {
-    match address.to_canonical() {
-        IpAddr::V6(v6) => Ipv6Addr::from_bits(v6.to_bits() >> 64 << 64).into(),
-        v4 => v4,
     }
 }
 
