@@ -1,7 +1,6 @@
 //! What the attacker does. Each attack ends by itself and says how much it has sent and got.
 
-use std::net::UdpSocket;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
@@ -16,82 +15,29 @@ use jaus::messages::core::{
 };
 use jaus::messages::mobility::{QueryLocalPose, SetWrenchEffort};
 use jaus::node::{Config, Node};
-use jaus::wire::{Frame, judp};
+use jaus::wire::{Acknowledgement, DataControl, Flags, Frame, judp};
 
-use crate::clients::{CLIENT, ECHO, VEHICLE};
+use crate::attacker::Attacker;
+use crate::clients::{CLIENT, VEHICLE};
 use crate::testbed::TO_STRANGERS;
-
-/// A socket that sends in any id, and counts what comes back.
-struct Attacker {
-    socket: UdpSocket,
-    sequence: u16,
-    packets: u64,
-    octets: u64,
-}
-
-impl Attacker {
-    fn new() -> Self {
-        let socket = UdpSocket::bind(("10.217.0.9", judp::PORT)).unwrap();
-        socket.connect((TO_STRANGERS, judp::PORT)).unwrap();
-        socket.set_nonblocking(true).unwrap();
-        Self {
-            socket,
-            sequence: 0,
-            packets: 0,
-            octets: 0,
-        }
-    }
-
-    fn send<M: Message>(&mut self, source: JausId, message: &M) {
-        let payload = message.encode().unwrap();
-        self.sequence = self.sequence.wrapping_add(1);
-        let frame = Frame {
-            sequence: self.sequence,
-            ..Frame::new(source, VEHICLE, payload)
-        };
-        self.send_octets(&judp::encode(&frame).unwrap());
-    }
-
-    fn send_octets(&mut self, datagram: &[u8]) {
-        // What the kernel does not take is lost.
-        let _ = self.socket.send(datagram);
-        self.packets += 1;
-    }
-
-    /// Counts what has come; it is not answered.
-    fn listen(&mut self) {
-        let mut buffer = [0; 65_535];
-        while let Ok(length) = self.socket.recv(&mut buffer) {
-            self.octets += length as u64;
-        }
-    }
-
-    /// Does something again and again, so many times a second, and listens meanwhile.
-    fn repeat(&mut self, time: Duration, rate: u32, mut act: impl FnMut(&mut Self, u32)) {
-        let (begun, mut number) = (Instant::now(), 0);
-        println!("\nbegun");
-        while begun.elapsed() < time {
-            while number < (begun.elapsed().as_secs_f64() * f64::from(rate)) as u32 {
-                act(self, number);
-                number += 1;
-            }
-            self.listen();
-            std::thread::sleep(Duration::from_millis(2));
-        }
-    }
-
-    fn report(&self) {
-        println!("\nattack packets={} octets={}", self.packets, self.octets);
-    }
-}
 
 /// Longer than the client needs for two looks and a newcomer to be found.
 const LONG: Duration = Duration::from_secs(30);
 
+/// The attacks that the echo socket sees too.
+const FLOODS: [&str; 3] = ["flood", "unending", "gapped"];
+
 pub(crate) async fn run(attack: &str) {
     let mut attacker = Attacker::new();
+    if FLOODS.contains(&attack) {
+        attacker = attacker.with_echo();
+    }
     match attack {
-        "flood" => flood(&mut attacker),
+        "flood" => attacker.repeat(LONG / 2, 10_000, mutate),
+        "unending" => attacker.repeat(LONG / 2, 10_000, unending),
+        "gapped" => attacker.repeat(LONG / 2, 10_000, gapped),
+        "overlapping" => attacker.repeat(LONG / 2, 10_000, overlapping),
+        "answers" => attacker.repeat(LONG / 2, 10_000, answers),
         "forged-id" => attacker.repeat(LONG / 2, 1000, |it, _| it.send(CLIENT, &pose())),
         "forged-control" => attacker.repeat(LONG / 6, 20, |it, _| {
             it.send(
@@ -127,19 +73,63 @@ fn effort() -> SetWrenchEffort {
     effort
 }
 
-/// Datagrams with one octet changed, at the vehicle and at the echo socket in turn.
-fn flood(attacker: &mut Attacker) {
-    let echo = UdpSocket::bind(("10.217.0.10", 0)).unwrap();
-    echo.connect((TO_STRANGERS, ECHO)).unwrap();
-    attacker.repeat(LONG / 2, 10_000, |it, number| {
-        let id = JausId::new(3000, 1, (number % 250 + 1) as u8);
-        let mut frame = Frame::new(id, VEHICLE, pose().encode().unwrap());
-        frame.sequence = number as u16;
-        let mut datagram = judp::encode(&frame).unwrap().to_vec();
-        let place = number as usize * 7 % datagram.len();
-        datagram[place] ^= (number / 7 % 255 + 1) as u8;
-        it.send_octets(&datagram);
-        let _ = echo.send(&datagram);
+/// Datagrams with one octet changed.
+fn mutate(attacker: &mut Attacker, number: u32) {
+    let id = JausId::new(3000, 1, (number % 250 + 1) as u8);
+    let mut frame = Frame::new(id, VEHICLE, pose().encode().unwrap());
+    frame.sequence = number as u16;
+    let mut datagram = judp::encode(&frame).unwrap().to_vec();
+    let place = number as usize * 7 % datagram.len();
+    datagram[place] ^= (number / 7 % 255 + 1) as u8;
+    attacker.send_octets(&datagram);
+}
+
+fn fragment(source: JausId, sequence: u32, data: DataControl, octets: usize) -> Frame {
+    Frame {
+        flags: Flags::default().with_data(data),
+        sequence: sequence as u16,
+        ..Frame::new(source, VEHICLE, vec![0x55; octets].into())
+    }
+}
+
+/// Messages of 200 ids that have a beginning, no end, and every second time no octets.
+fn unending(attacker: &mut Attacker, number: u32) {
+    let (id, position) = (number % 200, number / 200);
+    let data = match position {
+        0 => DataControl::First,
+        _ => DataControl::Middle,
+    };
+    let octets = [1400, 0][position as usize % 2];
+    let id = JausId::new(7000, 1, (id + 1) as u8);
+    attacker.send_frame(&fragment(id, position + 1, data, octets));
+}
+
+/// Every second fragment of messages of 20 ids, the last ones first.
+fn gapped(attacker: &mut Attacker, number: u32) {
+    let (id, position) = (number % 20, number / 20);
+    let id = JausId::new(7001, 1, (id + 1) as u8);
+    let sequence = u32::MAX - 2 * position;
+    attacker.send_frame(&fragment(id, sequence, DataControl::Middle, 64));
+}
+
+/// All numbers in an order in which any span of them is hit soon.
+const fn scattered(number: u32) -> u32 {
+    number.wrapping_mul(40_503)
+}
+
+/// Fragments in the client's id with any number, that overlap what it sends itself.
+fn overlapping(attacker: &mut Attacker, number: u32) {
+    let data = [DataControl::Middle, DataControl::Last, DataControl::First][number as usize % 3];
+    attacker.send_frame(&fragment(CLIENT, scattered(number / 3), data, 1000));
+}
+
+/// Acknowledgements and refusals in the client's id of any number.
+fn answers(attacker: &mut Attacker, number: u32) {
+    let answer = [Acknowledgement::Negative, Acknowledgement::Positive][number as usize % 2];
+    attacker.send_frame(&Frame {
+        flags: Flags::default().with_acknowledgement(answer),
+        sequence: scattered(number / 2) as u16,
+        ..Frame::new(CLIENT, VEHICLE, Bytes::new())
     });
 }
 

@@ -55,11 +55,13 @@ pub(crate) async fn client() {
                 },
                 _ = beats.tick() => {
                     pings += 1;
-                    lost += u64::from(!matches!(timeout(LOST, place()).await, Ok(Some(_))));
                     // Without an echo socket all of them are lost.
                     let _ = echo.send(b"ping").await;
-                    let answer = timeout(LOST / 50, echo.recv(&mut [0; 8])).await;
-                    echoes_lost += u64::from(!matches!(answer, Ok(Ok(_))));
+                    let mut answer = [0; 8];
+                    let echoed = timeout(LOST, echo.recv(&mut answer));
+                    let (answer, echoed) = tokio::join!(timeout(LOST, place()), echoed);
+                    lost += u64::from(!matches!(answer, Ok(Some(_))));
+                    echoes_lost += u64::from(!matches!(echoed, Ok(Ok(_))));
                 }
             }
         }
