@@ -96,6 +96,12 @@ impl Attacker {
         }
     }
 
+    /// Counts what another one has sent and got as its own.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.packets += other.packets;
+        self.octets += other.octets;
+    }
+
     pub(crate) fn report(&self) {
         println!("\nattack packets={} octets={}", self.packets, self.octets);
     }

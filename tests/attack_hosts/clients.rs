@@ -5,10 +5,13 @@ use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus::component::{Component, Kind, Update, When};
+use jaus::link::Ip;
 use jaus::messages::core::{QueryControl, ReportControl};
 use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
 use jaus::node::{Config, Node};
 use tokio::time::{interval, timeout};
+
+use crate::hosts::SETTINGS;
 
 pub(crate) const VEHICLE: JausId = JausId::new(101, 1, 1);
 pub(crate) const CLIENT: JausId = JausId::new(102, 1, 1);
@@ -16,6 +19,9 @@ pub(crate) const CLIENT: JausId = JausId::new(102, 1, 1);
 pub(crate) const ECHO: u16 = 9999;
 /// The vehicle's address on the client's cable.
 const TO_CLIENT: &str = "10.216.1.1";
+/// The same on the observer's cable.
+const TO_OBSERVER: &str = "10.216.3.1";
+const NEWCOMER: u16 = 104;
 /// How long the vehicle may be looked for.
 const SEARCH: Duration = Duration::from_secs(20);
 /// How long the client looks before it says what it has seen.
@@ -23,9 +29,27 @@ const SPAN: Duration = Duration::from_secs(6);
 /// What takes longer counts as lost.
 const LOST: Duration = Duration::from_millis(500);
 
+/// A node with the usual settings, but for those that the role was started with.
+fn config(subsystem: u16) -> Config {
+    let config = Config::new(subsystem, 1);
+    match std::env::var(SETTINGS).unwrap_or_default().as_str() {
+        "" | "echo" => config,
+        "ip6" => {
+            let cable = if subsystem == NEWCOMER { 3 } else { 1 };
+            config
+                .ip(Ip::V6)
+                .interfaces([format!("fd00:216:{cable}::2")])
+        }
+        "tcp" => config
+            .without_udp()
+            .tcp_connect(TO_OBSERVER.parse().unwrap()),
+        other => panic!("no setting is called {other}"),
+    }
+}
+
 /// Asks the vehicle and the echo socket twenty times a second, and subscribes to 25 poses a second.
 pub(crate) async fn client() {
-    let node = Node::start(Config::new(CLIENT.subsystem(), CLIENT.node())).unwrap();
+    let node = Node::start(config(CLIENT.subsystem())).unwrap();
     let builder = Component::builder(Kind::OperatorControlUnit, "Client");
     let client = builder.attach(&node, CLIENT.component()).unwrap();
     let found = client.find_within(local_pose_sensor::URN, SEARCH).await;
@@ -35,6 +59,7 @@ pub(crate) async fn client() {
     let mut events = events.await.unwrap();
     let echo = tokio::net::UdpSocket::bind(("0.0.0.0", 0)).await.unwrap();
     echo.connect((TO_CLIENT, ECHO)).await.unwrap();
+    let asks_echo = std::env::var(SETTINGS).is_ok_and(|it| it == "echo");
     let place = async || {
         let pose: Result<ReportLocalPose, _> = client.query(VEHICLE, &query).await;
         pose.ok()
@@ -55,13 +80,19 @@ pub(crate) async fn client() {
                 },
                 _ = beats.tick() => {
                     pings += 1;
-                    // Without an echo socket all of them are lost.
-                    let _ = echo.send(b"ping").await;
-                    let mut answer = [0; 8];
-                    let echoed = timeout(LOST, echo.recv(&mut answer));
+                    let echoed = async {
+                        // Where there is none, none is lost.
+                        if !asks_echo {
+                            return true;
+                        }
+                        let _ = echo.send(b"ping").await;
+                        let mut octets = [0; 8];
+                        let answer = timeout(LOST, echo.recv(&mut octets)).await;
+                        matches!(answer, Ok(Ok(_)))
+                    };
                     let (answer, echoed) = tokio::join!(timeout(LOST, place()), echoed);
                     lost += u64::from(!matches!(answer, Ok(Some(_))));
-                    echoes_lost += u64::from(!matches!(echoed, Ok(Ok(_))));
+                    echoes_lost += u64::from(!echoed);
                 }
             }
         }
@@ -82,7 +113,7 @@ pub(crate) async fn client() {
 /// Starts, finds the vehicle, asks it something, says how long that took, and stays.
 pub(crate) async fn newcomer() {
     let begun = Instant::now();
-    let node = Node::start(Config::new(104, 1)).unwrap();
+    let node = Node::start(config(NEWCOMER)).unwrap();
     let builder = Component::builder(Kind::OtherSubsystem, "Newcomer");
     let newcomer = builder.attach(&node, 1).unwrap();
     let found = newcomer.find_within(local_pose_sensor::URN, SEARCH).await;
@@ -97,6 +128,25 @@ pub(crate) async fn newcomer() {
     }
     println!("\nnewcomer ms={}", begun.elapsed().as_millis());
     std::future::pending::<()>().await;
+}
+
+/// Subscribes to a thousand poses a second, and reads them until it is stopped.
+pub(crate) async fn subscriber() {
+    let node = Node::start(config(NEWCOMER)).unwrap();
+    let builder = Component::builder(Kind::OtherSubsystem, "Subscriber");
+    let subscriber = builder.attach(&node, 1).unwrap();
+    let found = subscriber.find_within(local_pose_sensor::URN, SEARCH).await;
+    let query = QueryLocalPose { presence_vector: 3 };
+    let often = When::hz(1000.0);
+    let events = subscriber.subscribe::<ReportLocalPose, _>(found.unwrap(), &query, often);
+    let mut events = events.await.unwrap();
+    let mut number = 0;
+    while let Some(update) = events.next().await {
+        number += u32::from(matches!(update, Update::Report(_)));
+        if number == 100 {
+            println!("\nsubscriber reads");
+        }
+    }
 }
 
 /// Gives back what comes, until it is killed.
