@@ -17,7 +17,8 @@ fn a_flood_costs_nothing(attack: &str) {
         println!("| {sent} datagrams, {attack} | {seen:?}, {memory} KiB |");
         assert!(sent > 50_000, "{sent}");
         let (lost, echoes) = (seen["lost"], seen["echoes_lost"]);
-        assert!(lost <= echoes + 5, "{seen:?}");
+        assert!(lost <= echoes + 2, "{seen:?}");
+        assert!(echoes > 0 || seen["gap_ms"] < 1000, "{seen:?}");
         assert!(memory < MEMORY, "{memory} KiB");
     });
 }
