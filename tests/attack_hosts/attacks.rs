@@ -30,6 +30,9 @@ use crate::testbed::TO_STRANGERS;
 const LONG: Duration = Duration::from_secs(30);
 
 const TIME: Duration = Duration::from_secs(12);
+/// Datagrams a second of a flood: fewer for an unoptimised vehicle, which shares its processor with
+/// other tests.
+const FLOOD: u32 = if cfg!(debug_assertions) { 5000 } else { 20_000 };
 
 pub(crate) async fn run(attack: &str) {
     let mut attacker = match attack {
@@ -41,13 +44,13 @@ pub(crate) async fn run(attack: &str) {
         _ => Attacker::new(),
     };
     match attack {
-        "flood" => attacker.repeat(LONG / 2, 10_000, mutate),
-        "unending" => attacker.repeat(LONG / 2, 10_000, unending),
-        "gapped" => attacker.repeat(LONG / 2, 10_000, gapped),
-        "overlapping" => attacker.repeat(LONG / 2, 10_000, overlapping),
-        "answers" => attacker.repeat(LONG / 2, 10_000, answers),
+        "flood" => attacker.repeat(LONG / 2, FLOOD, mutate),
+        "unending" => attacker.repeat(LONG / 2, FLOOD, unending),
+        "gapped" => attacker.repeat(LONG / 2, FLOOD, gapped),
+        "overlapping" => attacker.repeat(LONG / 2, FLOOD, overlapping),
+        "answers" => attacker.repeat(LONG / 2, FLOOD, answers),
         "forged-id" | "forged-id6" => {
-            attacker.repeat(LONG / 2, 1000, |it, _| it.send(CLIENT, &pose()))
+            attacker.repeat(LONG / 2, 1000, |it, _| it.send(CLIENT, &pose()));
         }
         "forged-control" => attacker.repeat(LONG / 6, 20, |it, _| {
             it.send(

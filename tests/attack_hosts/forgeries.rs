@@ -1,7 +1,7 @@
 //! Ids that are not the attacker's, and ids that nobody has.
 
 use crate::bed::settings;
-use crate::scene::{figures, on_scene};
+use crate::scene::{GAP, figures, on_scene};
 use crate::testbed::Host;
 
 #[test]
@@ -15,7 +15,7 @@ fn a_forged_id_takes_nothing_from_a_client() {
             "| {} packets in the client's id | {seen:?}, {attack:?} |",
             attack["packets"]
         );
-        assert!(seen["lost"] <= 2 && seen["gap_ms"] < 1000, "{seen:?}");
+        assert!(seen["lost"] <= 2 && seen["gap_ms"] < GAP, "{seen:?}");
         // Challenges and the like, and no stream.
         assert!(attack["octets"] < 40_000, "{attack:?}");
     });

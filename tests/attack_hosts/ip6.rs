@@ -1,7 +1,7 @@
 //! The same attacks by IPv6, where one host has 2^64 addresses.
 
 use crate::bed::settings;
-use crate::scene::{Scene, figures, on_testbed};
+use crate::scene::{GAP, Scene, figures, on_testbed};
 use crate::testbed::Host;
 
 /// A vehicle and a client with IPv6 alone.
@@ -23,7 +23,7 @@ fn a_forged_id_takes_nothing_from_a_client() {
         let seen = scene.client();
         let attack = figures(&attacker.says("attack"));
         println!("| IPv6: packets in the client's id | {seen:?}, {attack:?} |");
-        assert!(seen["lost"] <= 2 && seen["gap_ms"] < 1000, "{seen:?}");
+        assert!(seen["lost"] <= 2 && seen["gap_ms"] < GAP, "{seen:?}");
         assert!(attack["octets"] < 40_000, "{attack:?}");
     });
 }

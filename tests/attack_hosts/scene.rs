@@ -11,6 +11,10 @@ use crate::vehicle_process::VehicleProcess;
 /// What `MemoryMax` of the packaged services allows, in KiB.
 pub(crate) const MEMORY: u64 = 64 * 1024;
 
+/// The longest time without one of 25 events a second, in ms: more than a busy machine takes, and less
+/// than a peer whose address was taken over goes without.
+pub(crate) const GAP: u64 = 2500;
+
 /// A vehicle and a client that has found it.
 pub(crate) struct Scene<'a> {
     pub(crate) bed: &'a Testbed,
