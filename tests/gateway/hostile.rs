@@ -3,25 +3,12 @@
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use bytes::{BufMut, Bytes, BytesMut};
+use bytes::Bytes;
 use jaus::gateway::{Counter, Settings};
 use jaus::ra::{Message, RaId};
 
-use crate::rover::{Rover, SUBSYSTEM};
+use crate::rover::{Rover, SUBSYSTEM, datagram};
 use crate::world::{World, subsystem};
-
-fn datagram(source: RaId, destination: RaId, code: u16, data: &[u8]) -> Bytes {
-    let mut datagram = BytesMut::from(&b"JAUS01.0"[..]);
-    datagram.put_u16_le(0x0206);
-    datagram.put_u16_le(code);
-    for id in [destination, source] {
-        datagram.put_slice(&[id.instance, id.component, id.node, id.subsystem]);
-    }
-    datagram.put_u16_le(data.len() as u16);
-    datagram.put_u16_le(0);
-    datagram.put_slice(data);
-    datagram.freeze()
-}
 
 fn stranger(host: u16) -> SocketAddr {
     let [high, low] = host.to_be_bytes();

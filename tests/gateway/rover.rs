@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use bytes::Bytes;
+use bytes::{BufMut, Bytes, BytesMut};
 use jaus::ra::{Message, RaId};
 
 pub(crate) const SUBSYSTEM: u8 = 20;
@@ -18,6 +18,20 @@ pub(crate) const GLOBAL_POSE: &str = "ff00eb0eed3425c8ccc63a8ee3b8295c8f02000000
 pub(crate) fn bytes(hex: &str) -> Bytes {
     let octet = |at: usize| u8::from_str_radix(&hex[at..at + 2], 16).unwrap();
     (0..hex.len()).step_by(2).map(octet).collect()
+}
+
+/// A message in the framing "JAUS01.0".
+pub(crate) fn datagram(source: RaId, destination: RaId, code: u16, data: &[u8]) -> Bytes {
+    let mut datagram = BytesMut::from(&b"JAUS01.0"[..]);
+    datagram.put_u16_le(0x0206);
+    datagram.put_u16_le(code);
+    for id in [destination, source] {
+        datagram.put_slice(&[id.instance, id.component, id.node, id.subsystem]);
+    }
+    datagram.put_u16_le(data.len() as u16);
+    datagram.put_u16_le(0);
+    datagram.put_slice(data);
+    datagram.freeze()
 }
 
 #[derive(Default)]

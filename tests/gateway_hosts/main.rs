@@ -193,7 +193,7 @@ fn a_jaus_vehicle_is_listed_asked_and_driven_from_ra() {
 #[test]
 fn a_process_that_plays_a_node() {
     hosts::play(async |role| match role {
-        "ra-vehicle" => ra_vehicle::play().await,
+        "ra-vehicle" => ra_vehicle::play("jaus0").await,
         "operator" => operator::play().await,
         other => panic!("unknown role {other}"),
     });

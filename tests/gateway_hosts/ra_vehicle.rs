@@ -34,8 +34,9 @@ struct RaVehicle {
     drives_begun: u32,
 }
 
-pub(crate) async fn play() {
-    let named = Interfaces::Only(vec!["jaus0".to_owned()]);
+/// Plays it on an interface.
+pub(crate) async fn play(interface: &str) {
+    let named = Interfaces::Only(vec![interface.to_owned()]);
     let interface = named.choose(Ip::V4).unwrap().remove(0);
     let settings = Settings {
         group: RaGateway::group(),

@@ -200,16 +200,21 @@ impl Drop for Process {
     }
 }
 
+/// Says how many seconds a test by hand takes in all.
+pub(crate) const SOAK: &str = "JAUS_SOAK_SECONDS";
+
 /// Plays the role that this process was started in, if it was in any: not for ever, should the test
 /// that waits for it be killed.
 pub(crate) fn play(part: impl AsyncFnOnce(&str)) {
     let Ok(role) = std::env::var(ROLE) else {
         return;
     };
+    let soak = std::env::var(SOAK).map_or(0, |seconds| seconds.parse().unwrap());
+    let limit = 2 * LIMIT + 2 * Duration::from_secs(soak);
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .unwrap();
-    let played = async { tokio::time::timeout(2 * LIMIT, part(&role)).await };
+    let played = async { tokio::time::timeout(limit, part(&role)).await };
     let _ = runtime.block_on(played);
 }

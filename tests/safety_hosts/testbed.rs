@@ -25,7 +25,7 @@ impl Host {
     ];
 
     /// The name of the cable to the vehicle, on both ends.
-    const fn cable(self) -> &'static str {
+    pub(crate) const fn cable(self) -> &'static str {
         match self {
             Self::Vehicle => "lo",
             Self::Controller => "controller",
@@ -70,7 +70,7 @@ impl Testbed {
         ip(&[&["-n", &strangers], &local[..]].concat())
     }
 
-    fn name(&self, host: Host) -> String {
+    pub(crate) fn name(&self, host: Host) -> String {
         format!("{}-{}", self.prefix, host.cable())
     }
 

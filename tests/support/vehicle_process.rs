@@ -31,6 +31,12 @@ impl VehicleProcess {
         vehicle
     }
 
+    /// The number of its process.
+    #[allow(dead_code, reason = "shared with tests that do less")]
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends it a signal, by its name.
     #[allow(dead_code, reason = "shared with tests that do less")]
     pub(crate) fn signal(&self, name: &str) {
