@@ -189,7 +189,6 @@ async fn a_forged_id_on_a_line_takes_nothing_from_its_owner() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-#[ignore = "a line takes over whatever has proven nothing yet"]
 async fn a_forged_id_on_a_line_takes_nothing_from_an_owner_that_has_only_asked() {
     forged_ids_take_nothing(false).await;
 }

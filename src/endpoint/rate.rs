@@ -134,8 +134,8 @@ impl<K: Eq + Hash> Buckets<K> {
     }
 
     /// How many tokens a source has taken that have not come back yet.
-    pub(super) fn owed(&self, now: Instant, source: K) -> u32 {
-        let bucket = self.own.get(&source).copied();
+    pub(super) fn owed(&self, now: Instant, source: &K) -> u32 {
+        let bucket = self.own.get(source).copied();
         bucket.unwrap_or(self.shared).owed(now, self.rate)
     }
 

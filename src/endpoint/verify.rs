@@ -52,7 +52,7 @@ impl Budget {
 
     /// Whether an address has used a quarter of its burst.
     fn is_in_use(&self, now: Instant, to: Origin) -> bool {
-        self.by_address.owed(now, to) >= self.by_address.rate().burst / 4
+        self.by_address.owed(now, &to) >= self.by_address.rate().burst / 4
     }
 }
 

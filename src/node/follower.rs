@@ -45,6 +45,10 @@ impl Follower {
         }
     }
 
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "it looks at interfaces, and decides nothing by time"
+    )]
     pub(super) async fn run(mut self) {
         let mut stopped = self.shared.stopped.subscribe();
         loop {

@@ -68,13 +68,12 @@ fn acknowledged_messages_arrive_in_a_flood_of_rubbish() {
 }
 
 #[test]
-#[ignore = "answers and fragments are taken from any address yet"]
+#[ignore = "fragments are put together from any address yet"]
 fn acknowledged_messages_arrive_whole_among_forged_fragments() {
     acknowledged_messages_arrive("overlapping");
 }
 
 #[test]
-#[ignore = "answers and fragments are taken from any address yet"]
 fn acknowledged_messages_arrive_among_forged_acknowledgements() {
     acknowledged_messages_arrive("answers");
 }

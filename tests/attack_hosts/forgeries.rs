@@ -89,7 +89,6 @@ fn commands_from_a_network_that_is_not_allowed_are_not_obeyed() {
 }
 
 #[test]
-#[ignore = "five addresses lock newcomers out yet"]
 fn newcomers_are_answered_among_ids_with_addresses_of_their_own() {
     on_scene(&[], |scene| {
         let attacker = scene.bed.start(Host::Strangers, "many-addresses", "");

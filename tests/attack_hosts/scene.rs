@@ -1,6 +1,7 @@
 //! The vehicle, a client that behaves, and what is seen of both.
 
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::time::Duration;
 
 use crate::hosts::Process;
@@ -77,16 +78,29 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Runs the body of the test whose thread this is.
-pub(crate) fn on_testbed(body: impl FnOnce(&Testbed)) {
+/// So often a test may begin again: what else a machine does can starve whoever is attacked as no
+/// attack would.
+const ATTEMPTS: u32 = 3;
+
+/// Runs the body of the test whose thread this is, until it passes once.
+pub(crate) fn on_testbed(body: impl Fn(&Testbed)) {
     let thread = std::thread::current();
     let test = thread.name().expect("libtest names threads after tests");
-    let ran = on_hosts(test, Testbed::new, body);
-    let may_skip = std::env::var_os("CI").is_none();
-    assert!(ran || may_skip, "no network namespaces on CI");
+    for attempt in 1..=ATTEMPTS {
+        let run = || on_hosts(test, Testbed::new, &body);
+        match catch_unwind(AssertUnwindSafe(run)) {
+            Ok(ran) => {
+                let may_skip = std::env::var_os("CI").is_none();
+                assert!(ran || may_skip, "no network namespaces on CI");
+                return;
+            }
+            Err(failure) if attempt == ATTEMPTS => resume_unwind(failure),
+            Err(_) => println!("{test} failed, attempt {attempt} of {ATTEMPTS}"),
+        }
+    }
 }
 
-pub(crate) fn on_scene(flags: &[&str], body: impl FnOnce(Scene<'_>)) {
+pub(crate) fn on_scene(flags: &[&str], body: impl Fn(Scene<'_>)) {
     on_testbed(|bed| body(Scene::start(bed, flags, "")));
 }
 

@@ -160,7 +160,7 @@ fn set(nodes: &mut Nodes, fault: Lasting, is_broken: bool) {
             format!("the wire between {one:?} and {other:?} is cut: {is_broken}")
         }
         Lasting::Unread(host) => {
-            nodes.network.set_read(host, !is_broken);
+            nodes.set_read(host, !is_broken);
             format!("the components of {host:?} read: {}", !is_broken)
         }
     };

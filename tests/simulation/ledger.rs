@@ -119,7 +119,8 @@ impl Ledger {
     }
 
     /// Judges a message that was delivered in one life of a node; `is_strict` tells whether the node
-    /// has room for all its peers, and so need not forget where one is in its numbers.
+    /// has room for all its peers, and so need not forget where one is in its numbers, and reads at once
+    /// what has arrived.
     pub(crate) fn receive(
         &mut self,
         at: Instant,

@@ -14,6 +14,8 @@ pub(crate) struct Nodes {
     pub(crate) network: Network,
     /// How often each was restarted.
     lives: Vec<u32>,
+    /// Whether its components have ever let messages wait.
+    has_rested: Vec<bool>,
     /// What the endpoints counted that are gone.
     past: Counts,
 }
@@ -47,6 +49,7 @@ impl Nodes {
         }
         Self {
             lives: vec![0; plan.nodes.len()],
+            has_rested: vec![false; plan.nodes.len()],
             plan,
             network,
             past: Counts::new(),
@@ -64,6 +67,12 @@ impl Nodes {
 
     pub(crate) fn life(&self, node: usize) -> Life {
         (node, self.lives[node])
+    }
+
+    /// Lets the components of a node read messages, or leave them waiting.
+    pub(crate) fn set_read(&mut self, host: Host, reads: bool) {
+        self.has_rested[host.0] |= !reads;
+        self.network.set_read(host, reads);
     }
 
     pub(crate) fn lives(&self) -> &[u32] {
@@ -122,7 +131,8 @@ impl Nodes {
         let mut news = Vec::new();
         for node in 0..self.len() {
             let life = self.life(node);
-            let is_strict = self.plan.nodes[node].config.max_peers >= 4 * self.len();
+            let has_room = self.plan.nodes[node].config.max_peers >= 4 * self.len();
+            let is_strict = has_room && !self.has_rested[node];
             for (at, event) in std::mem::take(&mut self.network.owner(Host(node)).events) {
                 match event {
                     Event::Received(received) => ledger.receive(at, life, &received, is_strict)?,

@@ -49,7 +49,7 @@ mod linux {
                 // What has changed is looked up afterwards; an error is as good a reason to look.
                 let _ = socket.readable().await;
             } else {
-                std::future::pending().await
+                std::future::pending::<()>().await;
             }
         }
 

@@ -221,7 +221,7 @@ fn configuration_of(id: u8, node: &Node, known: &Known) -> Option<report_configu
         instance_id: 0,
     });
     let component_list: Vec<_> = components.collect();
-    (!component_list.is_empty()).then(|| report_configuration::NodeSeq {
+    (!component_list.is_empty()).then_some(report_configuration::NodeSeq {
         node_rec: report_configuration::NodeRec { node_id: id },
         component_list,
     })
