@@ -246,7 +246,7 @@ async fn a_flush_ends_also_when_another_sender_writes_what_waits() {
         "the second still waits"
     );
     // So much that its sender writes all that waits, before the task has had its turn.
-    port.send(message(&port, nobody, &[0; 20_000])).unwrap();
+    port.send(message(&port, nobody, [0; 20_000])).unwrap();
     assert!(
         flushed.as_mut().poll(&mut look).is_ready(),
         "all is written"
