@@ -70,7 +70,8 @@ pub use pacing::Pacing;
 pub use packing::Packing;
 pub use peers::{Peer, RouteState, Traffic};
 #[cfg(feature = "ra33")]
-pub(crate) use rate::{Buckets, quota_address};
+pub(crate) use rate::Buckets;
+pub(crate) use rate::quota_address;
 pub use rate::{Rate, Rates};
 pub use send::SendError;
 
