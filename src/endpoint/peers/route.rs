@@ -12,10 +12,11 @@ use crate::endpoint::Path;
 use crate::wire::{Acknowledgement, Flags, Frame, Priority};
 
 /// A challenge is a Query Heartbeat Pulse, which every peer understands and which changes nothing.
-/// Its priority tells an endpoint that the query is not for the component, which never sees it.
+/// Its priority tells an endpoint that the query is not for the component, which never sees it: no
+/// other peer is known to ask for a heartbeat so urgently, and our services ask at high priority.
 pub(in crate::endpoint) const CHALLENGE: &[u8] = b"\x02\x22";
 pub(in crate::endpoint) const CHALLENGE_FLAGS: Flags =
-    Flags::new(Priority::High).with_acknowledgement(Acknowledgement::Request);
+    Flags::new(Priority::SafetyCritical).with_acknowledgement(Acknowledgement::Request);
 /// How often a challenge is sent before it counts as not answered.
 const TRIES: u32 = 3;
 /// The time between two tries; the decision comes as long after the last.
