@@ -123,9 +123,10 @@ impl Endpoint {
                     self.contest(now, id, local, from, was_verified, (path, is_stream));
                 }
             }
-            Heard::Contested { incumbent } => {
-                self.contest(now, id, local, incumbent, true, (path, is_stream));
-            }
+            Heard::Contested {
+                incumbent,
+                was_verified,
+            } => self.contest(now, id, local, incumbent, was_verified, (path, is_stream)),
             Heard::NoRoom => return Err(Counter::PeersFull),
         }
         Ok(())

@@ -31,7 +31,7 @@ pub use state::{Peer, Traffic};
 
 /// The most challenges under way.
 const MOST_CHALLENGES: usize = 64;
-/// After a challenge was decided, its peer is not challenged again for so long.
+/// After a challenge has moved nobody who proved it, its peer is not challenged again for so long.
 const SETTLED: Duration = Duration::from_secs(2);
 /// After a path has not answered, it is not challenged again for so long.
 const UNANSWERED: Duration = Duration::from_secs(10);
@@ -62,7 +62,7 @@ pub(super) enum Heard {
         was_verified: bool,
     },
     /// A peer that is elsewhere, unless a challenge shows that it has moved.
-    Contested { incumbent: Path },
+    Contested { incumbent: Path, was_verified: bool },
     /// A peer that is elsewhere, which was found out a moment ago or is being found out.
     Elsewhere,
     /// A peer not known before, for which there is no room.
@@ -197,12 +197,20 @@ impl Peers {
             is_near || now.saturating_duration_since(state.heard_on_route) >= route::SILENT;
         let (route, contested) = match state.peer.route {
             RouteState::Unverified if seen.is_stream && is_free => (RouteState::Verified, false),
-            RouteState::Unverified => (RouteState::Unverified, can_challenge),
+            RouteState::Unverified if is_free || !can_challenge => {
+                (RouteState::Unverified, can_challenge)
+            }
             RouteState::Stale => (RouteState::of(seen.is_stream), false),
             RouteState::Verified if is_near && seen.is_stream => (RouteState::Verified, false),
             RouteState::Verified if !can_challenge => return Heard::Elsewhere,
             RouteState::Verified if is_near => (RouteState::Unverified, true),
-            RouteState::Verified => return Heard::Contested { incumbent: from },
+            RouteState::Unverified | RouteState::Verified => {
+                let incumbent = from;
+                return Heard::Contested {
+                    incumbent,
+                    was_verified,
+                };
+            }
         };
         state.peer.version = frame.version;
         if is_near {
@@ -411,10 +419,12 @@ impl Peers {
             (Finding::Stays, _) => (before, RouteState::Verified),
             _ => (before, RouteState::of(challenge.doubt.was_verified)),
         };
-        let pause = if finding == Finding::Unanswered && challenge.rival.is_none() {
-            UNANSWERED
-        } else {
-            SETTLED
+        // Who has moved and proven it may move on at once: programs that run one after the other
+        // have an id in common.
+        let pause = match finding {
+            Finding::Moves { verified: true } => Duration::ZERO,
+            Finding::Unanswered if challenge.rival.is_none() => UNANSWERED,
+            _ => SETTLED,
         };
         state.settled_until = Some(now + pause);
         self.set_route(id, path, route);

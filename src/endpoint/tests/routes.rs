@@ -138,6 +138,42 @@ fn a_process_with_another_port_is_followed_at_once_and_left_if_the_old_one_answe
 }
 
 #[test]
+fn processes_that_run_one_after_the_other_with_one_id_are_each_followed_at_once() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    for number in 40_000..40_010 {
+        let port = Path {
+            peer: SocketAddr::from(([10, 0, 0, PEER_HOST], number)).into(),
+            ..path(PEER_HOST)
+        };
+        let datagram = judp::encode(&again(1)).unwrap();
+        rig.endpoint.handle_datagram(rig.now, port, datagram);
+        let there = To::Peer(port.peer);
+        let sent = rig.sent();
+        let query = &sent.iter().find(|(to, _)| *to == there).unwrap().1;
+        let answer = judp::encode(&acknowledgement_of(query)).unwrap();
+        rig.endpoint.handle_datagram(rig.now, port, answer);
+        assert_eq!(destination(&mut rig), there);
+        rig.pass(Duration::from_millis(300));
+    }
+}
+
+#[test]
+fn a_forged_sender_gets_nothing_for_a_peer_that_was_not_asked_yet() {
+    let mut rig = Rig::new();
+    rig.hear(&again(1));
+    assert_eq!(rig.sent(), [], "nobody doubts it yet");
+    rig.hear_from(ELSEWHERE, &again(1000));
+    let challenges = rig.sent();
+    assert_eq!(destination(&mut rig), at(PEER_HOST));
+    let query = challenge_to(&challenges, PEER_HOST);
+    rig.hear(&acknowledgement_of(query));
+    assert_eq!(destination(&mut rig), at(PEER_HOST));
+    let route = rig.endpoint.peers().next().unwrap().route;
+    assert_eq!(route, RouteState::Verified);
+}
+
+#[test]
 fn an_acknowledgement_that_nobody_waits_for_teaches_nothing_and_moves_nobody() {
     let mut rig = Rig::new();
     rig.hear(&acknowledgement_of(&Frame::new(US, PEER, Bytes::new())));
