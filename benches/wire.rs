@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bytes::{Bytes, BytesMut};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path};
+use jaus::endpoint::{Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path, StaticPeer};
 use jaus::wire::{Flags, Frame, as5669a, judp, ra};
 
 const US: JausId = JausId::new(101, 1, 1);
@@ -80,15 +80,23 @@ fn datagram(c: &mut Criterion) {
     group.finish();
 }
 
-/// An endpoint that knows a peer, with a clock that stands still.
+/// An endpoint that knows a peer, by its configured address perhaps, with a clock that stands still.
 #[expect(clippy::disallowed_methods, reason = "an arbitrary beginning of time")]
-fn endpoint() -> (Endpoint, Path, Instant) {
+fn endpoint(is_configured: bool) -> (Endpoint, Path, Instant) {
     let peer = Path {
         link: LinkId(0),
         peer: SocketAddr::from(([10, 0, 0, 2], judp::PORT)).into(),
     };
     let now = Instant::now();
-    let mut endpoint = Endpoint::new(Config::default());
+    let configured = StaticPeer {
+        id: PEER,
+        path: peer,
+        gets_broadcasts: false,
+    };
+    let mut endpoint = Endpoint::new(Config {
+        static_peers: is_configured.then_some(configured).into_iter().collect(),
+        ..Config::default()
+    });
     let own = SocketAddr::from(([10, 0, 0, 1], judp::PORT));
     endpoint.add_link(LinkId(0), LinkProfile::judp([own]));
     endpoint.attach(US).expect("an id of one component");
@@ -100,7 +108,7 @@ fn endpoint() -> (Endpoint, Path, Instant) {
 fn through_an_endpoint(c: &mut Criterion) {
     let mut group = c.benchmark_group("endpoint");
     for payload in [50, 1425] {
-        let (mut receiver, path, mut now) = endpoint();
+        let (mut receiver, path, mut now) = endpoint(false);
         let mut sequence = 0;
         group.bench_function(format!("receive/{payload}"), |b| {
             b.iter_batched(
@@ -123,12 +131,13 @@ fn through_an_endpoint(c: &mut Criterion) {
                 BatchSize::SmallInput,
             );
         });
-        let (mut sender, _, now) = endpoint();
+        // Others get no more than a little before they have acknowledged something.
+        let (mut sender, _, now) = endpoint(true);
         let message = Outgoing::new(US, PEER, Bytes::from(vec![0x44; payload]));
         group.bench_function(format!("send/{payload}"), |b| {
             b.iter(|| {
                 sender.send(now, message.clone()).expect("a known peer");
-                sender.poll_transmit().expect("a datagram")
+                sender.poll_transmit(now).expect("a datagram")
             });
         });
     }

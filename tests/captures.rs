@@ -226,7 +226,7 @@ impl Replay {
             }
         }
         self.transmits
-            .extend(std::iter::from_fn(|| self.endpoint.poll_transmit()));
+            .extend(std::iter::from_fn(|| self.endpoint.poll_transmit(now)));
     }
 
     /// The counters that are not zero, but for those that every replay has.

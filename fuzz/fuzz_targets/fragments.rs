@@ -175,7 +175,7 @@ impl World {
         };
         let datagram = judp::encode(&frame).expect("a short frame");
         self.endpoint.handle_datagram(self.now, path, datagram);
-        while self.endpoint.poll_transmit().is_some() {}
+        while self.endpoint.poll_transmit(self.now).is_some() {}
     }
 
     fn check(&mut self) {

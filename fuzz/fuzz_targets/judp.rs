@@ -185,18 +185,18 @@ fn play(choices: u8, story: &[u8]) {
                 let link = LinkId(u16::from(story.octet() & 3));
                 endpoint.add_link(link, LinkProfile::judp(story.path().peer.socket()));
             }
-            _ => drain(&mut endpoint),
+            _ => drain(&mut endpoint, now),
         }
         assert!(endpoint.components().count() <= 4);
         assert!(endpoint.peers().count() <= 4);
         assert!(endpoint.unfinished() <= REASSEMBLY_LIMIT);
     }
-    drain(&mut endpoint);
+    drain(&mut endpoint, now);
     settle(&mut endpoint, now);
 }
 
 /// Takes everything that the endpoint has to say, and checks what can be checked from outside.
-fn drain(endpoint: &mut Endpoint) {
+fn drain(endpoint: &mut Endpoint, now: Instant) {
     // News have a queue, messages and datagrams one for each of the priorities.
     let most = QUEUE_LIMIT * 8;
     let mut taken = 0;
@@ -209,7 +209,7 @@ fn drain(endpoint: &mut Endpoint) {
         }
     }
     let mut sent = 0;
-    while let Some(transmit) = endpoint.poll_transmit() {
+    while let Some(transmit) = endpoint.poll_transmit(now) {
         sent += 1;
         assert!(sent <= most, "more datagrams than the queues hold");
         let frames: Vec<_> = judp::frames(transmit.payload).expect("our own").collect();
@@ -228,7 +228,7 @@ fn settle(endpoint: &mut Endpoint, mut now: Instant) {
         };
         now = now.max(wake_up);
         endpoint.handle_timeout(now);
-        drain(endpoint);
+        drain(endpoint, now);
     }
     panic!("the endpoint never comes to rest");
 }

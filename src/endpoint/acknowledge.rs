@@ -66,10 +66,7 @@ impl Endpoint {
             sequence: request.sequence,
             payload: request.payload.slice(..code_len.min(request.payload.len())),
         };
-        if let Ok(transmit) = self.transmit_along(from, &answer)
-            && self.may_send(now, request.source, from, transmit.payload.len())
-            && self.transmit(transmit)
-        {
+        if self.send_along(now, from, &answer) == Ok(true) {
             self.counters.add(Counter::AcknowledgementsSent);
         }
     }

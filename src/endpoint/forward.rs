@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use tracing::trace;
 
-use super::{Counter, Endpoint, LinkId, Path, To, Transmit};
+use super::egress::Hop;
+use super::{Counter, Endpoint, Path, To};
+use crate::address::JausId;
 use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};
 
 /// For how long after a peer was heard from one side a broadcast of it from another side is taken
@@ -42,110 +44,68 @@ impl Endpoint {
     /// Sends a message on to where its receivers are, if that is somewhere else.
     pub(super) fn pass_on(&mut self, now: Instant, from: Path, frame: &Frame) {
         let (source, destination) = (frame.source, frame.destination);
-        match self.next_hops(now, from, frame) {
-            Ok(transmits) => {
-                self.counters.add(Counter::MessagesForwarded);
-                for transmit in transmits {
-                    self.transmit(transmit);
-                }
-            }
-            Err(reason) => {
-                trace!(%source, %destination, %reason, "not forwarded");
-                self.counters.add(reason);
-            }
-        }
+        let passed = self
+            .next_hops(now, from, frame)
+            .and_then(|(hops, version)| {
+                let frame = with_header(frame, version).ok_or(Counter::CannotForward)?;
+                self.send_to_hops(now, &hops, &frame)
+                    .map_err(|_| Counter::CannotForward)
+            });
+        let outcome = passed.err().unwrap_or(Counter::MessagesForwarded);
+        trace!(%source, %destination, %outcome);
+        self.counters.add(outcome);
     }
 
+    /// Where a message goes on to, and with which header.
     fn next_hops(
         &mut self,
         now: Instant,
         from: Path,
         frame: &Frame,
-    ) -> Result<Vec<Transmit>, Counter> {
+    ) -> Result<(Vec<Hop>, Version), Counter> {
         let destination = frame.destination;
         if destination.is_unicast() {
             self.config.access.check_source(destination)?;
             if let Some((path, version)) = self.route(destination) {
-                return self.along(from, path, version, frame);
+                // What went to a network's group was heard by all on that network.
+                let shared = from.link == path.link
+                    && self.framing(from.link) == Framing::Judp
+                    && frame.flags.broadcast() != Some(Broadcast::None);
+                return if path == from || shared {
+                    Err(Counter::NotForUs)
+                } else {
+                    Ok((vec![path.into()], version))
+                };
             }
             // Whoever asked for an acknowledgement has been heard: nobody is to be found.
             if frame.flags.acknowledgement().is_answer() {
                 return Err(Counter::NotForUs);
             }
         }
-        let hops = self.everywhere_but(from, frame)?;
+        let hops = self.hops_everywhere_but(from, destination);
         if hops.is_empty() {
             return Err(Counter::NotForUs);
         }
         if !self.broadcasts.take(now, self.config.forwarded_broadcasts) {
             return Err(Counter::ForwardRate);
         }
-        Ok(hops)
+        Ok((hops, Version::As5669a))
     }
 
-    /// To one receiver.
-    fn along(
-        &self,
-        from: Path,
-        path: Path,
-        version: Version,
-        frame: &Frame,
-    ) -> Result<Vec<Transmit>, Counter> {
-        // What went to a network's group was heard by all on that network.
-        let shared = from.link == path.link
-            && self.framing(from.link) == Framing::Judp
-            && frame.flags.broadcast() != Some(Broadcast::None);
-        if path == from || shared {
-            return Err(Counter::NotForUs);
-        }
-        Ok(vec![self.hop(
-            path.link,
-            To::Peer(path.peer),
-            version,
-            frame,
-        )?])
-    }
-
-    /// To everybody who has not heard it: the other links' groups, those at the other ends of a
+    /// Everybody who has not heard a message: the other links' groups, those at the other ends of a
     /// link that has no group, and configured peers that groups do not reach.
-    fn everywhere_but(&self, from: Path, frame: &Frame) -> Result<Vec<Transmit>, Counter> {
-        let version = Version::As5669a;
-        let to = |path: Path| self.hop(path.link, To::Peer(path.peer), version, frame);
-        let links = self.links.keys().filter(|&&link| link != from.link);
-        let mut hops: Vec<_> = links
-            .map(|&link| self.hop(link, To::Group, version, frame))
-            .collect::<Result<_, _>>()?;
-        let mut singly = self.peers.broadcast_copies(frame.destination);
+    fn hops_everywhere_but(&self, from: Path, destination: JausId) -> Vec<Hop> {
+        let mut singly = self.peers.broadcast_copies(destination);
         if self.framing(from.link) == Framing::Jtcp {
             singly.extend(self.peers.paths_on(from.link));
         }
         singly.sort_unstable();
         singly.dedup();
-        for path in singly.into_iter().filter(|&path| path != from) {
-            hops.push(to(path)?);
-        }
-        Ok(hops)
-    }
-
-    fn hop(
-        &self,
-        link: LinkId,
-        to: To,
-        version: Version,
-        frame: &Frame,
-    ) -> Result<Transmit, Counter> {
-        let frame = with_header(frame, version).ok_or(Counter::CannotForward)?;
-        let payload = self
-            .framing(link)
-            .encode(&frame)
-            .map_err(|_| Counter::CannotForward)?;
-        Ok(Transmit {
-            link,
-            to,
-            priority: frame.flags.priority(),
-            payload,
-            segment: None,
-        })
+        let links = self.egress.links().map(|(link, _)| link);
+        let groups = links.filter(|&link| link != from.link);
+        let groups = groups.map(|link| (link, To::Group));
+        let singly = singly.into_iter().filter(|&path| path != from);
+        groups.chain(singly.map(Hop::from)).collect()
     }
 }
 

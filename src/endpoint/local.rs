@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::address::JausId;
+use crate::wire::Broadcast;
 
 /// Why a component cannot be attached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -81,12 +82,24 @@ impl Components {
         self.ids.iter().copied()
     }
 
-    /// Those that `destination` reaches.
-    pub(super) fn matching(&self, destination: JausId) -> Vec<JausId> {
-        if destination.has_wildcard() {
-            self.iter().filter(|&id| destination.matches(id)).collect()
+    /// Those that a message to `destination` reaches: of the sender's subsystem alone if it is a
+    /// local broadcast.
+    pub(super) fn receivers(
+        &self,
+        source: JausId,
+        destination: JausId,
+        broadcast: Broadcast,
+    ) -> impl Iterator<Item = JausId> + '_ {
+        let (first, last) = if destination.has_wildcard() {
+            (JausId::from_u32(0), JausId::EVERYONE)
         } else {
-            self.ids.get(&destination).copied().into_iter().collect()
-        }
+            (destination, destination)
+        };
+        let ids = self.ids.range(first..=last).copied();
+        let in_scope = move |id: &JausId| {
+            broadcast != Broadcast::Local || id.subsystem() == source.subsystem()
+        };
+        ids.filter(move |&id| destination.matches(id))
+            .filter(in_scope)
     }
 }

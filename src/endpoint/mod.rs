@@ -35,17 +35,15 @@ mod acknowledge;
 mod config;
 mod counters;
 mod delivery;
+mod egress;
 mod event;
 mod forward;
+mod inbox;
 mod large;
 mod link;
 mod local;
 mod occupancy;
-mod output;
-mod pacing;
-mod packing;
 mod peers;
-mod queue;
 mod rate;
 mod receive;
 mod recent;
@@ -54,7 +52,7 @@ mod send;
 mod tests;
 mod verify;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::hash::RandomState;
 use std::time::Instant;
 
@@ -62,12 +60,13 @@ pub use access::{Access, AccessError, Network, Subsystems};
 pub use config::{Config, PAYLOAD_LIMITS, StaticPeer, first_sequence_at};
 pub use counters::{Counter, Counters};
 pub use delivery::FlowStatus;
+#[cfg(feature = "node")]
+pub(crate) use egress::MOST_OCTETS;
+pub use egress::{Pacing, Packing};
 pub use event::{Event, MessageHandle, Outgoing, Received, Unacknowledged};
 pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
 pub use occupancy::Occupancy;
-pub use pacing::Pacing;
-pub use packing::Packing;
 pub use peers::{Peer, RouteState, Traffic};
 #[cfg(feature = "ra33")]
 pub(crate) use rate::Buckets;
@@ -76,14 +75,14 @@ pub use rate::{Rate, Rates};
 pub use send::SendError;
 
 use crate::address::JausId;
+use crate::wire::Priority;
 use acknowledge::Calls;
 use delivery::Deliveries;
+use egress::{Egress, Level};
+use inbox::Inbox;
 use large::{Numbers, Reassembly};
 use local::Components;
-use pacing::Pacer;
-use packing::Gathering;
-use peers::Peers;
-use queue::PriorityQueue;
+use peers::{CHALLENGE_FLAGS, Peers};
 use rate::{Bucket, Gate};
 use recent::Recent;
 use verify::{Budget, Warnings};
@@ -93,7 +92,6 @@ use verify::{Budget, Warnings};
 pub struct Endpoint {
     config: Config,
     components: Components,
-    links: BTreeMap<LinkId, LinkProfile>,
     peers: Peers,
     numbers: Numbers,
     gate: Gate,
@@ -105,22 +103,12 @@ pub struct Endpoint {
     /// For what is passed on to many.
     broadcasts: Bucket,
     heard: Recent,
-    sent_to_group: Recent,
     calls: Calls,
     reassembly: Reassembly,
     deliveries: Deliveries,
     conflicts: BTreeMap<JausId, Instant>,
-    transmits: PriorityQueue<Transmit>,
-    /// Taken out, but they did not go with the one before; the last comes next.
-    held: Vec<Transmit>,
-    pacer: Pacer,
-    gathering: Gathering,
-    messages: PriorityQueue<Received>,
-    news: VecDeque<Event>,
-    /// How many of the news are results of messages, for which there is always room.
-    untold: usize,
-    /// The latest time that was told.
-    latest: Option<Instant>,
+    egress: Egress,
+    inbox: Inbox,
     counters: Counters,
 }
 
@@ -135,7 +123,6 @@ impl Endpoint {
         let longest = config.retransmission_window;
         Self {
             components: Components::new(config.max_components),
-            links: BTreeMap::new(),
             peers: Peers::new(&config),
             numbers: Numbers::after(config.first_sequence),
             gate: Gate::new(&config.rates, config.max_peers),
@@ -145,18 +132,11 @@ impl Endpoint {
             broadcasts: Bucket::default(),
             heard: Recent::new(config.max_recent, longest, keys.clone()),
             calls: Calls::default(),
-            sent_to_group: Recent::new(config.max_recent, config.echo_window, keys),
             reassembly: Reassembly::new(&config),
             deliveries: Deliveries::new(&config),
             conflicts: BTreeMap::new(),
-            transmits: PriorityQueue::new(config.queue_limit),
-            held: Vec::new(),
-            pacer: Pacer::new(&config),
-            gathering: Gathering::default(),
-            messages: PriorityQueue::new(config.queue_limit),
-            news: VecDeque::new(),
-            untold: 0,
-            latest: None,
+            egress: Egress::new(&config, keys),
+            inbox: Inbox::new(config.queue_limit),
             counters: Counters::default(),
             config,
         }
@@ -173,10 +153,12 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Lets a local component go. What was already received for it can still be polled.
+    /// Lets a local component go. What was already received for it can still be polled; its messages
+    /// that wait for acknowledgements are given up.
     pub fn detach(&mut self, id: JausId) {
         self.components.detach(id);
-        self.deliveries.forget_source(id);
+        let given_up = self.deliveries.forget_source(id);
+        self.counters.add_many(Counter::MessagesGivenUp, given_up);
         self.conflicts.remove(&id);
     }
 
@@ -194,17 +176,15 @@ impl Endpoint {
 
     /// Takes in a link, or tells that something about it has changed.
     pub fn add_link(&mut self, link: LinkId, profile: LinkProfile) {
-        self.links.insert(link, profile);
+        self.egress.add_link(link, profile);
     }
 
-    /// Lets a link go, with what was learned through it and what waits to be sent on it.
+    /// Removes a link, with what was learned through it and what waits to be sent on it, which is
+    /// counted.
     pub fn remove_link(&mut self, link: LinkId) {
-        self.links.remove(&link);
         self.peers.forget_link(link);
-        self.transmits.retain(|transmit| transmit.link != link);
-        self.held.retain(|transmit| transmit.link != link);
-        self.pacer.forget_link(link);
-        self.gathering.forget_link(link);
+        let lost = self.egress.remove_link(link);
+        self.counters.add_many(Counter::LinkGone, lost);
     }
 
     /// Tells that a connection has closed: what was learned through it is forgotten.
@@ -235,28 +215,35 @@ impl Endpoint {
     /// Tells that time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached;
     /// early calls are harmless.
     pub fn handle_timeout(&mut self, now: Instant) {
-        self.latest = Some(now);
         self.retry_unacknowledged(now);
         self.handle_challenges(now);
-        self.pacer.handle_timeout(now);
-        self.send_gathered(now);
+        self.egress.handle_timeout(now);
         self.reassembly.expire(now, &mut self.counters);
     }
 
     /// The next datagram to send, or several for links that take them so; the most urgent first.
-    pub fn poll_transmit(&mut self) -> Option<Transmit> {
-        self.next_transmit()
+    /// At each priority, whole messages go before those that wait for acknowledgements, and these
+    /// before the fragments of others.
+    pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
+        let mut most_urgent_first = Priority::ALL.into_iter().rev();
+        let next = most_urgent_first.find_map(|priority| {
+            let whole = self.dequeue(now, Level::whole(priority)).or_else(|| {
+                self.send_deliveries(now, priority);
+                self.dequeue(now, Level::whole(priority))
+            });
+            whole.or_else(|| self.dequeue(now, Level::fragments(priority)))
+        });
+        // What may not leave before its address is proven has queued a challenge instead.
+        next.or_else(|| self.dequeue(now, Level::whole(CHALLENGE_FLAGS.priority())))
+    }
+
+    fn dequeue(&mut self, now: Instant, level: Level) -> Option<Transmit> {
+        self.egress.dequeue(now, level, &mut self.counters)
     }
 
     /// The next event: news first, then received messages, the most urgent first.
     pub fn poll_event(&mut self) -> Option<Event> {
-        let Some(news) = self.news.pop_front() else {
-            return self.messages.pop().map(Event::Received);
-        };
-        if let Event::Acknowledged { .. } | Event::NotAcknowledged { .. } = news {
-            self.untold -= 1;
-        }
-        Some(news)
+        self.inbox.pop()
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout), if ever.
@@ -265,8 +252,7 @@ impl Endpoint {
         [
             self.deliveries.next_deadline(),
             self.peers.next_deadline(),
-            self.pacer.next_deadline(),
-            self.gathering.next_deadline(),
+            self.egress.next_deadline(),
             self.reassembly.next_expiry(),
         ]
         .into_iter()
@@ -280,18 +266,10 @@ impl Endpoint {
         &self.counters
     }
 
+    /// Queues news; a full queue is counted.
     fn announce(&mut self, event: Event) {
-        if self.news.len() - self.untold < self.config.queue_limit {
-            self.news.push_back(event);
-        } else {
+        if !self.inbox.push_news(event) {
             self.counters.add(Counter::NewsQueueFull);
         }
-    }
-
-    /// Tells what became of a message. There is room: a message whose result waits to be polled
-    /// counts as one that waits for its acknowledgement.
-    fn tell_result(&mut self, event: Event) {
-        self.untold += 1;
-        self.news.push_back(event);
     }
 }

@@ -13,6 +13,9 @@ use std::time::{Duration, Instant};
 use super::{Counter, LinkId, Path};
 use crate::address::JausId;
 
+/// Nanoseconds of a second.
+const NANOS: u64 = 1_000_000_000;
+
 /// So many in a second in the long run, and so many at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -31,8 +34,9 @@ impl Rate {
         Self { per_second, burst }
     }
 
-    fn interval(self) -> Duration {
-        Duration::from_secs(1) / self.per_second.max(1)
+    /// How long it takes until so many more are allowed.
+    fn time_for(self, tokens: u32) -> Duration {
+        Duration::from_nanos(u64::from(tokens) * NANOS / u64::from(self.per_second.max(1)))
     }
 }
 
@@ -72,29 +76,34 @@ impl Bucket {
 
     /// Takes so many tokens, if they are there.
     pub(super) fn take_many(&mut self, now: Instant, rate: Rate, tokens: u32) -> bool {
-        let interval = rate.interval();
-        let full = self.full.map_or(now, |full| full.max(now));
-        let debt = full.saturating_duration_since(now);
-        let Some(rest) = rate.burst.max(1).checked_sub(tokens) else {
-            return false;
-        };
-        if debt > interval * rest {
-            return false;
+        let cost = rate.time_for(tokens);
+        let is_there = self.debt(now) + cost <= rate.time_for(rate.burst.max(1));
+        if is_there {
+            self.spend(now, cost);
         }
-        self.full = Some(full + interval * tokens);
-        true
+        is_there
+    }
+
+    /// How long it takes until it is full.
+    pub(super) fn debt(self, now: Instant) -> Duration {
+        let debt = self.full.map(|full| full.saturating_duration_since(now));
+        debt.unwrap_or_default()
+    }
+
+    /// It takes so much longer until it is full.
+    pub(super) fn spend(&mut self, now: Instant, time: Duration) {
+        self.full = Some(self.full.map_or(now, |full| full.max(now)) + time);
     }
 
     /// How many tokens are missing.
     fn owed(self, now: Instant, rate: Rate) -> u32 {
-        let debt = self.full.map(|full| full.saturating_duration_since(now));
-        let interval = rate.interval().as_nanos().max(1);
-        let owed = debt.unwrap_or_default().as_nanos() / interval;
+        let owed =
+            self.debt(now).as_nanos() * u128::from(rate.per_second.max(1)) / u128::from(NANOS);
         u32::try_from(owed).unwrap_or(u32::MAX)
     }
 
-    fn is_full(self, now: Instant) -> bool {
-        self.full.is_none_or(|full| full <= now)
+    pub(super) fn is_full(self, now: Instant) -> bool {
+        self.debt(now).is_zero()
     }
 }
 

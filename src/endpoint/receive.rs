@@ -56,7 +56,6 @@ impl Endpoint {
     }
 
     fn receive_datagram(&mut self, now: Instant, from: Path, data: Bytes, to_all: bool) {
-        self.latest = Some(now);
         self.counters.add(Counter::DatagramsReceived);
         if let Err(reason) = self.check_path(from) {
             return self.counters.add(reason);
@@ -101,7 +100,6 @@ impl Endpoint {
     /// Takes a frame that came from `from`, from a link that reads frames itself. Nothing in it is
     /// an error, as with [`handle_datagram`](Self::handle_datagram).
     pub fn handle_frame(&mut self, now: Instant, from: Path, frame: &Frame) {
-        self.latest = Some(now);
         if let Err(reason) = self.check_path(from) {
             self.counters.add(Counter::MessagesReceived);
             return self.counters.add(reason);
@@ -126,7 +124,7 @@ impl Endpoint {
 
     /// Whether anything may come by a path.
     fn check_path(&self, from: Path) -> Result<(), Counter> {
-        if !self.links.contains_key(&from.link) {
+        if !self.egress.has_link(from.link) {
             return Err(Counter::UnknownLink);
         }
         let address = from.peer.socket().map(|address| address.ip());
@@ -172,9 +170,9 @@ impl Endpoint {
         self.refuse_own(now, path, frame.source, seen)?;
         self.refuse_misplaced(now, path, frame.source)?;
         let passes = self.is_passed_on(frame);
-        let receivers = match self.receivers(frame, broadcast) {
-            Err(_) if passes => Vec::new(),
-            receivers => receivers?,
+        let is_for_us = match self.check_receivers(frame, broadcast) {
+            Err(_) if passes => false,
+            checked => checked.map(|()| true)?,
         };
         self.admit(now, path, frame.source)?;
         // Before acknowledging: what is dropped must not be taken for delivered.
@@ -187,14 +185,14 @@ impl Endpoint {
             }
             return Err(Counter::PeersFull);
         }
-        if !receivers.is_empty() {
+        if is_for_us {
             match frame.flags.acknowledgement() {
                 Acknowledgement::Positive | Acknowledgement::Negative => {
                     return self.receive_acknowledgement(now, path, frame);
                 }
                 Acknowledgement::Request => {
                     let may_be_refused = frame.destination.is_unicast() && !is_challenge(frame);
-                    if may_be_refused && !self.has_room_for(frame, &receivers) {
+                    if may_be_refused && !self.has_room_for(frame) {
                         return Err(Counter::ReceiverBusy);
                     }
                     self.acknowledge(now, path, frame);
@@ -227,7 +225,10 @@ impl Endpoint {
                 self.pass_on(now, path, frame);
             }
         }
-        self.put_together(arrival, frame, broadcast, &receivers)
+        if !is_for_us || is_challenge(frame) {
+            return Ok(());
+        }
+        self.put_together(arrival, frame, broadcast)
     }
 
     /// Takes an acknowledgement. One that nobody waits for teaches nothing and moves nobody, and
@@ -274,12 +275,8 @@ impl Endpoint {
         arrival: Arrival,
         frame: &Frame,
         broadcast: Broadcast,
-        receivers: &[JausId],
     ) -> Result<(), Counter> {
         let from = arrival.path;
-        if receivers.is_empty() || is_challenge(frame) {
-            return Ok(());
-        }
         let payload = match frame.flags.data() {
             DataControl::Single => {
                 self.finish_large(from, frame);
@@ -296,7 +293,7 @@ impl Endpoint {
                 whole.payload
             }
         };
-        self.deliver(from, frame, broadcast, &payload, receivers);
+        self.deliver(from, frame, broadcast, &payload);
         Ok(())
     }
 
@@ -312,8 +309,7 @@ impl Endpoint {
             flags: Flags::new(priority),
             ..Frame::new(next.source, destination, Bytes::new())
         };
-        let receivers = self.components.matching(destination);
-        self.deliver(from, &large, Broadcast::None, &whole.payload, &receivers);
+        self.deliver(from, &large, Broadcast::None, &whole.payload);
     }
 
     /// Whether one more message may come from there, and from somebody who was not known.
@@ -326,27 +322,26 @@ impl Endpoint {
         }
     }
 
-    /// Whether a message can be handed to its receivers, and need not be dropped after it was
+    /// Whether a message to one component can be handed to it, and need not be dropped after it was
     /// acknowledged.
-    fn has_room_for(&self, frame: &Frame, receivers: &[JausId]) -> bool {
-        let priority = frame.flags.priority();
-        !receivers.iter().any(|id| self.components.is_busy(id))
-            && self.messages.has_room(priority, receivers.len())
+    fn has_room_for(&self, frame: &Frame) -> bool {
+        !self.components.is_busy(&frame.destination)
+            && self.inbox.has_room(frame.flags.priority(), 1)
     }
 
-    /// The local components that a message is for, or why there are none.
-    fn receivers(&self, frame: &Frame, broadcast: Broadcast) -> Result<Vec<JausId>, Counter> {
-        let mut receivers = self.components.matching(frame.destination);
-        if receivers.is_empty() {
-            return Err(Counter::NotForUs);
-        }
-        if broadcast == Broadcast::Local {
-            receivers.retain(|receiver| receiver.subsystem() == frame.source.subsystem());
-        }
-        if receivers.is_empty() {
+    /// Checks whether a message is for local components.
+    fn check_receivers(&self, frame: &Frame, broadcast: Broadcast) -> Result<(), Counter> {
+        let reaches = |broadcast| {
+            let (source, destination) = (frame.source, frame.destination);
+            let mut receivers = self.components.receivers(source, destination, broadcast);
+            receivers.next().is_some()
+        };
+        if reaches(broadcast) {
+            Ok(())
+        } else if reaches(Broadcast::None) {
             Err(Counter::OutOfScope)
         } else {
-            Ok(receivers)
+            Err(Counter::NotForUs)
         }
     }
 
@@ -361,8 +356,7 @@ impl Endpoint {
         source: JausId,
         seen: Fingerprint,
     ) -> Result<(), Counter> {
-        let window = self.config.echo_window;
-        if self.sent_to_group.contains(now, &seen, window) && self.may_be_ours(from) {
+        if self.egress.is_echo(now, &seen) && self.may_be_ours(from) {
             return Err(Counter::OwnEcho);
         }
         if self.components.contains(source) {
@@ -374,7 +368,8 @@ impl Endpoint {
 
     /// Whether something may have been sent by ourselves, as far as the address tells.
     fn may_be_ours(&self, from: Path) -> bool {
-        let mut own = self.links.values().flat_map(|link| &link.own).peekable();
+        let links = self.egress.links();
+        let mut own = links.flat_map(|(_, link)| &link.own).peekable();
         own.peek().is_none() || own.any(|&own| from.peer == own)
     }
 
@@ -463,34 +458,40 @@ impl Endpoint {
     }
 
     /// Queues a whole message for its receivers.
-    fn deliver(
-        &mut self,
-        from: Path,
-        frame: &Frame,
-        broadcast: Broadcast,
-        payload: &Bytes,
-        receivers: &[JausId],
-    ) {
-        for &to in receivers {
-            self.enqueue(Received {
-                source: frame.source,
-                destination: frame.destination,
-                priority: frame.flags.priority(),
-                broadcast,
-                payload: payload.clone(),
-                path: Some(from),
-                to,
-            });
-        }
+    fn deliver(&mut self, from: Path, frame: &Frame, broadcast: Broadcast, payload: &Bytes) {
+        let whole = Received {
+            source: frame.source,
+            destination: frame.destination,
+            priority: frame.flags.priority(),
+            broadcast,
+            payload: payload.clone(),
+            path: Some(from),
+            to: frame.destination,
+        };
+        self.deliver_to_all(&whole, None);
     }
 
-    /// Queues a message for one component; a full queue is counted.
-    pub(super) fn enqueue(&mut self, received: Received) {
-        let outcome = match self.messages.push(received.priority, received) {
-            Ok(()) => Counter::MessagesDelivered,
-            Err(_) => Counter::DeliveryQueueFull,
-        };
-        self.counters.add(outcome);
+    /// Queues a message for each component that it reaches, but for one; a full queue is counted.
+    pub(super) fn deliver_to_all(&mut self, message: &Received, but: Option<JausId>) {
+        let Received {
+            source,
+            destination,
+            ..
+        } = *message;
+        let receivers = self
+            .components
+            .receivers(source, destination, message.broadcast);
+        for to in receivers.filter(|&to| Some(to) != but) {
+            let message = Received {
+                to,
+                ..message.clone()
+            };
+            self.counters.add(if self.inbox.push(message) {
+                Counter::MessagesDelivered
+            } else {
+                Counter::DeliveryQueueFull
+            });
+        }
     }
 }
 

@@ -2,16 +2,14 @@
 
 use std::time::Instant;
 
-use tracing::{debug, trace};
+use tracing::trace;
 
+use super::egress::{FragmentedSend, Hop, Pacing};
 use super::large::{Cut, Cutting};
-use super::pacing::{Pacing, Stretch};
-use super::{
-    Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To, Transmit,
-};
+use super::{Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To};
 use crate::address::JausId;
 use crate::wire::{
-    Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version,
+    Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version, as5669a,
 };
 
 /// Why a message cannot be sent. Nothing of it was.
@@ -98,22 +96,22 @@ impl Endpoint {
     /// mean that it arrives; ask for an acknowledgement to be told.
     pub fn send(&mut self, now: Instant, message: Outgoing) -> Result<MessageHandle, SendError> {
         let scope = self.check(&message)?;
-        self.latest = Some(now);
         let handle = self.deliveries.next_handle();
         let (destination, length) = (message.destination, message.payload.len());
         if self.components.contains(message.destination) {
             self.send_to_sibling(handle, message)?;
         } else {
-            let siblings = self.siblings(&message, scope);
-            if !self.messages.has_room(message.priority, siblings.len()) {
+            let siblings = self
+                .components
+                .receivers(message.source, destination, scope);
+            if !self.inbox.has_room(message.priority, siblings.count()) {
                 self.counters.add(Counter::DeliveryQueueFull);
                 let limit = self.config.queue_limit;
                 return Err(SendError::QueueFull { limit });
             }
             self.send_away(now, handle, &message, scope)?;
-            for to in siblings {
-                self.enqueue(received_locally(message.clone(), scope, to));
-            }
+            let source = message.source;
+            self.deliver_to_all(&received_locally(message, scope, destination), Some(source));
         }
         self.counters.add(Counter::MessagesSent);
         self.peers.note_sent(destination, length);
@@ -155,35 +153,21 @@ impl Endpoint {
         let (acknowledge, scope, by) =
             (message.acknowledge, message.broadcast, message.destination);
         if acknowledge {
-            self.deliveries.check_room(self.untold, 0)?;
+            self.deliveries.check_room(self.inbox.results(), 0)?;
         }
-        let limit = self.config.queue_limit;
-        let received = received_locally(message, scope, by);
-        self.messages
-            .push(received.priority, received)
-            .map_err(|_| {
-                self.counters.add(Counter::DeliveryQueueFull);
-                SendError::QueueFull { limit }
-            })?;
+        if !self.inbox.push(received_locally(message, scope, by)) {
+            self.counters.add(Counter::DeliveryQueueFull);
+            let limit = self.config.queue_limit;
+            return Err(SendError::QueueFull { limit });
+        }
         self.counters.add(Counter::MessagesDelivered);
         if acknowledge {
-            self.tell_result(Event::Acknowledged {
+            self.inbox.push_result(Event::Acknowledged {
                 message: handle,
                 by,
             });
         }
         Ok(())
-    }
-
-    /// The components of this node that get a message for many, but for its sender.
-    fn siblings(&self, message: &Outgoing, scope: Broadcast) -> Vec<JausId> {
-        let source = message.source;
-        let mut siblings = self.components.matching(message.destination);
-        siblings.retain(|to| {
-            let in_scope = scope != Broadcast::Local || to.subsystem() == source.subsystem();
-            *to != source && in_scope
-        });
-        siblings
     }
 
     fn send_away(
@@ -193,8 +177,9 @@ impl Endpoint {
         message: &Outgoing,
         scope: Broadcast,
     ) -> Result<(), SendError> {
-        let (destination, limit) = (message.destination, self.config.queue_limit);
-        if self.links.is_empty() && scope == Broadcast::None {
+        let destination = message.destination;
+        let is_to_one = scope == Broadcast::None;
+        if is_to_one && self.egress.links().next().is_none() {
             return Err(SendError::NoLink(destination));
         }
         let route = self.route(destination);
@@ -204,38 +189,29 @@ impl Endpoint {
         let cut = self.cutting(destination, version).cut(length);
         // What is large goes to everybody only until the address is known, and nowhere else than to
         // whoever acknowledges the beginning.
-        let seeks = scope == Broadcast::None && self.seeks_proof(destination, length);
+        let seeks = is_to_one && self.seeks_proof(destination, length);
         if message.acknowledge || cut.count() > 1 && seeks {
             return self.deliver_reliably(now, handle, message, scope);
         }
+        let path = route.filter(|_| is_to_one).map(|(path, _)| path);
         let first = self.numbers.take(cut.count());
-        if cut.count() > 1 {
-            return self.pace(now, message, scope, cut, first);
-        }
         let frame = Frame {
+            version: if is_to_one { version } else { Version::As5669a },
             flags: Flags::new(message.priority).with_broadcast(scope),
             sequence: first as u16,
-            ..Frame::new(message.source, message.destination, message.payload.clone())
+            ..Frame::new(message.source, destination, message.payload.clone())
         };
-        let transmits = self.transmits_of(&frame)?;
-        if scope == Broadcast::None {
-            match route {
-                None => self.calls.insert(now, &frame),
-                Some((path, _)) => {
-                    let octets = transmits.iter().map(|it| it.payload.len()).sum();
-                    if !self.may_send(now, destination, path, octets) {
-                        return Ok(());
-                    }
-                }
+        if cut.count() > 1 {
+            return self.send_fragmented(now, path, &frame, cut, first);
+        }
+        let Some(path) = path else {
+            if is_to_one {
+                self.calls.insert(now, &frame);
             }
-        }
-        if !self.transmits.has_room(message.priority, transmits.len()) {
-            self.counters.add(Counter::TransmitQueueFull);
-            return Err(SendError::QueueFull { limit });
-        }
-        for transmit in self.remember_echo(now, &frame, transmits) {
-            self.transmit(transmit);
-        }
+            return self.send_to_all(now, frame);
+        };
+        self.check_egress(message.priority, 1)?;
+        self.send_along(now, path, &frame)?;
         Ok(())
     }
 
@@ -249,64 +225,97 @@ impl Endpoint {
         })
     }
 
-    /// Takes in a large message that wants no acknowledgement.
-    fn pace(
+    /// Takes in a large message that wants no acknowledgement: a frame without data control that
+    /// holds all of it, and leaves in fragments.
+    fn send_fragmented(
         &mut self,
         now: Instant,
-        message: &Outgoing,
-        scope: Broadcast,
+        path: Option<Path>,
+        whole: &Frame,
         cut: Cut,
         first: u64,
     ) -> Result<(), SendError> {
-        let flags = Flags::new(message.priority).with_broadcast(scope);
-        let (flags, ways) = self.ways(message.destination, flags);
-        if !self.pacer.has_room(ways.len() * message.payload.len()) {
+        let hops = match path {
+            Some(path) => vec![path.into()],
+            None => self.hops_to_all(whole.destination),
+        };
+        let length = whole.payload.len();
+        if !self.egress.has_room_for_fragments(hops.len() * length) {
             self.counters.add(Counter::TransmitQueueFull);
             let limit = self.config.max_paced;
             return Err(SendError::TooMuchQueued { limit });
         }
-        for Way { link, to, version } in ways {
-            let stretch = Stretch {
-                source: message.source,
-                destination: message.destination,
-                version,
-                flags,
-                payload: message.payload.clone(),
-                cut,
-                first,
-                pacing: self.pacing(message.destination),
-            };
-            self.pacer.push(now, (link, to), stretch);
+        let octets = length + cut.count() * (1 + as5669a::MIN_LEN);
+        if path.is_some_and(|path| !self.may_send(now, whole.destination, path, octets)) {
+            return Ok(());
+        }
+        let pacing = self.pacing(whole.destination);
+        for hop in hops {
+            let message = FragmentedSend::new(whole, cut, first, pacing);
+            self.egress.push_fragmented(now, hop, message);
         }
         Ok(())
     }
 
-    /// The next fragment of a large message that wants no acknowledgement, if one of this priority
-    /// may be sent.
-    pub(super) fn next_paced(&mut self, priority: Priority) -> Option<Transmit> {
-        let now = self.latest?;
-        loop {
-            let ((link, to), frame) = self.pacer.take(now, priority)?;
-            let way = Way {
-                link,
-                to,
-                version: frame.version,
-            };
-            match self.transmit_of(&way, &frame) {
-                Ok(transmit) if !self.may_leave(now, &frame, &transmit) => {}
-                Ok(transmit) => return self.remember_echo(now, &frame, vec![transmit]).pop(),
-                Err(error) => debug!(destination = %frame.destination, %error, "cannot be sent"),
-            }
+    /// Checks whether so many more datagrams can wait to be sent.
+    fn check_egress(&mut self, priority: Priority, count: usize) -> Result<(), SendError> {
+        if self.egress.has_room(priority, count) {
+            return Ok(());
         }
+        self.counters.add(Counter::TransmitQueueFull);
+        let limit = self.config.queue_limit;
+        Err(SendError::QueueFull { limit })
     }
 
-    /// Whether a datagram may go to an address, or goes to the group.
-    fn may_leave(&mut self, now: Instant, frame: &Frame, transmit: &Transmit) -> bool {
-        let (link, octets) = (transmit.link, transmit.payload.len());
-        match transmit.to {
-            To::Peer(peer) => self.may_send(now, frame.destination, Path { link, peer }, octets),
-            To::Group => true,
+    /// Sends a frame along a path, with its own header, if that address may get so much and there is
+    /// room; whether it does. What is not sent is counted.
+    pub(super) fn send_along(
+        &mut self,
+        now: Instant,
+        path: Path,
+        frame: &Frame,
+    ) -> Result<bool, EncodeError> {
+        let octets = self.egress.encode(path.link, frame)?;
+        if !self.may_send(now, frame.destination, path, octets.len()) {
+            return Ok(false);
         }
+        let priority = frame.flags.priority();
+        let queued = self.egress.push(now, path.into(), priority, octets);
+        if !queued {
+            self.counters.add(Counter::TransmitQueueFull);
+        }
+        Ok(queued)
+    }
+
+    /// Sends a frame of ours to everybody. One for a component whose address is unknown asks it for
+    /// an answer.
+    pub(super) fn send_to_all(&mut self, now: Instant, mut frame: Frame) -> Result<(), SendError> {
+        let hops = self.hops_to_all(frame.destination);
+        self.check_egress(frame.flags.priority(), hops.len())?;
+        self.egress.remember_echo(now, &frame);
+        frame.version = Version::As5669a;
+        if frame.flags.broadcast() == Some(Broadcast::None) {
+            trace!(destination = %frame.destination, "address unknown");
+            frame.flags = frame
+                .flags
+                .with_broadcast(Broadcast::Global)
+                .with_acknowledgement(Acknowledgement::Request);
+        }
+        self.send_to_hops(now, &hops, &frame)?;
+        Ok(())
+    }
+
+    /// Sends a frame to several places. What is not sent is counted.
+    pub(super) fn send_to_hops(
+        &mut self,
+        now: Instant,
+        hops: &[Hop],
+        frame: &Frame,
+    ) -> Result<(), EncodeError> {
+        let refused = self.egress.push_to_many(now, hops, frame)?;
+        self.counters
+            .add_many(Counter::TransmitQueueFull, refused as u64);
+        Ok(())
     }
 
     /// How messages to `destination` are cut.
@@ -346,115 +355,19 @@ impl Endpoint {
     pub(super) fn route(&self, destination: JausId) -> Option<(Path, Version)> {
         self.peers
             .route(destination)
-            .filter(|(path, _)| self.links.contains_key(&path.link))
-    }
-
-    /// Remembers what goes to the group, which may come back.
-    pub(super) fn remember_echo(
-        &mut self,
-        now: Instant,
-        frame: &Frame,
-        transmits: Vec<Transmit>,
-    ) -> Vec<Transmit> {
-        if transmits.iter().any(|transmit| transmit.to == To::Group) {
-            self.sent_to_group
-                .insert(now, self.sent_to_group.fingerprint(frame));
-        }
-        transmits
-    }
-
-    /// The datagrams that carry a frame to where its destination is.
-    pub(super) fn transmits_of(&self, frame: &Frame) -> Result<Vec<Transmit>, SendError> {
-        let (flags, ways) = self.ways(frame.destination, frame.flags);
-        let frame = Frame {
-            flags,
-            ..frame.clone()
-        };
-        ways.iter()
-            .map(|way| Ok(self.transmit_of(way, &frame)?))
-            .collect()
-    }
-
-    /// The datagram that carries a frame, with its own header, along a path.
-    pub(super) fn transmit_along(
-        &self,
-        path: Path,
-        frame: &Frame,
-    ) -> Result<Transmit, EncodeError> {
-        Ok(Transmit {
-            link: path.link,
-            to: To::Peer(path.peer),
-            priority: frame.flags.priority(),
-            payload: self.framing(path.link).encode(frame)?,
-            segment: None,
-        })
-    }
-
-    fn transmit_of(&self, way: &Way, frame: &Frame) -> Result<Transmit, EncodeError> {
-        let frame = Frame {
-            version: way.version,
-            ..frame.clone()
-        };
-        Ok(Transmit {
-            link: way.link,
-            to: way.to,
-            priority: frame.flags.priority(),
-            payload: self.framing(way.link).encode(&frame)?,
-            segment: None,
-        })
-    }
-
-    /// The ways to where a destination is. If its address is unknown: to everybody, with flags that
-    /// ask it for an answer.
-    fn ways(&self, destination: JausId, flags: Flags) -> (Flags, Vec<Way>) {
-        if destination.has_wildcard() || flags.broadcast() != Some(Broadcast::None) {
-            return (flags, self.ways_to_group(destination));
-        }
-        if let Some((path, version)) = self.route(destination) {
-            return (flags, vec![Way::along(path, version)]);
-        }
-        trace!(%destination, "address unknown");
-        let flags = flags
-            .with_broadcast(Broadcast::Global)
-            .with_acknowledgement(Acknowledgement::Request);
-        (flags, self.ways_to_group(destination))
+            .filter(|(path, _)| self.egress.has_link(path.link))
     }
 
     /// The group of every link, and the static peers that multicast does not reach.
-    fn ways_to_group(&self, destination: JausId) -> Vec<Way> {
-        let group = |&link: &LinkId| Way {
-            link,
-            to: To::Group,
-            version: Version::As5669a,
-        };
-        let copies = self.peers.broadcast_copies(destination).into_iter();
-        let copies = copies.map(|path| Way::along(path, Version::As5669a));
-        self.links.keys().map(group).chain(copies).collect()
+    fn hops_to_all(&self, destination: JausId) -> Vec<Hop> {
+        let groups = self.egress.links().map(|(link, _)| (link, To::Group));
+        let copies = self.peers.broadcast_copies(destination);
+        groups.chain(copies.into_iter().map(Hop::from)).collect()
     }
 
     /// How a link frames messages.
     pub(super) fn framing(&self, link: LinkId) -> Framing {
-        self.links
-            .get(&link)
-            .map_or(Framing::default(), |profile| profile.framing)
-    }
-}
-
-/// Whereto, and with which header.
-#[derive(Clone, Copy, Debug)]
-struct Way {
-    link: LinkId,
-    to: To,
-    version: Version,
-}
-
-impl Way {
-    const fn along(path: Path, version: Version) -> Self {
-        Self {
-            link: path.link,
-            to: To::Peer(path.peer),
-            version,
-        }
+        self.egress.framing(link)
     }
 }
 

@@ -222,10 +222,7 @@ impl Endpoint {
                 sequence: number,
                 ..Frame::new(local, id, Bytes::from_static(CHALLENGE))
             };
-            if let Ok(transmit) = self.transmit_along(path, &frame)
-                && self.is_within_budget(now, path, transmit.payload.len())
-                && self.transmit(transmit)
-            {
+            if self.send_along(now, path, &frame) == Ok(true) {
                 self.counters.add(Counter::ChallengesSent);
             }
         }
@@ -298,25 +295,23 @@ impl Endpoint {
     /// Whether a datagram may go to where a peer is; what may not is counted. Asks for a proof in
     /// good time.
     pub(super) fn may_send(&mut self, now: Instant, id: JausId, to: Path, octets: usize) -> bool {
-        let may = self.is_within_budget(now, to, octets);
-        if !self.is_free(to) && self.budget.is_in_use(now, to.into()) {
-            self.challenge(now, id);
-        }
-        may
-    }
-
-    fn is_within_budget(&mut self, now: Instant, to: Path, octets: usize) -> bool {
-        if self.is_free(to) || self.budget.take(now, to.into(), octets) {
+        if self.is_free(to) {
             return true;
         }
-        self.counters.add(Counter::UnverifiedBudget);
-        if self.warnings.is_due(now, Warning::Unverified) {
-            warn!(
-                to = %to.peer,
-                "too much for an address that acknowledges nothing: name the peer in peers if it is real"
-            );
+        let may = self.budget.take(now, to.into(), octets);
+        if self.budget.is_in_use(now, to.into()) {
+            self.challenge(now, id);
         }
-        false
+        if !may {
+            self.counters.add(Counter::UnverifiedBudget);
+            if self.warnings.is_due(now, Warning::Unverified) {
+                warn!(
+                    to = %to.peer,
+                    "too much for an address that acknowledges nothing: name the peer in peers if it is real"
+                );
+            }
+        }
+        may
     }
 
     /// Whether what goes to a path is not limited.

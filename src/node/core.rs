@@ -227,11 +227,12 @@ impl Core {
         }
         let (source, deadline) = (message.source, self.deadline());
         let urgent = message.priority > Priority::Standard;
-        let mut result = self.endpoint.send(now(), message.clone());
+        let now = now();
+        let mut result = self.endpoint.send(now, message.clone());
         if let Err(endpoint::SendError::QueueFull { .. }) = result {
             // What was gathered so far may be all that is in the way.
-            self.pump();
-            result = self.endpoint.send(now(), message);
+            self.pump(now);
+            result = self.endpoint.send(now, message);
         }
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
             self.awaiting.insert(*handle, source, waiter);
@@ -243,7 +244,7 @@ impl Core {
             return Ok(result?);
         }
         // What stays among the node's components is none of the driver's business.
-        if self.pump() || self.deadline() != deadline {
+        if self.pump(now) || self.deadline() != deadline {
             self.wake_driver();
         }
         Ok(result?)
@@ -267,7 +268,7 @@ impl Core {
         {
             self.endpoint.handle_timeout(now);
         }
-        self.pump();
+        self.pump(now);
         let flushed = self.flush(cx, now);
         if self
             .stop_at
@@ -296,10 +297,10 @@ impl Core {
 
     /// Hands on what the endpoint has to say: datagrams to links, messages to mailboxes.
     /// Says whether anything went to a link.
-    fn pump(&mut self) -> bool {
+    fn pump(&mut self, now: Instant) -> bool {
         let mut transmitted = false;
         self.gathered = 0;
-        while let Some(transmit) = self.endpoint.poll_transmit() {
+        while let Some(transmit) = self.endpoint.poll_transmit(now) {
             if let Some(link) = self.links.get_mut(transmit.link) {
                 self.taps.transmit(link.framing(), &transmit);
                 link.transmit(&transmit);

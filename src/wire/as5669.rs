@@ -40,10 +40,22 @@ pub fn parse(datagram: &Bytes, offset: usize) -> Result<(Frame, usize), Error> {
 /// # Errors
 /// As [`ra::emit`].
 pub fn emit(frame: &Frame, out: &mut BytesMut) -> Result<(), EncodeError> {
-    let mut message = BytesMut::with_capacity(ra::HEADER_LEN + frame.payload.len());
-    ra::emit(frame, &mut message)?;
-    out.put_slice(&[0, 0]);
-    out.put_u16(message.len() as u16);
-    out.put_slice(&message);
+    emit_behind(&[0; PREFIX_LEN], u16::to_be_bytes, frame, out)
+}
+
+/// Writes a message behind a prefix that ends with the length of the message; on an error nothing is
+/// written.
+pub(super) fn emit_behind(
+    prefix: &[u8],
+    length: fn(u16) -> [u8; 2],
+    frame: &Frame,
+    out: &mut BytesMut,
+) -> Result<(), EncodeError> {
+    let start = out.len();
+    out.put_slice(prefix);
+    ra::emit(frame, out).inspect_err(|_| out.truncate(start))?;
+    let message = start + prefix.len();
+    let length = length((out.len() - message) as u16);
+    out[message - length.len()..message].copy_from_slice(&length);
     Ok(())
 }

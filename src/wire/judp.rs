@@ -135,19 +135,29 @@ impl Iterator for Frames {
 /// A frame that its header cannot carry.
 pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
     let mut out = BytesMut::with_capacity(ra::PREFIX.len() + ra::HEADER_LEN + frame.payload.len());
-    match frame.version {
+    emit(frame, &mut out)?;
+    Ok(out.freeze())
+}
+
+/// Writes such a datagram behind what `out` holds; on an error nothing is written.
+///
+/// # Errors
+/// A frame that its header cannot carry.
+pub fn emit(frame: &Frame, out: &mut BytesMut) -> Result<(), EncodeError> {
+    let start = out.len();
+    let emitted = match frame.version {
         Version::As5669a => {
             out.put_u8(VERSION_AS5669A);
-            as5669a::emit(frame, &mut out)?;
+            as5669a::emit(frame, out)
         }
         Version::As5669 => {
             out.put_u8(VERSION_AS5669);
-            as5669::emit(frame, &mut out)?;
+            as5669::emit(frame, out)
         }
         Version::Ra => {
             out.put_slice(ra::PREFIX);
-            ra::emit(frame, &mut out)?;
+            ra::emit(frame, out)
         }
-    }
-    Ok(out.freeze())
+    };
+    emitted.inspect_err(|_| out.truncate(start))
 }

@@ -195,24 +195,25 @@ impl Header {
     }
 
     /// The header of a frame whose data, without the message code, has `data_size` octets.
-    fn from_frame(frame: &Frame, code: u16, data_size: u16) -> Self {
+    fn from_frame(frame: &Frame, code: u16, data_size: usize) -> Self {
         let flags = frame.flags;
-        let data_flag = match flags.data() {
-            DataControl::Single => 0,
-            DataControl::First => 1,
-            DataControl::Middle => 2,
-            DataControl::Last => 8,
-        };
-        Self {
-            properties: VERSION_3_3
-                | priority_to_ra(flags.priority())
-                | (flags.acknowledgement() as u16) << 4,
+        Self::new(&Fields {
+            priority: priority_to_ra(flags.priority()),
+            acknowledgement: flags.acknowledgement(),
+            service_connection: false,
+            experimental: false,
             code,
-            destination: frame.destination.to_u32(),
-            source: frame.source.to_u32(),
-            data_control: data_flag << 12 | data_size,
+            destination: frame.destination.into(),
+            source: frame.source.into(),
+            data_flag: match flags.data() {
+                DataControl::Single => 0,
+                DataControl::First => 1,
+                DataControl::Middle => 2,
+                DataControl::Last => 8,
+            },
+            data_size,
             sequence: frame.sequence,
-        }
+        })
     }
 }
 
@@ -227,8 +228,8 @@ const fn priority_from_ra(priority: u8) -> Priority {
 }
 
 /// The middle of the range that [`priority_from_ra`] maps to the same priority.
-const fn priority_to_ra(priority: Priority) -> u16 {
-    3 * priority.bits() as u16 + 3
+const fn priority_to_ra(priority: Priority) -> u8 {
+    3 * priority.bits() + 3
 }
 
 /// An id as the Reference Architecture divides its four octets.
@@ -341,7 +342,7 @@ pub fn emit(frame: &Frame, out: &mut BytesMut) -> Result<(), EncodeError> {
             limit: CODE_LEN + MAX_DATA,
         });
     }
-    let header = Header::from_frame(frame, u16::from_le_bytes(*code), data.len() as u16);
+    let header = Header::from_frame(frame, u16::from_le_bytes(*code), data.len());
     out.put_slice(&header.octets());
     out.put_slice(data);
     Ok(())

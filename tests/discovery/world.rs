@@ -256,7 +256,7 @@ impl World {
             node.endpoint.send(now, message).unwrap();
         }
         let mut departures = Vec::new();
-        while let Some(transmit) = node.endpoint.poll_transmit() {
+        while let Some(transmit) = node.endpoint.poll_transmit(now) {
             node.datagrams += 1;
             departures.push((node.address, transmit));
         }

@@ -488,7 +488,7 @@ impl<O: Owner> Network<O> {
     fn settle(&mut self, host: usize) {
         loop {
             let node = &mut self.nodes[host];
-            if let Some(transmit) = node.endpoint.poll_transmit() {
+            if let Some(transmit) = node.endpoint.poll_transmit(self.now) {
                 self.carry_all(host, &transmit);
             } else if let Some(event) = next_event(node) {
                 note_event(&mut self.trace, self.now, host, &event);

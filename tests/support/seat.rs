@@ -172,7 +172,7 @@ impl Seat {
                 break;
             }
         }
-        while let Some(transmit) = self.endpoint.poll_transmit() {
+        while let Some(transmit) = self.endpoint.poll_transmit(self.now) {
             let challenged = (transmit.link == UDP).then(|| acknowledgement(&transmit));
             match challenged.flatten() {
                 Some((path, answer)) => self.endpoint.handle_datagram(self.now, path, answer),

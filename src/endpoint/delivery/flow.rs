@@ -98,6 +98,8 @@ pub(super) struct Flow {
     pub(super) connected: bool,
     /// By priority, whether it stands in the list of those that have something to send.
     pub(super) listed: [bool; Priority::ALL.len()],
+    /// When it is looked at, at the latest.
+    pub(super) timer: Option<Instant>,
     /// Messages of which a packet was sent as often as is allowed.
     exhausted: Vec<u64>,
     /// No message under way has a lower serial number.
@@ -127,6 +129,7 @@ impl Flow {
             known: false,
             connected: false,
             listed: Default::default(),
+            timer: None,
             exhausted: Vec::new(),
             floor: 0,
             patience: config.acknowledge_patience,

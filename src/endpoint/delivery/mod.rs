@@ -25,8 +25,7 @@ use std::time::{Duration, Instant};
 use tracing::debug;
 
 use super::{
-    Config, Counter, Endpoint, Event, MessageHandle, Outgoing, Path, SendError, Transmit,
-    Unacknowledged,
+    Config, Counter, Endpoint, Event, MessageHandle, Outgoing, Path, SendError, Unacknowledged,
 };
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, Priority, Version};
@@ -68,7 +67,6 @@ pub(super) struct Deliveries {
     turn: Option<(JausId, usize)>,
     /// When to look at a flow at the latest; one entry each at the most.
     timers: BTreeSet<(Instant, JausId)>,
-    timer_of: HashMap<JausId, Instant>,
     handed_in: u64,
     messages: usize,
     octets: usize,
@@ -82,7 +80,6 @@ impl Deliveries {
             ready: Default::default(),
             turn: None,
             timers: BTreeSet::new(),
-            timer_of: HashMap::new(),
             handed_in: 0,
             messages: 0,
             octets: 0,
@@ -96,10 +93,10 @@ impl Deliveries {
         MessageHandle(self.handed_in)
     }
 
-    /// Checks whether one more message can be taken in, while `untold` results were not polled.
-    pub(super) fn check_room(&self, untold: usize, length: usize) -> Result<(), SendError> {
+    /// Checks whether one more message can be taken in, while so many `results` were not polled.
+    pub(super) fn check_room(&self, results: usize, length: usize) -> Result<(), SendError> {
         let limit = self.config.max_unacknowledged;
-        if self.messages + untold >= limit {
+        if self.messages + results >= limit {
             return Err(SendError::TooManyUnacknowledged { limit });
         }
         let limit = self.config.max_unacknowledged_octets;
@@ -141,7 +138,9 @@ impl Deliveries {
         let Some((&destination, _)) = oldest else {
             return false;
         };
-        self.flows.remove(&destination);
+        if let Some(timer) = self.flows.remove(&destination).and_then(|flow| flow.timer) {
+            self.timers.remove(&(timer, destination));
+        }
         true
     }
 
@@ -163,18 +162,15 @@ impl Deliveries {
             }
         }
         let deadline = flow.deadline();
-        match (self.timer_of.get(&destination).copied(), deadline) {
+        match (flow.timer, deadline) {
             // A timer that is early is harmless, and moving it for each answer is not.
             (Some(set), Some(deadline)) if set <= deadline => {}
             (set, deadline) => {
                 if let Some(set) = set {
                     self.timers.remove(&(set, destination));
-                    self.timer_of.remove(&destination);
                 }
-                if let Some(deadline) = deadline {
-                    self.timers.insert((deadline, destination));
-                    self.timer_of.insert(destination, deadline);
-                }
+                self.timers.extend(deadline.map(|at| (at, destination)));
+                flow.timer = deadline;
             }
         }
     }
@@ -211,7 +207,9 @@ impl Deliveries {
             return None;
         }
         self.timers.pop_first();
-        self.timer_of.remove(&destination);
+        if let Some(flow) = self.flows.get_mut(&destination) {
+            flow.timer = None;
+        }
         Some(destination)
     }
 
@@ -224,8 +222,9 @@ impl Deliveries {
         self.octets -= length;
     }
 
-    /// Forgets the messages of a component that has gone.
-    pub(super) fn forget_source(&mut self, source: JausId) {
+    /// Forgets the messages of a component that has gone; how many.
+    pub(super) fn forget_source(&mut self, source: JausId) -> u64 {
+        let before = self.messages;
         let destinations: Vec<_> = self.flows.keys().copied().collect();
         for destination in destinations {
             let Some(flow) = self.flows.get_mut(&destination) else {
@@ -240,6 +239,7 @@ impl Deliveries {
             gone.into_iter().for_each(|length| self.settle(length));
             self.touch(destination);
         }
+        (before - self.messages) as u64
     }
 }
 
@@ -260,39 +260,31 @@ impl Endpoint {
         scope: Broadcast,
     ) -> Result<(), SendError> {
         self.deliveries
-            .check_room(self.untold, message.payload.len())?;
+            .check_room(self.inbox.results(), message.payload.len())?;
         let parcel = Parcel::new(now, message, scope);
         self.deliveries
             .push(now, message.destination, handle, parcel)
     }
 
-    /// The next packet of a message that wants an acknowledgement, if one of this priority may be
-    /// sent.
-    pub(super) fn next_delivery(&mut self, priority: Priority) -> Option<Transmit> {
-        let now = self.latest?;
-        while let Some(destination) = self.deliveries.next_ready(priority) {
-            let Some(transmit) = self.next_packet(now, destination, priority) else {
-                // What waits for numbers to be free has its next turn when something is
-                // acknowledged or given up.
-                continue;
-            };
-            self.deliveries.take_turn(destination);
-            self.deliveries.touch(destination);
-            if transmit.is_some() {
-                return transmit;
+    /// Sends the packets that are next of this priority, as many as one flow may send in its turn.
+    pub(super) fn send_deliveries(&mut self, now: Instant, priority: Priority) {
+        let mut sent = 0;
+        while sent < TURN
+            && let Some(destination) = self.deliveries.next_ready(priority)
+        {
+            // What waits for numbers to be free has its next turn when something is acknowledged or
+            // given up.
+            if self.send_packet(now, destination, priority).is_some() {
+                self.deliveries.take_turn(destination);
+                self.deliveries.touch(destination);
+                sent += 1;
             }
         }
-        None
     }
 
-    /// Takes the next packet to a destination, if there is one; and what to transmit for it, if
-    /// some way leads there. If none does, it counts as lost on the way.
-    fn next_packet(
-        &mut self,
-        now: Instant,
-        destination: JausId,
-        priority: Priority,
-    ) -> Option<Option<Transmit>> {
+    /// Sends the next packet to a destination, if there is one. If no way leads there, it counts as
+    /// lost on the way.
+    fn send_packet(&mut self, now: Instant, destination: JausId, priority: Priority) -> Option<()> {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
         let cutting = self.cutting(destination, version);
@@ -322,34 +314,16 @@ impl Endpoint {
             frame.version = version;
         }
         let sent = match route {
-            Some((path, _)) if frame.flags.broadcast() == Some(Broadcast::None) => self
-                .transmit_along(path, &frame)
-                .map(|it| {
-                    let may = self.may_send(now, destination, path, it.payload.len());
-                    may.then_some(it)
-                })
-                .map_err(SendError::Header),
-            _ => self.transmit_to_all(now, &frame),
+            Some((path, _)) if frame.flags.broadcast() == Some(Broadcast::None) => {
+                let sent = self.send_along(now, path, &frame);
+                sent.map(drop).map_err(SendError::Header)
+            }
+            _ => self.send_to_all(now, frame),
         };
-        Some(sent.unwrap_or_else(|error| {
+        if let Err(error) = sent {
             debug!(%destination, %error, "cannot be sent");
-            None
-        }))
-    }
-
-    /// Sends a packet by all ways that there are to its destination; gives back the first.
-    fn transmit_to_all(
-        &mut self,
-        now: Instant,
-        frame: &Frame,
-    ) -> Result<Option<Transmit>, SendError> {
-        let transmits = self.transmits_of(frame)?;
-        let mut transmits = self.remember_echo(now, frame, transmits).into_iter();
-        let first = transmits.next();
-        for other in transmits {
-            self.transmit(other);
         }
-        Ok(first)
+        Some(())
     }
 
     /// Whether a message, or a part of it, waits for an acknowledgement of `peer` with this number.
@@ -412,7 +386,7 @@ impl Endpoint {
             self.deliveries.settle(parcel.payload.len());
             if parcel.awaited {
                 let message = MessageHandle(message);
-                self.tell_result(Event::Acknowledged { message, by });
+                self.inbox.push_result(Event::Acknowledged { message, by });
             }
         }
     }
@@ -435,7 +409,7 @@ impl Endpoint {
             if !awaited {
                 continue;
             }
-            self.tell_result(Event::NotAcknowledged {
+            self.inbox.push_result(Event::NotAcknowledged {
                 message: MessageHandle(message),
                 destination,
                 reason,

@@ -91,6 +91,12 @@ impl Cut {
         start.min(self.length)..end.min(self.length)
     }
 
+    /// The octets of the fragment.
+    pub(in crate::endpoint) fn fragment_len(&self, index: usize) -> usize {
+        let repeated = if index == 0 { 0 } else { self.repeated };
+        repeated + self.range(index).len()
+    }
+
     /// The data control and payload of the fragment.
     pub(in crate::endpoint) fn fragment(
         &self,

@@ -232,5 +232,5 @@ fn without_pacing_destinations_are_forgotten_too() {
             .unwrap();
         assert_eq!(rig.transmits().len(), 4);
     }
-    assert!(rig.endpoint.pacer.len() <= 64);
+    assert!(rig.endpoint.egress.len() <= 128);
 }

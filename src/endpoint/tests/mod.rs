@@ -127,7 +127,7 @@ impl Rig {
     }
 
     fn transmits(&mut self) -> Vec<Transmit> {
-        std::iter::from_fn(|| self.endpoint.poll_transmit()).collect()
+        std::iter::from_fn(|| self.endpoint.poll_transmit(self.now)).collect()
     }
 
     /// What is sent, read again.

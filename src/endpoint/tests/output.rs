@@ -137,9 +137,13 @@ fn messages_to_different_places_do_not_share_a_datagram() {
         })
         .unwrap();
     }
-    let places: Vec<_> = rig.transmits().iter().map(|t| t.to).collect();
+    let transmits = rig.transmits();
+    let places: Vec<_> = transmits
+        .iter()
+        .map(|it| (it.to, messages(it).len()))
+        .collect();
     let to = |host| To::Peer(path(host).peer);
-    assert_eq!(places, [to(PEER_HOST), to(9), to(PEER_HOST), To::Group]);
+    assert_eq!(places, [(to(PEER_HOST), 2), (to(9), 1), (To::Group, 1)]);
 }
 
 #[test]
@@ -306,4 +310,52 @@ fn datagrams_to_three_places_all_leave_with_packing_and_segments_together() {
         mine.map(|it| messages(it).len()).sum()
     };
     assert_eq!([20, 21, 22].map(octets), [3; 3]);
+}
+
+#[test]
+fn packed_datagrams_of_one_length_leave_together_and_lose_no_message() {
+    let mut rig = with_packing(Packing::Within(Duration::ZERO));
+    rig.endpoint.add_link(WIRE, segmenting());
+    let lengths = [3, 900, 3, 1400, 700, 700, 20];
+    for (number, length) in (0..210_u8).zip(lengths.into_iter().cycle()) {
+        let mut payload = vec![number; length];
+        payload[..2].copy_from_slice(QUERY_HEARTBEAT);
+        rig.send(unreliable(payload.into(), Priority::Standard))
+            .unwrap();
+    }
+    let transmits = rig.transmits();
+    assert!(transmits.iter().any(|it| it.segment.is_some()));
+    let numbers = transmits.iter().flat_map(|it| {
+        let octets = it.segment.unwrap_or(it.payload.len());
+        let datagrams = it.payload.chunks(octets);
+        datagrams.flat_map(|datagram| {
+            let frames = judp::frames(Bytes::copy_from_slice(datagram)).unwrap();
+            frames.map(|frame| frame.unwrap().payload[2])
+        })
+    });
+    assert!(numbers.eq(0..210));
+    assert_eq!(rig.count(Counter::StaleOctets), 0);
+}
+
+#[test]
+fn what_waits_for_a_link_that_is_removed_is_counted() {
+    let mut rig = with_packing(Packing::Within(Duration::from_millis(5)));
+    rig.send(unreliable(large(10 * 1425), Priority::Standard))
+        .unwrap();
+    rig.send(unreliable(large(1425), Priority::Standard))
+        .unwrap();
+    (0..3).for_each(|_| drop(rig.send(to_peer())));
+    rig.endpoint.remove_link(WIRE);
+    let fragments_and_messages = 10 + 4;
+    assert_eq!(rig.count(Counter::LinkGone), fragments_and_messages);
+    assert_eq!(
+        (rig.transmits(), rig.endpoint.poll_timeout()),
+        (vec![], None)
+    );
+    rig.endpoint.add_link(WIRE, segmenting());
+    rig.hear(&from_peer(QUERY_HEARTBEAT));
+    assert!(
+        (0..1024).all(|_| rig.send(to_peer()).is_ok()),
+        "nothing left"
+    );
 }

@@ -98,7 +98,7 @@ impl World {
 
     /// Puts what a node has to send on the networks. Multicast comes back to its sender, too.
     fn collect(&mut self, node: usize) {
-        while let Some(transmit) = self.nodes[node].poll_transmit() {
+        while let Some(transmit) = self.nodes[node].poll_transmit(self.now) {
             let from = self
                 .plugs
                 .iter()
@@ -460,13 +460,14 @@ impl Between {
     }
 
     fn sent(&mut self) -> Vec<(LinkId, To, Frame)> {
+        let now = self.world.now;
         let router = &mut self.world.nodes[self.router];
         let read = |transmit: Transmit| {
             let mut frames = judp::frames(transmit.payload).unwrap();
             let frame = frames.next().unwrap().unwrap();
             (transmit.link, transmit.to, frame)
         };
-        std::iter::from_fn(|| router.poll_transmit())
+        std::iter::from_fn(|| router.poll_transmit(now))
             .map(read)
             .collect()
     }

@@ -152,7 +152,7 @@ fn siblings_talk_without_a_link() {
         (received.source, received.to, received.priority),
         (US, SIBLING, Priority::High)
     );
-    assert_eq!(endpoint.poll_transmit(), None);
+    assert_eq!(endpoint.poll_transmit(now), None);
     let stranger = Outgoing::new(US, PEER, Bytes::from_static(QUERY_HEARTBEAT));
     assert_eq!(endpoint.send(now, stranger), Err(SendError::NoLink(PEER)));
 }

@@ -90,7 +90,7 @@ impl Wire {
     /// Takes what the ends want to send.
     fn carry(&mut self) {
         for end in 0..2 {
-            while let Some(transmit) = self.ends[end].poll_transmit() {
+            while let Some(transmit) = self.ends[end].poll_transmit(self.now) {
                 let length = transmit.segment.unwrap_or(transmit.payload.len());
                 for datagram in transmit.payload.chunks(length) {
                     self.put_on(end, datagram);

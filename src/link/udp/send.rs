@@ -13,12 +13,8 @@ use socket2::SockRef;
 
 use super::socket::Socket;
 use super::{MAX_SEGMENTS, UdpLink};
-use crate::endpoint::{Remote, To, Transmit};
+use crate::endpoint::{MOST_OCTETS, Remote, To, Transmit};
 use crate::wire::Priority;
-
-/// What the kernel takes at once, whatever the number of datagrams; a little less than it says,
-/// for IPv6's longer headers.
-const MOST_OCTETS: usize = 65_000;
 
 /// So many messages leave at once, and with one call if they are datagrams to different peers.
 const BURST: usize = 64;
@@ -118,7 +114,7 @@ impl UdpLink {
         let single = |batch: &&GsoBatch| batch.octets.len() <= batch.segment;
         let singles = self.leaving.iter().take_while(single).count();
         self.counters.send_calls += 1;
-        if CAN_SEND_MANY && self.batch && singles > 1 {
+        if self.batch && singles > 1 {
             match self.send_many(singles) {
                 Ok(sent) => (0..sent).for_each(|_| self.complete_first(1)),
                 Err(error) => self.handle_refusal(1, &error),
@@ -189,9 +185,6 @@ impl UdpLink {
         tracing::info!(interface, limit, %error, "datagrams above the limit leave one by one");
     }
 }
-
-/// Whether datagrams to several peers leave with one call.
-const CAN_SEND_MANY: bool = cfg!(all(feature = "udp-batch", target_os = "linux"));
 
 /// If the error means that batches of such datagrams cannot be sent: the most octets of those that
 /// can, perhaps.

@@ -67,11 +67,9 @@ pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
             2
         }
         Version::As5669 => {
-            message.put_slice(&[0; as5669::PREFIX_LEN]);
-            ra::emit(frame, &mut message)?;
             // Little-endian here, other than in datagrams and streams.
-            let size = (message.len() - as5669::PREFIX_LEN) as u16;
-            message[2..4].copy_from_slice(&size.to_le_bytes());
+            let prefix = [0; as5669::PREFIX_LEN];
+            as5669::emit_behind(&prefix, u16::to_le_bytes, frame, &mut message)?;
             1
         }
         Version::Ra => return Err(EncodeError::DatagramsOnly),

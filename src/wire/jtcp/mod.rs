@@ -32,7 +32,7 @@ use bytes::{Buf, BufMut, Bytes, BytesMut};
 pub use decoder::Decoder;
 
 use super::judp::{VERSION_AS5669, VERSION_AS5669A};
-use super::{EncodeError, Frame, Version, as5669a, ra};
+use super::{EncodeError, Frame, Version, as5669, as5669a, ra};
 
 /// Octets of the size in front of an AS5669 header.
 const SIZE_LEN: usize = 2;
@@ -51,10 +51,8 @@ pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
             as5669a::emit(frame, &mut out)?;
         }
         Version::As5669 => {
-            out.put_slice(&[VERSION_AS5669, 0, 0]);
-            ra::emit(frame, &mut out)?;
-            let size = (out.len() - 1 - SIZE_LEN) as u16;
-            out[1..=SIZE_LEN].copy_from_slice(&size.to_be_bytes());
+            let prefix = [VERSION_AS5669, 0, 0];
+            as5669::emit_behind(&prefix, u16::to_be_bytes, frame, &mut out)?;
         }
         Version::Ra => return Err(EncodeError::DatagramsOnly),
     }

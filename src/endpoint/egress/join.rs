@@ -1,0 +1,183 @@
+//! Several messages in one datagram, and several datagrams with one call.
+
+use std::collections::VecDeque;
+use std::time::Instant;
+
+use bytes::{BufMut, Bytes, BytesMut};
+
+use super::queue::{HopQueue, Level};
+use super::{MOST_OCTETS, encode};
+use crate::endpoint::recent::Recent;
+use crate::endpoint::{Counter, Counters};
+use crate::wire::{EncodeError, Frame, Framing, Priority, as5669a, judp};
+
+/// What fragments leave with.
+pub(super) struct Fragments<'a> {
+    pub(super) now: Instant,
+    pub(super) framing: Framing,
+    /// Where to remember them, if they go to a group.
+    pub(super) echoes: Option<&'a mut Recent>,
+    /// The octets of all that wait.
+    pub(super) octets: &'a mut usize,
+    pub(super) counters: &'a mut Counters,
+}
+
+impl Fragments<'_> {
+    fn note(&mut self, fragment: &Frame) {
+        *self.octets -= fragment.payload.len();
+        if let Some(echoes) = &mut self.echoes {
+            echoes.insert(self.now, echoes.fingerprint(fragment));
+        }
+    }
+}
+
+impl HopQueue {
+    /// The first message that waits, with others in the same datagram of up to `longest` octets, and
+    /// with further datagrams, of which only the last may be shorter; and their length.
+    pub(super) fn join_messages(
+        &mut self,
+        level: Level,
+        segments: usize,
+        longest: usize,
+        buffer: &mut BytesMut,
+    ) -> Option<(Bytes, Option<usize>)> {
+        let priority = usize::from(level.priority().bits());
+        let mut joined = Joined::new(self.whole[priority].pop_front()?, buffer);
+        // Less urgent messages use the room that is left, but keep nothing safety-critical waiting.
+        let least = if level.priority() == Priority::SafetyCritical {
+            priority
+        } else {
+            0
+        };
+        let queues = &mut self.whole[least..=priority];
+        joined.pack(0, queues, longest);
+        let (length, mut segment) = (joined.len(), None);
+        for _ in 1..segments.min(MOST_OCTETS / length.max(1)) {
+            let start = joined.len();
+            let Some(next) = pop_if(&mut queues[priority - least], |it| it.len() <= length) else {
+                break;
+            };
+            joined.push(&next);
+            joined.pack(start, queues, longest.min(length));
+            segment = Some(length);
+            if joined.len() - start < length {
+                break;
+            }
+        }
+        Some((joined.finish(), segment))
+    }
+
+    /// The next fragment that may leave, with others of the same length.
+    pub(super) fn join_fragments(
+        &mut self,
+        level: Level,
+        segments: usize,
+        leaving: &mut Fragments<'_>,
+        buffer: &mut BytesMut,
+    ) -> Option<(Bytes, Option<usize>)> {
+        let (first, like) = loop {
+            let frame = self.next_fragment(leaving.now, level, None)?;
+            leaving.note(&frame);
+            match encode(leaving.framing, buffer, &frame) {
+                Ok(octets) => break (octets, (frame.version, frame.payload.len())),
+                Err(_) => leaving.counters.add(Counter::CannotSend),
+            }
+        };
+        let (length, mut segment) = (first.len(), None);
+        let mut joined = Joined::new(first, buffer);
+        for _ in 1..segments.min(MOST_OCTETS / length.max(1)) {
+            let Some(next) = self.next_fragment(leaving.now, level, Some(like)) else {
+                break;
+            };
+            leaving.note(&next);
+            if joined.emit(&next).is_err() {
+                leaving.counters.add(Counter::CannotSend);
+                break;
+            }
+            segment = Some(length);
+            if next.payload.len() < like.1 {
+                break;
+            }
+        }
+        Some((joined.finish(), segment))
+    }
+}
+
+/// Octets that leave together. One message alone stays where it is.
+struct Joined<'a> {
+    first: Bytes,
+    /// All of them, once there is more than the first.
+    buffer: &'a mut BytesMut,
+}
+
+impl<'a> Joined<'a> {
+    fn new(first: Bytes, buffer: &'a mut BytesMut) -> Self {
+        Self { first, buffer }
+    }
+
+    fn len(&self) -> usize {
+        self.buffer.len().max(self.first.len())
+    }
+
+    fn begin(&mut self) {
+        if self.buffer.is_empty() {
+            self.buffer.put_slice(&self.first);
+        }
+    }
+
+    fn push(&mut self, octets: &[u8]) {
+        self.begin();
+        self.buffer.put_slice(octets);
+    }
+
+    fn emit(&mut self, frame: &Frame) -> Result<(), EncodeError> {
+        self.begin();
+        judp::emit(frame, self.buffer)
+    }
+
+    /// Puts messages that wait, the most urgent first, into the datagram that begins at `start`, up
+    /// to `longest` octets.
+    fn pack(&mut self, start: usize, queues: &mut [VecDeque<Bytes>], longest: usize) {
+        let datagram = if start == 0 {
+            &self.first[..]
+        } else {
+            &self.buffer[start..]
+        };
+        if !may_pack(datagram, longest) {
+            return;
+        }
+        // A message without its version octet.
+        let room = |joined: &Self| 1 + longest - (joined.len() - start);
+        for queue in queues.iter_mut().rev() {
+            while let Some(next) = pop_if(queue, |it| is_todays(it) && it.len() <= room(self)) {
+                self.push(next.get(1..).unwrap_or_default());
+            }
+        }
+    }
+
+    fn finish(self) -> Bytes {
+        if self.buffer.is_empty() {
+            self.first
+        } else {
+            self.buffer.split().freeze()
+        }
+    }
+}
+
+fn pop_if(queue: &mut VecDeque<Bytes>, is_wanted: impl FnOnce(&Bytes) -> bool) -> Option<Bytes> {
+    if queue.front().is_some_and(is_wanted) {
+        queue.pop_front()
+    } else {
+        None
+    }
+}
+
+/// Whether another message fits behind a datagram with today's header.
+pub(super) fn may_pack(datagram: &[u8], longest: usize) -> bool {
+    is_todays(datagram) && datagram.len() + as5669a::MIN_LEN <= longest
+}
+
+/// Whether it is a datagram with today's header.
+fn is_todays(datagram: &[u8]) -> bool {
+    datagram.first() == Some(&judp::VERSION_AS5669A)
+}

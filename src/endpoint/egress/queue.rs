@@ -1,0 +1,157 @@
+//! What waits to be sent to one other end of a link.
+
+use std::collections::VecDeque;
+use std::time::Instant;
+
+use bytes::Bytes;
+
+use super::FragmentedSend;
+use crate::endpoint::rate::Bucket;
+use crate::wire::{Frame, Priority, Version};
+
+const PRIORITIES: usize = Priority::ALL.len();
+
+/// What is sent in one turn: fragments of a priority, or whole messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::endpoint) struct Level(usize);
+
+impl Level {
+    pub(super) const COUNT: usize = 2 * PRIORITIES;
+
+    pub(in crate::endpoint) const fn fragments(priority: Priority) -> Self {
+        Self(priority.bits() as usize)
+    }
+
+    pub(in crate::endpoint) const fn whole(priority: Priority) -> Self {
+        Self(PRIORITIES + priority.bits() as usize)
+    }
+
+    fn all() -> impl Iterator<Item = Self> {
+        (0..Self::COUNT).map(Self)
+    }
+
+    pub(super) const fn index(self) -> usize {
+        self.0
+    }
+
+    pub(super) const fn is_fragments(self) -> bool {
+        self.0 < PRIORITIES
+    }
+
+    pub(super) const fn priority(self) -> Priority {
+        Priority::ALL[self.0 % PRIORITIES]
+    }
+}
+
+/// What waits to be sent to one other end of a link, by priority.
+#[derive(Debug, Default)]
+pub(super) struct HopQueue {
+    pub(super) whole: [VecDeque<Bytes>; PRIORITIES],
+    fragmented: [VecDeque<FragmentedSend>; PRIORITIES],
+    /// By level, whether it stands in the list of those that have something to send.
+    listed: [bool; Level::COUNT],
+    /// Until when messages wait for others to share a datagram.
+    held_until: Option<Instant>,
+    /// How much of the receive buffer at the other end its fragments fill.
+    bucket: Bucket,
+    /// Until when there is no room for fragments.
+    blocked_until: Option<Instant>,
+}
+
+impl HopQueue {
+    /// Queues a datagram. If others may join it, it waits for them until `held_until`, or until what
+    /// waits already is due; else nothing waits any longer.
+    pub(super) fn push(&mut self, priority: Priority, octets: Bytes, held_until: Option<Instant>) {
+        self.whole[usize::from(priority.bits())].push_back(octets);
+        if priority != Priority::SafetyCritical {
+            self.held_until = held_until.map(|until| self.held_until.unwrap_or(until));
+        }
+    }
+
+    pub(super) fn push_fragmented(&mut self, message: FragmentedSend) {
+        let level = usize::from(message.priority().bits());
+        self.fragmented[level].push_back(message);
+    }
+
+    /// Whether something of a level can be sent, where datagrams are packed up to `longest` octets.
+    fn is_ready(&self, level: Level, longest: usize) -> bool {
+        let priority = usize::from(level.priority().bits());
+        if level.is_fragments() {
+            return self.blocked_until.is_none() && !self.fragmented[priority].is_empty();
+        }
+        let waiting = self.whole.iter().flatten();
+        let fills = || waiting.map(|message| message.len() - 1).sum::<usize>() >= longest;
+        !self.whole[priority].is_empty()
+            && (self.held_until.is_none()
+                || level.priority() == Priority::SafetyCritical
+                || fills())
+    }
+
+    /// The levels into whose lists it is to be put.
+    pub(super) fn list(&mut self, longest: usize) -> impl Iterator<Item = Level> + '_ {
+        Level::all().filter(move |level| {
+            let is_new = !self.listed[level.index()] && self.is_ready(*level, longest);
+            self.listed[level.index()] |= is_new;
+            is_new
+        })
+    }
+
+    /// It stands in the list of a level no more.
+    pub(super) fn take_turn(&mut self, level: Level) {
+        self.listed[level.index()] = false;
+    }
+
+    /// The next fragment, if there is room for it and it has no other header and no more octets than
+    /// those before it.
+    pub(super) fn next_fragment(
+        &mut self,
+        now: Instant,
+        level: Level,
+        like: Option<(Version, usize)>,
+    ) -> Option<Frame> {
+        let waiting = &mut self.fragmented[usize::from(level.priority().bits())];
+        let message = waiting.front_mut()?;
+        if self.blocked_until.is_some() || !like.is_none_or(|like| message.continues(like)) {
+            return None;
+        }
+        if let Some(pacing) = message.pacing
+            && let Err(wait) = pacing.take(&mut self.bucket, now, message.next_len())
+        {
+            self.blocked_until = Some(now + wait);
+            return None;
+        }
+        let frame = message.frame();
+        if message.advance() {
+            waiting.pop_front();
+        }
+        Some(frame)
+    }
+
+    /// When what is held, and fragments for which there is no room, may go on.
+    pub(super) fn deadlines(&self) -> impl Iterator<Item = Instant> {
+        [self.held_until, self.blocked_until].into_iter().flatten()
+    }
+
+    pub(super) fn handle_timeout(&mut self, now: Instant) {
+        self.held_until.take_if(|until| *until <= now);
+        self.blocked_until.take_if(|until| *until <= now);
+    }
+
+    /// How many datagrams wait, by priority, without fragments.
+    pub(super) fn waiting(&self) -> [usize; PRIORITIES] {
+        self.whole.each_ref().map(VecDeque::len)
+    }
+
+    /// How many fragments wait, and their octets.
+    pub(super) fn fragments(&self) -> (usize, usize) {
+        let messages = self.fragmented.iter().flatten();
+        messages.fold((0, 0), |(count, octets), message| {
+            (count + message.fragments(), octets + message.remaining())
+        })
+    }
+
+    /// Whether it is as good as none.
+    pub(super) fn is_idle(&self, now: Instant) -> bool {
+        self.waiting() == [0; PRIORITIES] && self.fragments().0 == 0 && self.bucket.is_full(now)
+    }
+}

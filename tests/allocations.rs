@@ -1,0 +1,98 @@
+//! A small message that wants no acknowledgement goes through an endpoint without an allocation once
+//! its tables have been filled.
+
+#![allow(clippy::expect_used, reason = "helpers of tests")]
+
+use std::alloc::System;
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::endpoint::{
+    Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path, Remote, StaticPeer,
+};
+use jaus::wire::{Frame, judp};
+use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
+
+#[global_allocator]
+static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+const US: JausId = JausId::new(101, 1, 1);
+const PEER: JausId = JausId::new(42, 1, 1);
+const MESSAGES: usize = 2000;
+
+/// An endpoint with a component, and a peer with a configured address.
+fn endpoint() -> (Endpoint, Path) {
+    let address = |host| SocketAddr::from(([10, 0, 0, host], judp::PORT));
+    let path = Path {
+        link: LinkId(0),
+        peer: Remote::Socket(address(2)),
+    };
+    let mut endpoint = Endpoint::new(Config {
+        static_peers: vec![StaticPeer {
+            id: PEER,
+            path,
+            gets_broadcasts: false,
+        }],
+        max_recent: 64,
+        ..Config::default()
+    });
+    endpoint.add_link(LinkId(0), LinkProfile::judp([address(1)]));
+    endpoint.attach(US).expect("an id of one component");
+    (endpoint, path)
+}
+
+/// How often `handle` allocates for the later half of the messages.
+fn allocations(mut handle: impl FnMut(usize)) -> usize {
+    (0..MESSAGES / 2).for_each(&mut handle);
+    let region = Region::new(ALLOCATOR);
+    (MESSAGES / 2..MESSAGES).for_each(&mut handle);
+    let change = region.change();
+    change.allocations + change.reallocations
+}
+
+/// The one test of this program: others would allocate at the same time.
+#[test]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "an arbitrary beginning of virtual time"
+)]
+fn a_small_message_is_received_and_sent_without_allocation() {
+    let start = Instant::now();
+    let at = |number: usize| start + Duration::from_millis(number as u64);
+    let payload = Bytes::from_static(&[0x02, 0x44, 1, 2, 3, 4, 5, 6, 7, 8]);
+
+    let (mut receiver, path) = endpoint();
+    let datagram = |sequence| {
+        let frame = Frame {
+            sequence,
+            ..Frame::new(PEER, US, payload.clone())
+        };
+        let octets = judp::encode(&frame).expect("a short frame");
+        // The first copy of what a vector held allocates its counter.
+        [octets.clone(), octets]
+    };
+    let mut datagrams = (1..=MESSAGES as u16).map(datagram).collect::<Vec<_>>();
+    let mut received = 0;
+    let on_receipt = allocations(|number| {
+        let [datagram, _] = std::mem::take(&mut datagrams[number]);
+        receiver.handle_datagram(at(number), path, datagram);
+        while let Some(event) = receiver.poll_event() {
+            received += usize::from(matches!(event, Event::Received(_)));
+        }
+    });
+    assert_eq!((received, on_receipt), (MESSAGES, 0));
+
+    let (mut sender, _) = endpoint();
+    let message = Outgoing::new(US, PEER, payload);
+    let mut sent = 0;
+    let on_sending = allocations(|number| {
+        let now = at(number);
+        sender.send(now, message.clone()).expect("a known peer");
+        while sender.poll_transmit(now).is_some() {
+            sent += 1;
+        }
+    });
+    assert_eq!((sent, on_sending), (MESSAGES, 0));
+}
