@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bytes::{Bytes, BytesMut};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path, StaticPeer};
+use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path, StaticPeer};
 use jaus::wire::{Flags, Frame, as5669a, judp, ra};
 
 const US: JausId = JausId::new(101, 1, 1);
@@ -100,7 +100,8 @@ fn endpoint(is_configured: bool) -> (Endpoint, Path, Instant) {
     let own = SocketAddr::from(([10, 0, 0, 1], judp::PORT));
     endpoint.add_link(LinkId(0), LinkProfile::judp([own]));
     endpoint.attach(US).expect("an id of one component");
-    endpoint.handle_datagram(now, peer, judp::encode(&frame(2)).expect("a datagram"));
+    let datagram = judp::encode(&frame(2)).expect("a datagram");
+    endpoint.handle_datagram(now, peer, datagram, &mut Vec::new());
     while endpoint.poll_event().is_some() {}
     (endpoint, peer, now)
 }
@@ -109,6 +110,7 @@ fn through_an_endpoint(c: &mut Criterion) {
     let mut group = c.benchmark_group("endpoint");
     for payload in [50, 1425] {
         let (mut receiver, path, mut now) = endpoint(false);
+        let mut received = Vec::with_capacity(1);
         let mut sequence = 0;
         group.bench_function(format!("receive/{payload}"), |b| {
             b.iter_batched(
@@ -122,11 +124,8 @@ fn through_an_endpoint(c: &mut Criterion) {
                 },
                 |datagram| {
                     now += Duration::from_micros(100);
-                    receiver.handle_datagram(now, path, datagram);
-                    let Some(Event::Received(message)) = receiver.poll_event() else {
-                        panic!("not delivered");
-                    };
-                    message
+                    receiver.handle_datagram(now, path, datagram, &mut received);
+                    received.pop().expect("a message that is delivered")
                 },
                 BatchSize::SmallInput,
             );
@@ -136,7 +135,9 @@ fn through_an_endpoint(c: &mut Criterion) {
         let message = Outgoing::new(US, PEER, Bytes::from(vec![0x44; payload]));
         group.bench_function(format!("send/{payload}"), |b| {
             b.iter(|| {
-                sender.send(now, message.clone()).expect("a known peer");
+                sender
+                    .send(now, message.clone(), &mut received)
+                    .expect("a known peer");
                 sender.poll_transmit(now).expect("a datagram")
             });
         });

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use Counter::{AcknowledgementsSent, MessagesDelivered, MessagesReceived};
 use bytes::Bytes;
 use jaus::endpoint::{
-    Config, Counter, Endpoint, Event, LinkId, LinkProfile, Path, Received, To, Transmit,
+    Config, Counter, Endpoint, LinkId, LinkProfile, Path, Received, To, Transmit,
 };
 use jaus::view::{Capture, Network};
 use jaus::wire::{Version, judp};
@@ -219,12 +219,7 @@ impl Replay {
             peer: datagram.source.into(),
         };
         self.endpoint
-            .handle_datagram(now, path, datagram.payload.clone());
-        while let Some(event) = self.endpoint.poll_event() {
-            if let Event::Received(received) = event {
-                self.received.push(received);
-            }
-        }
+            .handle_datagram(now, path, datagram.payload.clone(), &mut self.received);
         self.transmits
             .extend(std::iter::from_fn(|| self.endpoint.poll_transmit(now)));
     }

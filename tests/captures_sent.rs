@@ -27,7 +27,7 @@ use std::path::Path as FilePath;
 use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
-use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path, Rate};
+use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path, Rate, Received};
 use jaus::view::{Capture, Network};
 use jaus::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, judp};
 
@@ -63,6 +63,7 @@ fn recorded(file: &FilePath) -> Vec<Recorded> {
 struct Party {
     endpoint: Endpoint,
     now: Instant,
+    received: Vec<Received>,
     sent: Vec<Bytes>,
 }
 
@@ -94,6 +95,7 @@ impl Party {
         Self {
             endpoint,
             now: Instant::now(),
+            received: Vec::new(),
             sent: Vec::new(),
         }
     }
@@ -104,7 +106,8 @@ impl Party {
             peer: datagram.source.into(),
         };
         let octets = datagram.octets.clone();
-        self.endpoint.handle_datagram(self.now, path, octets);
+        self.endpoint
+            .handle_datagram(self.now, path, octets, &mut self.received);
         self.drain();
     }
 
@@ -121,13 +124,16 @@ impl Party {
             acknowledge: wanted && !unknown,
             ..Outgoing::new(frame.source, frame.destination, payload)
         };
-        self.endpoint.send(self.now, outgoing).unwrap();
+        self.endpoint
+            .send(self.now, outgoing, &mut self.received)
+            .unwrap();
         self.drain();
     }
 
     fn drain(&mut self) {
         while self.endpoint.poll_event().is_some() {}
-        while let Some(transmit) = self.endpoint.poll_transmit() {
+        self.received.clear();
+        while let Some(transmit) = self.endpoint.poll_transmit(self.now) {
             self.sent.push(transmit.payload);
         }
     }

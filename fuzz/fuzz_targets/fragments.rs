@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event, LinkId, LinkProfile, Path};
+use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Path, Received};
 use jaus::wire::{Acknowledgement, DataControl, Flags, Frame, judp};
 use libfuzzer_sys::fuzz_target;
 
@@ -37,6 +37,7 @@ struct Sent {
 /// The model beside the endpoint.
 struct World {
     endpoint: Endpoint,
+    received: Vec<Received>,
     config: Config,
     now: Instant,
     sent: Vec<Sent>,
@@ -82,6 +83,7 @@ impl World {
         endpoint.add_link(LinkId(0), LinkProfile::judp([]));
         Self {
             endpoint,
+            received: Vec::new(),
             config,
             now: *START,
             sent: Vec::new(),
@@ -174,16 +176,15 @@ impl World {
             peer: SocketAddr::from(([10, 0, 0, 1 + sender as u8], 3794)).into(),
         };
         let datagram = judp::encode(&frame).expect("a short frame");
-        self.endpoint.handle_datagram(self.now, path, datagram);
+        self.endpoint
+            .handle_datagram(self.now, path, datagram, &mut self.received);
         while self.endpoint.poll_transmit(self.now).is_some() {}
     }
 
     fn check(&mut self) {
         assert!(self.endpoint.unfinished() <= self.config.max_reassembly);
-        while let Some(event) = self.endpoint.poll_event() {
-            let Event::Received(received) = event else {
-                continue;
-            };
+        while self.endpoint.poll_event().is_some() {}
+        for received in self.received.drain(..) {
             let sender = usize::from(received.source.component() - 1);
             let whole =
                 |sent: &&mut Sent| sent.sender == sender && sent.content == received.payload;

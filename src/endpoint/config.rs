@@ -70,8 +70,8 @@ pub struct Config {
     /// pause between two tries or try in vain: they do not send again what was acknowledged, and
     /// would take a message for delivered of which the beginning was forgotten.
     pub reassembly_timeout: Duration,
-    /// The most entries of each queue (datagrams to send and messages to deliver, both per
-    /// priority; news). What comes when a queue is full is dropped and counted.
+    /// The most entries of each queue (datagrams to send, per priority; news). What comes when a
+    /// queue is full is dropped and counted.
     pub queue_limit: usize,
     /// How long the same message (source, destination, sequence number and content) is taken for a
     /// duplicate made by the network. Short, because a restarted peer may well begin with the same

@@ -96,14 +96,12 @@ counters! {
     /// Dropped: a part of a large message of which the rest did not come in time, or for which
     /// there is no room.
     FragmentsForgotten = "dropped: unfinished large message",
-    /// Dropped, or refused when a component sent it: a message, because too many wait to be delivered.
-    DeliveryQueueFull = "dropped: delivery queue full",
     /// Not sent: a fragment that its header cannot carry.
     CannotSend = "not sent: its header cannot carry it",
     /// Not sent: a datagram that waited for a link that was removed.
     LinkGone = "not sent: the link is gone",
     /// Dropped: a datagram to send, because too many wait to be sent.
     TransmitQueueFull = "dropped: transmit queue full",
-    /// Dropped: an event that is not a message, because too many wait.
+    /// Dropped: an event, because too many wait.
     NewsQueueFull = "dropped: event queue full",
 }

@@ -68,8 +68,6 @@ pub struct Received {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Event {
-    /// A message for a local component.
-    Received(Received),
     /// A peer was heard for the first time (or again, after it had been forgotten).
     PeerLearned {
         /// Who.

@@ -29,8 +29,6 @@ pub enum AttachError {
 #[derive(Debug)]
 pub(super) struct Components {
     ids: BTreeSet<JausId>,
-    /// Those that do not read what waits for them.
-    busy: BTreeSet<JausId>,
     limit: usize,
 }
 
@@ -38,7 +36,6 @@ impl Components {
     pub(super) fn new(limit: usize) -> Self {
         Self {
             ids: BTreeSet::new(),
-            busy: BTreeSet::new(),
             limit,
         }
     }
@@ -59,19 +56,6 @@ impl Components {
 
     pub(super) fn detach(&mut self, id: JausId) {
         self.ids.remove(&id);
-        self.busy.remove(&id);
-    }
-
-    pub(super) fn set_busy(&mut self, id: JausId, busy: bool) {
-        if !busy {
-            self.busy.remove(&id);
-        } else if self.contains(id) {
-            self.busy.insert(id);
-        }
-    }
-
-    pub(super) fn is_busy(&self, id: &JausId) -> bool {
-        self.busy.contains(id)
     }
 
     pub(super) fn contains(&self, id: JausId) -> bool {

@@ -1,11 +1,11 @@
 //! The protocol core of a node: who is here, who is where, what to send and what to deliver.
 //!
 //! An [`Endpoint`] does no I/O and reads no clock. Its owner says what happened
-//! ([`Endpoint::handle_datagram`], [`Endpoint::handle_datagram_to_all`] or, where a link has read
-//! the frames itself, [`Endpoint::handle_frame`]; [`Endpoint::handle_timeout`]), what is wanted
-//! ([`Endpoint::attach`], [`Endpoint::send`]), and then polls until there is no more:
-//! [`Endpoint::poll_transmit`] for datagrams to send, [`Endpoint::poll_event`] for messages to
-//! deliver and news, [`Endpoint::poll_timeout`] for when to call `handle_timeout`.
+//! ([`Endpoint::handle_datagram`] or, where a link has read the frames itself,
+//! [`Endpoint::handle_frame`]; [`Endpoint::handle_timeout`]), what is wanted ([`Endpoint::attach`],
+//! [`Endpoint::send`]), and who takes messages for local components (a [`Sink`]). Then it polls
+//! until there is no more: [`Endpoint::poll_transmit`] for datagrams to send,
+//! [`Endpoint::poll_event`] for news, [`Endpoint::poll_timeout`] for when to call `handle_timeout`.
 //!
 //! Received rubbish is never an error here: it is counted ([`Counters`]), traced and forgotten.
 //! Every table and queue has a bound in [`Config`]; what is dropped for a bound is counted too.
@@ -15,7 +15,7 @@
 //!
 //! use bytes::Bytes;
 //! use jaus::address::JausId;
-//! use jaus::endpoint::{Config, Endpoint, Event, Outgoing};
+//! use jaus::endpoint::{Config, Endpoint, Outgoing, Received};
 //!
 //! let (driver, sensor) = (JausId::new(101, 1, 33), JausId::new(101, 1, 41));
 //! let mut endpoint = Endpoint::new(Config::default());
@@ -24,9 +24,9 @@
 //! # #[expect(clippy::disallowed_methods, reason = "an example of an owner, who has the clock")]
 //! let now = Instant::now();
 //! let query_identification = Bytes::from_static(b"\x00\x2B\x02");
-//! endpoint.send(now, Outgoing::new(driver, sensor, query_identification))?;
-//! let Some(Event::Received(message)) = endpoint.poll_event() else { panic!("a local message") };
-//! assert_eq!((message.source, message.to), (driver, sensor));
+//! let mut received = Vec::<Received>::new();
+//! endpoint.send(now, Outgoing::new(driver, sensor, query_identification), &mut received)?;
+//! assert_eq!((received[0].source, received[0].to), (driver, sensor));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -38,16 +38,17 @@ mod delivery;
 mod egress;
 mod event;
 mod forward;
-mod inbox;
 mod large;
 mod link;
 mod local;
+mod news;
 mod occupancy;
 mod peers;
 mod rate;
 mod receive;
 mod recent;
 mod send;
+mod sink;
 #[cfg(test)]
 mod tests;
 mod verify;
@@ -73,15 +74,16 @@ pub(crate) use rate::Buckets;
 pub(crate) use rate::quota_address;
 pub use rate::{Rate, Rates};
 pub use send::SendError;
+pub use sink::{Ingress, Sink};
 
 use crate::address::JausId;
 use crate::wire::Priority;
 use acknowledge::Calls;
 use delivery::Deliveries;
 use egress::{Egress, Level};
-use inbox::Inbox;
 use large::{Numbers, Reassembly};
 use local::Components;
+use news::News;
 use peers::{CHALLENGE_FLAGS, Peers};
 use rate::{Bucket, Gate};
 use recent::Recent;
@@ -108,7 +110,7 @@ pub struct Endpoint {
     deliveries: Deliveries,
     conflicts: BTreeMap<JausId, Instant>,
     egress: Egress,
-    inbox: Inbox,
+    news: News,
     counters: Counters,
 }
 
@@ -136,7 +138,7 @@ impl Endpoint {
             deliveries: Deliveries::new(&config),
             conflicts: BTreeMap::new(),
             egress: Egress::new(&config, keys),
-            inbox: Inbox::new(config.queue_limit),
+            news: News::new(config.queue_limit),
             counters: Counters::default(),
             config,
         }
@@ -160,13 +162,6 @@ impl Endpoint {
         let given_up = self.deliveries.forget_source(id);
         self.counters.add_many(Counter::MessagesGivenUp, given_up);
         self.conflicts.remove(&id);
-    }
-
-    /// Says that a local component has no room for more, or has it again. Messages for it that want
-    /// an acknowledgement are left alone meanwhile, not even acknowledged, so that their senders
-    /// try again; the others are delivered, for the owner to drop.
-    pub fn set_busy(&mut self, id: JausId, busy: bool) {
-        self.components.set_busy(id, busy);
     }
 
     /// The attached components, in order of their ids.
@@ -241,9 +236,9 @@ impl Endpoint {
         self.egress.dequeue(now, level, &mut self.counters)
     }
 
-    /// The next event: news first, then received messages, the most urgent first.
+    /// The next of the news.
     pub fn poll_event(&mut self) -> Option<Event> {
-        self.inbox.pop()
+        self.news.pop()
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout), if ever.
@@ -268,7 +263,7 @@ impl Endpoint {
 
     /// Queues news; a full queue is counted.
     fn announce(&mut self, event: Event) {
-        if !self.inbox.push_news(event) {
+        if !self.news.push(event) {
             self.counters.add(Counter::NewsQueueFull);
         }
     }

@@ -9,7 +9,7 @@ use tracing::{debug, trace, warn};
 use super::peers::is_challenge;
 use super::recent::{Class, Fingerprint};
 use super::verify::Warning;
-use super::{Counter, Endpoint, Event, Path, Received};
+use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
 use crate::peer;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Framing, Version, judp};
@@ -40,22 +40,18 @@ enum Novelty {
 }
 
 impl Endpoint {
-    /// Takes a datagram that came from `from`.
+    /// Takes a datagram, and hands the messages in it for local components to `sink`.
     ///
-    /// Nothing in it is an error: what cannot be used is counted and traced. Messages, answers and
-    /// news come out of [`poll_event`](Self::poll_event) and
-    /// [`poll_transmit`](Self::poll_transmit).
-    pub fn handle_datagram(&mut self, now: Instant, from: Path, data: Bytes) {
-        self.receive_datagram(now, from, data, false);
-    }
-
-    /// The same for a datagram that went to everybody: to the link's group, or to what it has
-    /// instead.
-    pub fn handle_datagram_to_all(&mut self, now: Instant, from: Path, data: Bytes) {
-        self.receive_datagram(now, from, data, true);
-    }
-
-    fn receive_datagram(&mut self, now: Instant, from: Path, data: Bytes, to_all: bool) {
+    /// Nothing in it is an error: what cannot be used is counted and traced. Answers and news come
+    /// out of [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event).
+    pub fn handle_datagram(
+        &mut self,
+        now: Instant,
+        from: impl Into<Ingress>,
+        data: Bytes,
+        sink: &mut dyn Sink,
+    ) {
+        let Ingress { path: from, to_all } = from.into();
         self.counters.add(Counter::DatagramsReceived);
         if let Err(reason) = self.check_path(from) {
             return self.counters.add(reason);
@@ -77,7 +73,7 @@ impl Endpoint {
         for frame in &mut frames {
             match frame {
                 Ok(frame) => {
-                    self.receive(arrival, &frame);
+                    self.receive(arrival, &frame, sink);
                     latest = Some(frame.source);
                 }
                 Err(error) => {
@@ -99,7 +95,7 @@ impl Endpoint {
 
     /// Takes a frame that came from `from`, from a link that reads frames itself. Nothing in it is
     /// an error, as with [`handle_datagram`](Self::handle_datagram).
-    pub fn handle_frame(&mut self, now: Instant, from: Path, frame: &Frame) {
+    pub fn handle_frame(&mut self, now: Instant, from: Path, frame: &Frame, sink: &mut dyn Sink) {
         if let Err(reason) = self.check_path(from) {
             self.counters.add(Counter::MessagesReceived);
             return self.counters.add(reason);
@@ -110,7 +106,7 @@ impl Endpoint {
             to_all: false,
             held: usize::MAX,
         };
-        self.receive(arrival, frame);
+        self.receive(arrival, frame, sink);
     }
 
     /// Takes note that a version octet stands before the next frame of `source` in the middle of a
@@ -134,12 +130,12 @@ impl Endpoint {
         Ok(())
     }
 
-    fn receive(&mut self, arrival: Arrival, frame: &Frame) {
+    fn receive(&mut self, arrival: Arrival, frame: &Frame, sink: &mut dyn Sink) {
         self.counters.add(Counter::MessagesReceived);
         let (source, destination) = (frame.source, frame.destination);
         let accepted = match self.with_wildcards_for_zeros(frame) {
-            Some(meant) => self.accept(arrival, &meant),
-            None => self.accept(arrival, frame),
+            Some(meant) => self.accept(arrival, &meant, sink),
+            None => self.accept(arrival, frame, sink),
         };
         if let Err(reason) = accepted {
             trace!(%source, %destination, peer = %arrival.path.peer, %reason);
@@ -158,7 +154,12 @@ impl Endpoint {
     }
 
     /// Does all that a message causes, or tells why it is dropped.
-    fn accept(&mut self, arrival: Arrival, frame: &Frame) -> Result<(), Counter> {
+    fn accept(
+        &mut self,
+        arrival: Arrival,
+        frame: &Frame,
+        sink: &mut dyn Sink,
+    ) -> Result<(), Counter> {
         let Arrival { now, path, .. } = arrival;
         let broadcast = check_header(frame).inspect_err(|reason| {
             if *reason == Counter::PriorityFault {
@@ -192,7 +193,7 @@ impl Endpoint {
                 }
                 Acknowledgement::Request => {
                     let may_be_refused = frame.destination.is_unicast() && !is_challenge(frame);
-                    if may_be_refused && !self.has_room_for(frame) {
+                    if may_be_refused && !sink.has_room(frame.destination, frame.flags.priority()) {
                         return Err(Counter::ReceiverBusy);
                     }
                     self.acknowledge(now, path, frame);
@@ -228,7 +229,7 @@ impl Endpoint {
         if !is_for_us || is_challenge(frame) {
             return Ok(());
         }
-        self.put_together(arrival, frame, broadcast)
+        self.put_together(arrival, frame, broadcast, sink)
     }
 
     /// Takes an acknowledgement. One that nobody waits for teaches nothing and moves nobody, and
@@ -275,11 +276,12 @@ impl Endpoint {
         arrival: Arrival,
         frame: &Frame,
         broadcast: Broadcast,
+        sink: &mut dyn Sink,
     ) -> Result<(), Counter> {
         let from = arrival.path;
         let payload = match frame.flags.data() {
             DataControl::Single => {
-                self.finish_large(from, frame);
+                self.finish_large(from, frame, sink);
                 frame.payload.clone()
             }
             _ => {
@@ -293,12 +295,12 @@ impl Endpoint {
                 whole.payload
             }
         };
-        self.deliver(from, frame, broadcast, &payload);
+        self.deliver(from, frame, broadcast, &payload, sink);
         Ok(())
     }
 
     /// Delivers a large message whose end only the next message of its sender shows.
-    fn finish_large(&mut self, from: Path, next: &Frame) {
+    fn finish_large(&mut self, from: Path, next: &Frame, sink: &mut dyn Sink) {
         let finished = self.reassembly.finish(next.source, next.sequence);
         let Some((destination, priority, whole)) = finished else {
             return;
@@ -309,7 +311,7 @@ impl Endpoint {
             flags: Flags::new(priority),
             ..Frame::new(next.source, destination, Bytes::new())
         };
-        self.deliver(from, &large, Broadcast::None, &whole.payload);
+        self.deliver(from, &large, Broadcast::None, &whole.payload, sink);
     }
 
     /// Whether one more message may come from there, and from somebody who was not known.
@@ -320,13 +322,6 @@ impl Endpoint {
         } else {
             self.gate.admit_new_id(now, from)
         }
-    }
-
-    /// Whether a message to one component can be handed to it, and need not be dropped after it was
-    /// acknowledged.
-    fn has_room_for(&self, frame: &Frame) -> bool {
-        !self.components.is_busy(&frame.destination)
-            && self.inbox.has_room(frame.flags.priority(), 1)
     }
 
     /// Checks whether a message is for local components.
@@ -457,8 +452,15 @@ impl Endpoint {
         self.peers.profile(source).repeats_soon()
     }
 
-    /// Queues a whole message for its receivers.
-    fn deliver(&mut self, from: Path, frame: &Frame, broadcast: Broadcast, payload: &Bytes) {
+    /// Hands a whole message to its receivers.
+    fn deliver(
+        &mut self,
+        from: Path,
+        frame: &Frame,
+        broadcast: Broadcast,
+        payload: &Bytes,
+        sink: &mut dyn Sink,
+    ) {
         let whole = Received {
             source: frame.source,
             destination: frame.destination,
@@ -468,11 +470,16 @@ impl Endpoint {
             path: Some(from),
             to: frame.destination,
         };
-        self.deliver_to_all(&whole, None);
+        self.deliver_to_all(&whole, None, sink);
     }
 
-    /// Queues a message for each component that it reaches, but for one; a full queue is counted.
-    pub(super) fn deliver_to_all(&mut self, message: &Received, but: Option<JausId>) {
+    /// Hands a message to each component that it reaches, but for one.
+    pub(super) fn deliver_to_all(
+        &mut self,
+        message: &Received,
+        but: Option<JausId>,
+        sink: &mut dyn Sink,
+    ) {
         let Received {
             source,
             destination,
@@ -486,11 +493,8 @@ impl Endpoint {
                 to,
                 ..message.clone()
             };
-            self.counters.add(if self.inbox.push(message) {
-                Counter::MessagesDelivered
-            } else {
-                Counter::DeliveryQueueFull
-            });
+            sink.deliver(message);
+            self.counters.add(Counter::MessagesDelivered);
         }
     }
 }

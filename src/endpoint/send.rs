@@ -6,7 +6,7 @@ use tracing::trace;
 
 use super::egress::{FragmentedSend, Hop, Pacing};
 use super::large::{Cut, Cutting};
-use super::{Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, To};
+use super::{Counter, Endpoint, Event, LinkId, MessageHandle, Outgoing, Path, Received, Sink, To};
 use crate::address::JausId;
 use crate::wire::{
     Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version, as5669a,
@@ -69,7 +69,11 @@ pub enum SendError {
         /// [`Config::max_paced`](super::Config::max_paced).
         limit: usize,
     },
-    /// Too many datagrams or messages wait to be sent or delivered.
+    /// The receiver is a component of this node that does not read what waits for it, and what was
+    /// acknowledged shall not be dropped.
+    #[error("{0} does not read fast enough: its mailbox is full")]
+    ReceiverFull(JausId),
+    /// Too many datagrams wait to be sent.
     #[error("{limit} messages of this priority wait already")]
     QueueFull {
         /// [`Config::queue_limit`](super::Config::queue_limit).
@@ -84,7 +88,8 @@ pub enum SendError {
 }
 
 impl Endpoint {
-    /// Sends a message from a local component: to siblings at once, to others through the links.
+    /// Sends a message from a local component: to siblings through `sink` at once, to others through
+    /// the links.
     ///
     /// A message to one component goes to its address if that is known; else to the group of every
     /// link, as a global broadcast that wants an acknowledgement, because the answer teaches the
@@ -94,24 +99,22 @@ impl Endpoint {
     /// # Errors
     /// A [`SendError`] tells what is wrong; then nothing was sent. That a message was sent does not
     /// mean that it arrives; ask for an acknowledgement to be told.
-    pub fn send(&mut self, now: Instant, message: Outgoing) -> Result<MessageHandle, SendError> {
+    pub fn send(
+        &mut self,
+        now: Instant,
+        message: Outgoing,
+        sink: &mut dyn Sink,
+    ) -> Result<MessageHandle, SendError> {
         let scope = self.check(&message)?;
         let handle = self.deliveries.next_handle();
         let (destination, length) = (message.destination, message.payload.len());
         if self.components.contains(message.destination) {
-            self.send_to_sibling(handle, message)?;
+            self.send_to_sibling(handle, message, sink)?;
         } else {
-            let siblings = self
-                .components
-                .receivers(message.source, destination, scope);
-            if !self.inbox.has_room(message.priority, siblings.count()) {
-                self.counters.add(Counter::DeliveryQueueFull);
-                let limit = self.config.queue_limit;
-                return Err(SendError::QueueFull { limit });
-            }
             self.send_away(now, handle, &message, scope)?;
             let source = message.source;
-            self.deliver_to_all(&received_locally(message, scope, destination), Some(source));
+            let message = received_locally(message, scope, destination);
+            self.deliver_to_all(&message, Some(source), sink);
         }
         self.counters.add(Counter::MessagesSent);
         self.peers.note_sent(destination, length);
@@ -149,20 +152,20 @@ impl Endpoint {
         &mut self,
         handle: MessageHandle,
         message: Outgoing,
+        sink: &mut dyn Sink,
     ) -> Result<(), SendError> {
         let (acknowledge, scope, by) =
             (message.acknowledge, message.broadcast, message.destination);
         if acknowledge {
-            self.deliveries.check_room(self.inbox.results(), 0)?;
+            self.deliveries.check_room(self.news.results(), 0)?;
+            if !sink.has_room(by, message.priority) {
+                return Err(SendError::ReceiverFull(by));
+            }
         }
-        if !self.inbox.push(received_locally(message, scope, by)) {
-            self.counters.add(Counter::DeliveryQueueFull);
-            let limit = self.config.queue_limit;
-            return Err(SendError::QueueFull { limit });
-        }
+        sink.deliver(received_locally(message, scope, by));
         self.counters.add(Counter::MessagesDelivered);
         if acknowledge {
-            self.inbox.push_result(Event::Acknowledged {
+            self.news.push_result(Event::Acknowledged {
                 message: handle,
                 by,
             });

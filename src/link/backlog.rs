@@ -53,11 +53,6 @@ impl<T> Backlog<T> {
         self.items + items <= self.bounds.items && self.octets <= self.bounds.octets / 2
     }
 
-    /// Whether no more than half of what may wait does.
-    pub(crate) const fn is_half_empty(&self) -> bool {
-        self.has_room(self.bounds.items / 2)
-    }
-
     /// Takes an item in; returns how many items went for it.
     #[must_use]
     pub(crate) fn push(&mut self, priority: Priority, octets: usize, item: T) -> u64 {

@@ -5,7 +5,7 @@
 //! queued in between. Receiving and waiting is the [driver](super::driver)'s.
 
 use std::any::Any;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
@@ -23,7 +23,7 @@ use super::resident::Residents;
 use super::tap::Taps;
 use crate::address::JausId;
 use crate::endpoint::{
-    self, AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, first_sequence_at,
+    self, AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, Sink, first_sequence_at,
 };
 use crate::link::local::Process;
 use crate::link::udp::UdpLink;
@@ -101,6 +101,27 @@ fn first_sequence() -> u16 {
     first_sequence_at(since_1970.unwrap_or_default())
 }
 
+/// The components' mailboxes, with those who look on.
+pub(super) struct Receivers<'a> {
+    mailboxes: &'a BTreeMap<JausId, Arc<Mailbox>>,
+    pub(super) taps: &'a mut Taps,
+}
+
+impl Sink for Receivers<'_> {
+    fn has_room(&self, to: JausId, _priority: Priority) -> bool {
+        self.mailboxes
+            .get(&to)
+            .is_none_or(|mailbox| !mailbox.is_full())
+    }
+
+    fn deliver(&mut self, message: Received) {
+        self.taps.message(&message);
+        if let Some(mailbox) = self.mailboxes.get(&message.to) {
+            mailbox.push(message);
+        }
+    }
+}
+
 #[derive(Debug)]
 pub(super) struct Core {
     pub(super) endpoint: Endpoint,
@@ -113,8 +134,6 @@ pub(super) struct Core {
     events: Option<broadcast::Sender<Event>>,
     slab: Slab,
     pub(super) taps: Taps,
-    /// Components that do not read in time: nothing is acknowledged in their name until they do.
-    busy: BTreeSet<JausId>,
     /// Messages sent since the last [`pump`](Self::pump).
     gathered: usize,
     driver: Option<Waker>,
@@ -134,7 +153,6 @@ impl Core {
             events: Some(broadcast::Sender::new(EVENTS)),
             slab: Slab::new(),
             taps: Taps::default(),
-            busy: BTreeSet::new(),
             gathered: 0,
             driver: None,
             stop_at: None,
@@ -220,19 +238,14 @@ impl Core {
         message: Outgoing,
         waiter: Option<Waiter>,
     ) -> Result<MessageHandle, SendError> {
-        let full = |mailbox: &Arc<Mailbox>| mailbox.is_full();
-        if message.acknowledge && self.mailboxes.get(&message.destination).is_some_and(full) {
-            // What was acknowledged shall not be dropped at once.
-            return Err(SendError::ReceiverFull(message.destination));
-        }
         let (source, deadline) = (message.source, self.deadline());
         let urgent = message.priority > Priority::Standard;
         let now = now();
-        let mut result = self.endpoint.send(now, message.clone());
+        let mut result = self.hand_in(now, message.clone());
         if let Err(endpoint::SendError::QueueFull { .. }) = result {
             // What was gathered so far may be all that is in the way.
             self.pump(now);
-            result = self.endpoint.send(now, message);
+            result = self.hand_in(now, message);
         }
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
             self.awaiting.insert(*handle, source, waiter);
@@ -248,6 +261,16 @@ impl Core {
             self.wake_driver();
         }
         Ok(result?)
+    }
+
+    fn hand_in(
+        &mut self,
+        now: Instant,
+        message: Outgoing,
+    ) -> Result<MessageHandle, endpoint::SendError> {
+        let (mailboxes, taps) = (&self.mailboxes, &mut self.taps);
+        let mut receivers = Receivers { mailboxes, taps };
+        self.endpoint.send(now, message, &mut receivers)
     }
 
     /// Begins to shut down; the driver finishes.
@@ -312,67 +335,34 @@ impl Core {
                 .iter_mut()
                 .for_each(|(_, link)| link.send_waiting());
         }
-        self.deliver_all();
+        self.announce();
         transmitted
     }
 
-    /// Hands on messages to mailboxes, and news to those who wait for them.
-    fn deliver_all(&mut self) {
+    /// Hands on news to those who wait for them.
+    fn announce(&mut self) {
         while let Some(event) = self.endpoint.poll_event() {
-            match event {
-                Event::Received(message) => {
-                    self.taps.message(&message);
-                    self.deliver(message);
-                }
-                news => {
-                    self.awaiting.handle_event(&news);
-                    self.announce(news);
-                }
+            self.awaiting.handle_event(&event);
+            if let Some(events) = &self.events {
+                // Nobody listening is no error.
+                let _ = events.send(event);
             }
-        }
-    }
-
-    fn deliver(&mut self, message: Received) {
-        let to = message.to;
-        let Some(mailbox) = self.mailboxes.get(&to) else {
-            return;
-        };
-        if !mailbox.push(message) && self.busy.insert(to) {
-            self.endpoint.set_busy(to, true);
-        }
-    }
-
-    /// Finds out who has read what waited for it.
-    fn look_after_the_busy(&mut self) {
-        let (endpoint, mailboxes) = (&mut self.endpoint, &self.mailboxes);
-        self.busy.retain(|&id| {
-            let busy = mailboxes.get(&id).is_some_and(|m| !m.is_half_empty());
-            if !busy {
-                endpoint.set_busy(id, false);
-            }
-            busy
-        });
-    }
-
-    fn announce(&self, news: Event) {
-        if let Some(events) = &self.events {
-            // Nobody listening is no error.
-            let _ = events.send(news);
         }
     }
 
     /// Takes in what has arrived; whether a link had more than its share.
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
-        self.look_after_the_busy();
         let mut more = false;
         let links: Vec<_> = self.links.iter().map(|(id, _)| id).collect();
         for id in links {
             if let Some(link) = self.links.get_mut(id) {
-                let into = (&mut self.endpoint, &mut self.taps);
+                let (mailboxes, taps) = (&self.mailboxes, &mut self.taps);
+                let mut receivers = Receivers { mailboxes, taps };
+                let into = (&mut self.endpoint, &mut receivers);
                 more |= link.receive(cx, now, id, &mut self.slab, into);
             }
             // Before the next: all of them together may bring more than waits at a time.
-            self.deliver_all();
+            self.announce();
         }
         more
     }

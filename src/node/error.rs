@@ -59,10 +59,6 @@ pub enum SendError {
          node is back"
     )]
     NotConnected(JausId),
-    /// The message is to be acknowledged, and the receiver, a component of this host, has no room
-    /// for it.
-    #[error("{0} does not read fast enough: its mailbox is full")]
-    ReceiverFull(JausId),
     /// The host's node takes messages more slowly than the component sends them.
     #[error("{octets} octets wait for the node of this host already: send more slowly")]
     Busy {

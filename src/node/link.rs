@@ -4,8 +4,8 @@ use std::net::SocketAddr;
 use std::task::{Context, Poll};
 use std::time::Instant;
 
-use super::tap::Taps;
-use crate::endpoint::{Endpoint, LinkId, LinkProfile, Path, Remote, Transmit};
+use super::core::Receivers;
+use crate::endpoint::{Endpoint, Ingress, LinkId, LinkProfile, Path, Remote, Transmit};
 use crate::link::Slab;
 #[cfg(feature = "serial")]
 use crate::link::serial::{self, SerialLink};
@@ -138,7 +138,7 @@ impl Link {
         now: Instant,
         id: LinkId,
         slab: &mut Slab,
-        (endpoint, taps): (&mut Endpoint, &mut Taps),
+        (endpoint, receivers): (&mut Endpoint, &mut Receivers<'_>),
     ) -> bool {
         let from = |peer| Path { link: id, peer };
         match self {
@@ -148,12 +148,9 @@ impl Link {
                         return false;
                     };
                     let path = from(Remote::Socket(peer));
-                    taps.datagram(path, &datagram);
-                    if link.went_to_all() {
-                        endpoint.handle_datagram_to_all(now, path, datagram);
-                    } else {
-                        endpoint.handle_datagram(now, path, datagram);
-                    }
+                    receivers.taps.datagram(path, &datagram);
+                    let to_all = link.went_to_all();
+                    endpoint.handle_datagram(now, Ingress { path, to_all }, datagram, receivers);
                 }
                 true
             }
@@ -164,20 +161,20 @@ impl Link {
                     version_again,
                 } => {
                     let path = from(Remote::Socket(remote));
-                    taps.frame(path, &frame);
+                    receivers.taps.frame(path, &frame);
                     // First, for it decides where this one is answered.
                     if version_again {
                         endpoint.handle_repeated_version(frame.source);
                     }
-                    endpoint.handle_frame(now, path, &frame);
+                    endpoint.handle_frame(now, path, &frame, receivers);
                 }
                 Arrival::Closed(peer, _) => endpoint.forget_path(from(Remote::Socket(peer))),
             }),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.receive(cx, now, |arrival| match arrival {
                 serial::Arrival::Frame(frame) => {
-                    taps.frame(from(Remote::Line), &frame);
-                    endpoint.handle_frame(now, from(Remote::Line), &frame);
+                    receivers.taps.frame(from(Remote::Line), &frame);
+                    endpoint.handle_frame(now, from(Remote::Line), &frame, receivers);
                 }
                 serial::Arrival::Lost => endpoint.forget_path(from(Remote::Line)),
             }),

@@ -84,20 +84,14 @@ impl Mailbox {
         }
     }
 
-    /// Puts a message in. Says whether there is room for half as much as can wait.
-    pub(super) fn push(&self, message: Received) -> bool {
+    /// Puts a message in.
+    pub(super) fn push(&self, message: Received) {
         let mut inner = self.lock();
         inner.delivered += 1;
         inner.dropped += inner
             .messages
             .push(message.priority, message.payload.len(), message);
         inner.wake();
-        inner.messages.is_half_empty()
-    }
-
-    /// Whether there is room for half as much as can wait.
-    pub(super) fn is_half_empty(&self) -> bool {
-        self.lock().messages.is_half_empty()
     }
 
     /// The most urgent message, the oldest of these; `None` when the mailbox is closed and empty.

@@ -361,7 +361,7 @@ pub struct Events {
 }
 
 impl Events {
-    /// Waits for the next event, which is never [`Event::Received`]; `None` when the node is gone.
+    /// Waits for the next event; `None` when the node is gone.
     pub async fn recv(&mut self) -> Option<Event> {
         loop {
             match self.receiver.recv().await {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message;
-use jaus::endpoint::{Config, Endpoint, Event, LinkId, LinkProfile, Outgoing, Path, Received, To};
+use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path, Received, To};
 use jaus::service::{
     Change, Discovery, Kind, Liveness, Profile, Scope, Service, Stack, Timing, Transport,
 };
@@ -31,6 +31,7 @@ struct Node {
     address: SocketAddr,
     id: JausId,
     endpoint: Endpoint,
+    inbox: Vec<Received>,
     stack: Option<Stack>,
     up: bool,
     datagrams: u64,
@@ -95,6 +96,7 @@ impl World {
             address,
             id,
             endpoint,
+            inbox: Vec::new(),
             stack,
             up: true,
             datagrams: 0,
@@ -152,7 +154,11 @@ impl World {
     pub(crate) fn say_octets(&mut self, place: Place, to: JausId, payload: Bytes) {
         let node = &mut self.nodes[place.0];
         node.endpoint
-            .send(self.now, Outgoing::new(node.id, to, payload))
+            .send(
+                self.now,
+                Outgoing::new(node.id, to, payload),
+                &mut node.inbox,
+            )
             .unwrap();
     }
 
@@ -205,8 +211,12 @@ impl World {
             let flight = entry.remove();
             let receiver = self.nodes.iter_mut().find(|node| node.address == flight.to);
             if let Some(node) = receiver.filter(|node| node.up) {
-                node.endpoint
-                    .handle_datagram(self.now, flight.from, flight.payload);
+                node.endpoint.handle_datagram(
+                    self.now,
+                    flight.from,
+                    flight.payload,
+                    &mut node.inbox,
+                );
             }
         }
     }
@@ -235,10 +245,8 @@ impl World {
             return;
         }
         loop {
-            while let Some(event) = node.endpoint.poll_event() {
-                let Event::Received(message) = event else {
-                    continue;
-                };
+            while node.endpoint.poll_event().is_some() {}
+            for message in std::mem::take(&mut node.inbox) {
                 match &mut node.stack {
                     Some(stack) => stack.handle_message(now, &message),
                     None => node.received.push(message),
@@ -253,7 +261,7 @@ impl World {
             let Some(message) = stack.poll_transmit() else {
                 break;
             };
-            node.endpoint.send(now, message).unwrap();
+            node.endpoint.send(now, message, &mut node.inbox).unwrap();
         }
         let mut departures = Vec::new();
         while let Some(transmit) = node.endpoint.poll_transmit(now) {

@@ -220,7 +220,7 @@ async fn what_is_to_be_acknowledged_is_refused_where_there_is_no_room_for_it() {
         within(here.deliver(message(&here, there.id(), b"x"))).await,
         Ok(())
     );
-    let refused = SendError::ReceiverFull(full.id());
+    let refused = SendError::Endpoint(jaus::endpoint::SendError::ReceiverFull(full.id()));
     let words = refused.to_string();
     let outcome = within(here.deliver(message(&here, full.id(), b"x"))).await;
     assert_eq!(outcome, Err(Undelivered::NotSent(refused)));

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{Endpoint, Event as EndpointEvent, MessageHandle, Outgoing};
+use jaus::endpoint::{Event as News, MessageHandle, Outgoing};
 use jaus::messages::core::Resume;
 use jaus::service::{
     ControlId, ControlNews, Discovery, Event, Kind, Liveness, Patience, Profile, Scope, Stack,
@@ -15,7 +15,7 @@ use jaus::service::{
 
 use crate::cell::Driver;
 use crate::commands;
-use crate::sim::WallClock;
+use crate::sim::{Event as EndpointEvent, OwnedEndpoint, WallClock};
 use crate::vehicle::VEHICLE;
 
 /// A controller, or a program that wants to become one.
@@ -118,18 +118,20 @@ impl Client {
     pub(crate) fn handle_event(
         &mut self,
         now: Instant,
-        endpoint: &mut Endpoint,
+        endpoint: &mut OwnedEndpoint,
         event: EndpointEvent,
     ) {
         match event {
             EndpointEvent::Received(message) => self.stack.handle_message(now, &message),
-            EndpointEvent::Acknowledged { message, .. } if self.unacknowledged == Some(message) => {
+            EndpointEvent::News(News::Acknowledged { message, .. })
+                if self.unacknowledged == Some(message) =>
+            {
                 self.unacknowledged = None;
                 self.queue.pop_front();
                 self.is_driving = self.queue.is_empty();
                 self.next = now;
             }
-            EndpointEvent::NotAcknowledged { message, .. }
+            EndpointEvent::News(News::NotAcknowledged { message, .. })
                 if self.unacknowledged == Some(message) =>
             {
                 self.unacknowledged = None;
@@ -139,7 +141,7 @@ impl Client {
         self.settle(now, endpoint);
     }
 
-    pub(crate) fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    pub(crate) fn handle_timeout(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         self.stack.handle_timeout(now);
         self.settle(now, endpoint);
     }
@@ -151,7 +153,7 @@ impl Client {
     }
 
     /// Does what is due, and sends what there is.
-    pub(crate) fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    pub(crate) fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         self.note_news(now);
         if self.next <= now {
             self.next = now + Self::PERIOD;
@@ -181,7 +183,7 @@ impl Client {
         }
     }
 
-    fn act(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn act(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         if self.wants && self.control.is_none() {
             let patience = Patience::default();
             let request = self

@@ -9,12 +9,13 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::endpoint::{Endpoint, Event as EndpointEvent};
 use jaus::gateway::{Action, Gateway, Settings};
 use jaus::ra::carrier::To;
 use jaus::ra::convert::to_ra;
 use jaus::ra::node::{self, RaNode, Subsystem};
 use jaus::ra::{Message, RaId};
+
+use crate::sim::{Event as EndpointEvent, OwnedEndpoint};
 
 use crate::cell::Driver;
 use crate::commands;
@@ -71,7 +72,7 @@ impl Crossing {
     pub(crate) fn handle_event(
         &mut self,
         now: Instant,
-        endpoint: &mut Endpoint,
+        endpoint: &mut OwnedEndpoint,
         event: EndpointEvent,
     ) {
         if let EndpointEvent::Received(message) = event {
@@ -80,7 +81,7 @@ impl Crossing {
         self.settle(now, endpoint);
     }
 
-    pub(crate) fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    pub(crate) fn handle_timeout(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         self.gateway.handle_timeout(now);
         self.operator.handle_timeout(now);
         self.settle(now, endpoint);
@@ -96,7 +97,7 @@ impl Crossing {
     }
 
     /// Carries everything until nothing is left to carry.
-    pub(crate) fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    pub(crate) fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         while self.carry_datagrams(now) | self.carry_actions(now, endpoint) {}
     }
 
@@ -121,7 +122,7 @@ impl Crossing {
         moved
     }
 
-    fn carry_actions(&mut self, now: Instant, endpoint: &mut Endpoint) -> bool {
+    fn carry_actions(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) -> bool {
         let mut moved = false;
         while let Some(action) = self.gateway.poll_action() {
             moved = true;

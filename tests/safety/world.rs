@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event as EndpointEvent, Outgoing};
+use jaus::endpoint::{Config, Endpoint, Outgoing};
 use jaus::messages::core::{
     QueryHeartbeatPulse, ReportIdentification, report_identification::QueryType,
 };
@@ -15,7 +15,10 @@ use crate::client::Client;
 use crate::commands::encode;
 use crate::gateway::{Crossing, OPERATOR_BEHIND_GATEWAY, Operator};
 use crate::plant::SharedPlant;
-use crate::sim::{Conditions, Host, Network, Owner, Random, WallClock, seeds};
+use crate::sim::{
+    Conditions, Event as EndpointEvent, Host, Network, OwnedEndpoint, Owner, Random, WallClock,
+    seeds,
+};
 use crate::vehicle::{Program, VEHICLE};
 use crate::witness::Witness;
 
@@ -54,7 +57,7 @@ pub(crate) struct World {
 }
 
 impl Vehicle {
-    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         let Some(program) = &mut self.program else {
             return;
         };
@@ -74,7 +77,7 @@ impl Vehicle {
 }
 
 impl Owner for Party {
-    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut OwnedEndpoint, event: EndpointEvent) {
         match (self, event) {
             (Self::Client(client), event) => client.handle_event(now, endpoint, event),
             (Self::Gateway(crossing), event) => crossing.handle_event(now, endpoint, event),
@@ -94,7 +97,7 @@ impl Owner for Party {
         }
     }
 
-    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         match self {
             Self::Client(client) => client.handle_timeout(now, endpoint),
             Self::Gateway(crossing) => crossing.handle_timeout(now, endpoint),
@@ -124,7 +127,7 @@ impl Owner for Party {
     }
 }
 
-fn settle_peer(stack: &mut Stack, now: Instant, endpoint: &mut Endpoint) {
+fn settle_peer(stack: &mut Stack, now: Instant, endpoint: &mut OwnedEndpoint) {
     while let Some(message) = stack.poll_transmit() {
         // There may be no way to the peer yet.
         let _ = endpoint.send(now, message);

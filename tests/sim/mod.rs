@@ -17,6 +17,7 @@
 )]
 
 mod clock;
+mod owned;
 mod random;
 pub mod seeds;
 mod trace;
@@ -27,13 +28,14 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::endpoint::{
-    Endpoint, Event, LinkId, LinkProfile, MessageHandle, Outgoing, Path, Received, SendError, To,
+    self, Endpoint, LinkId, LinkProfile, MessageHandle, Outgoing, Path, Received, SendError, To,
     Transmit,
 };
 use jaus::wire::judp;
 
 use clock::VirtualTime;
 pub use clock::WallClock;
+pub use owned::{Event, OwnedEndpoint};
 pub use random::Random;
 pub use trace::Trace;
 use wire::{Backlog, Flight, Wire};
@@ -47,10 +49,10 @@ const MOST_STEPS: u32 = 100_000;
 /// What takes the events of a simulated node, and may wake up and send by itself.
 pub trait Owner {
     /// Takes an event; may send through the endpoint at once.
-    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: Event);
+    fn handle_event(&mut self, now: Instant, endpoint: &mut OwnedEndpoint, event: Event);
 
     /// Tells that the time that [`poll_timeout`](Self::poll_timeout) asked for has come.
-    fn handle_timeout(&mut self, _now: Instant, _endpoint: &mut Endpoint) {}
+    fn handle_timeout(&mut self, _now: Instant, _endpoint: &mut OwnedEndpoint) {}
 
     /// When to be woken.
     fn poll_timeout(&self) -> Option<Instant> {
@@ -66,7 +68,7 @@ pub struct Mailbox {
 }
 
 impl Owner for Mailbox {
-    fn handle_event(&mut self, now: Instant, _endpoint: &mut Endpoint, event: Event) {
+    fn handle_event(&mut self, now: Instant, _endpoint: &mut OwnedEndpoint, event: Event) {
         self.events.push((now, event));
     }
 }
@@ -79,17 +81,21 @@ impl Mailbox {
             .extract_if(.., |(_, event)| matches!(event, Event::Received(_)));
         let message = |(_, event)| match event {
             Event::Received(received) => Some(received),
-            _ => None,
+            Event::News(_) => None,
         };
         messages.filter_map(message).collect()
     }
 
     /// Takes out the news, and leaves the messages.
-    pub fn take_news(&mut self) -> Vec<Event> {
+    pub fn take_news(&mut self) -> Vec<endpoint::Event> {
         let news = self
             .events
-            .extract_if(.., |(_, event)| !matches!(event, Event::Received(_)));
-        news.map(|(_, event)| event).collect()
+            .extract_if(.., |(_, event)| matches!(event, Event::News(_)));
+        let event = |(_, event)| match event {
+            Event::Received(_) => None,
+            Event::News(event) => Some(event),
+        };
+        news.filter_map(event).collect()
     }
 }
 
@@ -98,7 +104,7 @@ impl Mailbox {
 pub struct Host(pub usize);
 
 struct Node<O> {
-    endpoint: Endpoint,
+    endpoint: OwnedEndpoint,
     owner: O,
     attachments: Vec<Attachment>,
     /// Datagrams that its links take at once.
@@ -208,7 +214,7 @@ impl<O: Owner> Network<O> {
             address: SocketAddr::from(([10, network, 0, host as u8 + 1], judp::PORT)),
         };
         self.nodes.push(Node {
-            endpoint,
+            endpoint: OwnedEndpoint::new(endpoint),
             owner,
             attachments: networks.iter().enumerate().map(attachment).collect(),
             max_segments: 1,
@@ -222,7 +228,7 @@ impl<O: Owner> Network<O> {
     /// Replaces a node by a new one at the same address, as after a crash and a restart.
     pub fn restart(&mut self, host: Host, endpoint: Endpoint, owner: O) {
         let node = &mut self.nodes[host.0];
-        node.endpoint = endpoint;
+        node.endpoint = OwnedEndpoint::new(endpoint);
         node.owner = owner;
         node.is_read = true;
         node.process = Process::Running;
@@ -326,7 +332,7 @@ impl<O: Owner> Network<O> {
     }
 
     /// A node's endpoint.
-    pub fn endpoint(&mut self, host: Host) -> &mut Endpoint {
+    pub fn endpoint(&mut self, host: Host) -> &mut OwnedEndpoint {
         &mut self.nodes[host.0].endpoint
     }
 
@@ -386,7 +392,7 @@ impl<O: Owner> Network<O> {
     pub fn act<T>(
         &mut self,
         host: Host,
-        act: impl FnOnce(Instant, &mut O, &mut Endpoint) -> T,
+        act: impl FnOnce(Instant, &mut O, &mut OwnedEndpoint) -> T,
     ) -> T {
         let node = &mut self.nodes[host.0];
         let result = act(self.now, &mut node.owner, &mut node.endpoint);
@@ -568,6 +574,6 @@ fn note_event(trace: &mut Trace, now: Instant, host: usize, event: &Event) {
             let what = format_args!("{host} delivers {code:02x?}, {length} octets, {source}→{to}");
             trace.note(now, what);
         }
-        news => trace.note(now, format_args!("{host} is told {news:?}")),
+        Event::News(news) => trace.note(now, format_args!("{host} is told {news:?}")),
     }
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus::codec::Message;
-use jaus::endpoint::{Config, Endpoint, Event as EndpointEvent};
+use jaus::endpoint::{Config, Endpoint};
 use jaus::messages::core::{
     ClearEmergency, DeleteElement, Reset, Resume, SetEmergency, Standby, list_manager,
 };
@@ -18,7 +18,7 @@ use jaus::service::{
 };
 
 use crate::rules::Rules;
-use crate::sim::{Conditions, Host, Network, Owner, Random};
+use crate::sim::{Conditions, Event as EndpointEvent, Host, Network, OwnedEndpoint, Owner, Random};
 use crate::totals::Counts;
 
 const VEHICLE: JausId = JausId::new(101, 1, 1);
@@ -119,7 +119,7 @@ impl Vehicle {
         }))
     }
 
-    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         let mut outcome = Ok(());
         while let Some(message) = self.stack.poll_transmit() {
             outcome = outcome.and_then(|()| self.rules.say(now, &message));
@@ -149,7 +149,7 @@ impl Operator {
         }))
     }
 
-    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         while let Some(message) = self.stack.poll_transmit() {
             // There may be no way to the vehicle yet.
             let _ = endpoint.send(now, message);
@@ -188,7 +188,7 @@ impl Operator {
 }
 
 impl Owner for Party {
-    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut OwnedEndpoint, event: EndpointEvent) {
         let EndpointEvent::Received(message) = event else {
             return;
         };
@@ -205,7 +205,7 @@ impl Owner for Party {
         }
     }
 
-    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         match self {
             Self::Vehicle(vehicle) => {
                 vehicle.stack.handle_timeout(now);

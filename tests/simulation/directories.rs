@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event as EndpointEvent};
+use jaus::endpoint::{Config, Endpoint};
 use jaus::service::{
     Change, Directory, Discovery, Event, Kind, Liveness, Profile, Scope, Service, Stack, Timing,
 };
 
-use crate::sim::{Conditions, Host, Network, Owner, Random};
+use crate::sim::{Conditions, Event as EndpointEvent, Host, Network, OwnedEndpoint, Owner, Random};
 use crate::totals::Counts;
 
 /// How long things go wrong.
@@ -96,7 +96,7 @@ impl Components {
         }
     }
 
-    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         for stack in &mut self.stacks {
             while let Some(message) = stack.poll_transmit() {
                 // The other may have gone.
@@ -115,7 +115,7 @@ impl Components {
 }
 
 impl Owner for Components {
-    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut OwnedEndpoint, event: EndpointEvent) {
         if let EndpointEvent::Received(message) = event {
             let mut stacks = self.stacks.iter_mut();
             if let Some(stack) = stacks.find(|stack| stack.id() == message.to) {
@@ -125,7 +125,7 @@ impl Owner for Components {
         }
     }
 
-    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         let is_due = |stack: &&mut Stack| stack.poll_timeout().is_some_and(|due| due <= now);
         for stack in self.stacks.iter_mut().filter(is_due) {
             stack.handle_timeout(now);

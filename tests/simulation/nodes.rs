@@ -1,12 +1,12 @@
 //! The nodes of a scenario on their networks, each in one of its lives.
 
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Counter, Endpoint, Event, MessageHandle, Outgoing, SendError};
+use jaus::endpoint::{Config, Counter, Endpoint, MessageHandle, Outgoing, SendError};
 
 use crate::ledger::{Ledger, Life};
 use crate::plan::Plan;
 use crate::sim::seeds::is_traced;
-use crate::sim::{Conditions, Host, Mailbox, Network, Random};
+use crate::sim::{Conditions, Event, Host, Mailbox, Network, Random};
 use crate::totals::Counts;
 
 pub(crate) struct Nodes {
@@ -136,7 +136,7 @@ impl Nodes {
             for (at, event) in std::mem::take(&mut self.network.owner(Host(node)).events) {
                 match event {
                     Event::Received(received) => ledger.receive(at, life, &received, is_strict)?,
-                    event => news.push((life, event)),
+                    Event::News(event) => news.push((life, event)),
                 }
             }
         }

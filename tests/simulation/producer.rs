@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message;
-use jaus::endpoint::{Endpoint, Event as EndpointEvent, Outgoing, Received};
+use jaus::endpoint::{Outgoing, Received};
 use jaus::messages::core::{
     CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryEventTimeout, RejectEventRequest,
     ReportEventTimeout, create_event,
 };
 
-use crate::sim::{Owner, Random};
+use crate::sim::{Event as EndpointEvent, OwnedEndpoint, Owner, Random};
 
 /// How a peer treats events.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +74,7 @@ impl Producer {
         self.running.iter().filter(|it| it.client == client).count()
     }
 
-    fn say<M: Message>(&self, endpoint: &mut Endpoint, now: Instant, to: JausId, message: &M) {
+    fn say<M: Message>(&self, endpoint: &mut OwnedEndpoint, now: Instant, to: JausId, message: &M) {
         let payload = message.encode().expect("a message");
         // The client may have gone, or there may be no way to it yet.
         let _ = endpoint.send(now, Outgoing::new(self.id, to, payload));
@@ -83,7 +83,7 @@ impl Producer {
     fn create(
         &mut self,
         now: Instant,
-        endpoint: &mut Endpoint,
+        endpoint: &mut OwnedEndpoint,
         from: JausId,
         create: &CreateEvent,
     ) {
@@ -139,7 +139,7 @@ impl Producer {
     fn cancel(
         &mut self,
         now: Instant,
-        endpoint: &mut Endpoint,
+        endpoint: &mut OwnedEndpoint,
         from: JausId,
         cancel: &CancelEvent,
     ) {
@@ -177,7 +177,7 @@ fn period(create: &CreateEvent) -> Duration {
 }
 
 impl Owner for Producer {
-    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut OwnedEndpoint, event: EndpointEvent) {
         let EndpointEvent::Received(Received {
             source, payload, ..
         }) = event
@@ -194,7 +194,7 @@ impl Owner for Producer {
         }
     }
 
-    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         let forgets = self.habits.forgets;
         self.running
             .retain(|it| !forgets || now < it.renewed + Self::LIFETIME);

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
-use jaus::endpoint::{Config, Endpoint, Event as EndpointEvent};
+use jaus::endpoint::{Config, Endpoint};
 use jaus::service::{
     Discovery, Event, Kind, Patience, Profile, Scope, Stack, SubscriptionId, SubscriptionNews,
     Timing, Topic, When,
 };
 
 use crate::producer::{Habits, Producer};
-use crate::sim::{Conditions, Host, Network, Owner, Random};
+use crate::sim::{Conditions, Event as EndpointEvent, Host, Network, OwnedEndpoint, Owner, Random};
 use crate::totals::Counts;
 use crate::vehicle::Vehicle;
 
@@ -98,7 +98,7 @@ impl Client {
         }))
     }
 
-    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         while let Some(message) = self.stack.poll_transmit() {
             // There may be no way to the producer yet.
             let _ = endpoint.send(now, message);
@@ -166,7 +166,7 @@ impl Stream {
 }
 
 impl Owner for Party {
-    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut OwnedEndpoint, event: EndpointEvent) {
         match self {
             Self::Producer(producer) => producer.handle_event(now, endpoint, event),
             Self::Vehicle(vehicle) => vehicle.handle_event(now, endpoint, event),
@@ -179,7 +179,7 @@ impl Owner for Party {
         }
     }
 
-    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         match self {
             Self::Producer(producer) => producer.handle_timeout(now, endpoint),
             Self::Vehicle(vehicle) => vehicle.handle_timeout(now, endpoint),

@@ -7,14 +7,13 @@ use std::time::{Duration, Instant};
 
 use jaus::address::JausId;
 use jaus::codec::Message;
-use jaus::endpoint::{Endpoint, Event as EndpointEvent};
 use jaus::messages::core::{
     QueryAuthority, QueryControl, QueryStatus, ReportAuthority, ReportControl, ReportStatus,
     discovery,
 };
 use jaus::service::{Discovery, Handlers, Kind, Liveness, Profile, Scope, Service, Stack, Timing};
 
-use crate::sim::Owner;
+use crate::sim::{Event as EndpointEvent, OwnedEndpoint, Owner};
 
 pub(crate) struct Vehicle {
     stack: Stack,
@@ -41,7 +40,7 @@ impl Vehicle {
         }
     }
 
-    fn settle(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn settle(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         while let Some(message) = self.stack.poll_transmit() {
             // There may be no way to the client any more.
             let _ = endpoint.send(now, message);
@@ -72,14 +71,14 @@ fn answers(changes: &Arc<AtomicU8>) -> Handlers {
 }
 
 impl Owner for Vehicle {
-    fn handle_event(&mut self, now: Instant, endpoint: &mut Endpoint, event: EndpointEvent) {
+    fn handle_event(&mut self, now: Instant, endpoint: &mut OwnedEndpoint, event: EndpointEvent) {
         if let EndpointEvent::Received(message) = event {
             self.stack.handle_message(now, &message);
             self.settle(now, endpoint);
         }
     }
 
-    fn handle_timeout(&mut self, now: Instant, endpoint: &mut Endpoint) {
+    fn handle_timeout(&mut self, now: Instant, endpoint: &mut OwnedEndpoint) {
         if self.next <= now {
             self.next += Self::CHANGE;
             self.changes.fetch_add(1, Relaxed);

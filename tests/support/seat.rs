@@ -24,6 +24,7 @@ const TCP: LinkId = LinkId(1);
 /// A node of ours.
 pub(crate) struct Seat {
     pub(crate) endpoint: Endpoint,
+    inbox: Vec<Received>,
     stacks: BTreeMap<JausId, Stack>,
     /// Everything that was said.
     pub(crate) said: Vec<Said>,
@@ -68,6 +69,7 @@ impl Seat {
         let now = Instant::now();
         Self {
             endpoint,
+            inbox: Vec::new(),
             stacks: BTreeMap::new(),
             said: Vec::new(),
             heard: Vec::new(),
@@ -119,7 +121,8 @@ impl Seat {
             link: UDP,
             peer: from.into(),
         };
-        self.endpoint.handle_datagram(self.now, path, payload);
+        self.endpoint
+            .handle_datagram(self.now, path, payload, &mut self.inbox);
         self.pump();
     }
 
@@ -138,26 +141,27 @@ impl Seat {
             link: TCP,
             peer: from.into(),
         };
-        self.endpoint.handle_frame(self.now, path, frame);
+        self.endpoint
+            .handle_frame(self.now, path, frame, &mut self.inbox);
         self.pump();
     }
 
     /// A component without a stack says something.
     pub(crate) fn say(&mut self, message: Outgoing) {
-        self.endpoint.send(self.now, message).expect("to be sent");
+        let sent = self.endpoint.send(self.now, message, &mut self.inbox);
+        sent.expect("to be sent");
         self.pump();
     }
 
     /// Carries messages between components, endpoint and what was said.
     fn pump(&mut self) {
         loop {
-            while let Some(event) = self.endpoint.poll_event() {
-                match event {
-                    Event::Received(message) => match self.stacks.get_mut(&message.to) {
-                        Some(stack) => stack.handle_message(self.now, &message),
-                        None => self.heard.push(message),
-                    },
-                    other => self.news.push(other),
+            self.news
+                .extend(std::iter::from_fn(|| self.endpoint.poll_event()));
+            for message in std::mem::take(&mut self.inbox) {
+                match self.stacks.get_mut(&message.to) {
+                    Some(stack) => stack.handle_message(self.now, &message),
+                    None => self.heard.push(message),
                 }
             }
             let mut quiet = true;
@@ -165,7 +169,8 @@ impl Seat {
                 while stack.poll_event().is_some() {}
                 while let Some(message) = stack.poll_transmit() {
                     quiet = false;
-                    self.endpoint.send(self.now, message).expect("to be sent");
+                    let sent = self.endpoint.send(self.now, message, &mut self.inbox);
+                    sent.expect("to be sent");
                 }
             }
             if quiet {
@@ -175,7 +180,10 @@ impl Seat {
         while let Some(transmit) = self.endpoint.poll_transmit(self.now) {
             let challenged = (transmit.link == UDP).then(|| acknowledgement(&transmit));
             match challenged.flatten() {
-                Some((path, answer)) => self.endpoint.handle_datagram(self.now, path, answer),
+                Some((path, answer)) => {
+                    self.endpoint
+                        .handle_datagram(self.now, path, answer, &mut self.inbox);
+                }
                 None => self.note(&transmit),
             }
         }

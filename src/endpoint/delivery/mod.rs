@@ -260,7 +260,7 @@ impl Endpoint {
         scope: Broadcast,
     ) -> Result<(), SendError> {
         self.deliveries
-            .check_room(self.inbox.results(), message.payload.len())?;
+            .check_room(self.news.results(), message.payload.len())?;
         let parcel = Parcel::new(now, message, scope);
         self.deliveries
             .push(now, message.destination, handle, parcel)
@@ -386,7 +386,7 @@ impl Endpoint {
             self.deliveries.settle(parcel.payload.len());
             if parcel.awaited {
                 let message = MessageHandle(message);
-                self.inbox.push_result(Event::Acknowledged { message, by });
+                self.news.push_result(Event::Acknowledged { message, by });
             }
         }
     }
@@ -409,7 +409,7 @@ impl Endpoint {
             if !awaited {
                 continue;
             }
-            self.inbox.push_result(Event::NotAcknowledged {
+            self.news.push_result(Event::NotAcknowledged {
                 message: MessageHandle(message),
                 destination,
                 reason,

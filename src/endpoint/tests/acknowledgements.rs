@@ -68,7 +68,7 @@ fn an_offer_of_header_compression_is_acknowledged_without_it() {
 #[test]
 fn a_request_to_a_busy_component_is_left_alone_until_it_has_room() {
     let mut rig = Rig::new();
-    rig.endpoint.set_busy(US, true);
+    rig.inbox.full.push(US);
     rig.hear(&request());
     assert!(rig.sent().is_empty() && rig.received().is_empty());
     assert_eq!(rig.count(Counter::ReceiverBusy), 1);
@@ -79,7 +79,7 @@ fn a_request_to_a_busy_component_is_left_alone_until_it_has_room() {
     };
     rig.hear(&without);
     assert_eq!(rig.received().len(), 1, "nobody would repeat this one");
-    rig.endpoint.set_busy(US, false);
+    rig.inbox.full.clear();
     rig.hear(&request());
     assert_eq!((rig.sent().len(), rig.received().len()), (1, 1));
 }
@@ -240,12 +240,12 @@ fn answers_that_nobody_waits_for_are_dropped_quietly() {
         source: id("42.1.2"),
         ..right.clone()
     });
-    rig.events();
+    let _ = (rig.events(), rig.received());
     rig.hear(&Frame {
         payload: Bytes::from_static(QUERY_HEARTBEAT),
         ..right
     });
-    assert_eq!((rig.events(), rig.transmits()), (vec![], vec![]));
+    assert!(rig.is_silent());
     assert_eq!(rig.count(Counter::UnawaitedAcknowledgement), 2);
     assert_eq!(rig.count(Counter::AcknowledgementWithPayload), 1);
     assert!(

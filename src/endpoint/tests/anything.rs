@@ -140,7 +140,7 @@ fn take(rig: &mut Rig, step: Step) {
         Step::RemoveLink(link) => rig.endpoint.remove_link(LinkId(link)),
         Step::Pass(milliseconds) => rig.pass(Duration::from_millis(milliseconds)),
         Step::Poll => {
-            let _ = (rig.events(), rig.transmits());
+            let _ = (rig.events(), rig.received(), rig.transmits());
         }
     }
 }
@@ -199,7 +199,7 @@ proptest! {
             let Some(timeout) = rig.endpoint.poll_timeout() else { break };
             rig.now = rig.now.max(timeout);
             rig.endpoint.handle_timeout(rig.now);
-            let _ = (rig.events(), rig.transmits());
+            let _ = (rig.events(), rig.received(), rig.transmits());
         }
         prop_assert_eq!(rig.endpoint.poll_timeout(), None);
     }

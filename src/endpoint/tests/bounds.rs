@@ -53,32 +53,6 @@ fn a_forgotten_peer_is_told_and_reached_through_the_group() {
 }
 
 #[test]
-fn messages_that_nobody_polls_are_dropped_and_counted() {
-    let mut rig = Rig::with(small());
-    for sequence in 0..10 {
-        rig.hear(&Frame {
-            sequence,
-            ..from_peer(QUERY_HEARTBEAT)
-        });
-    }
-    let urgent = Frame {
-        flags: Flags::new(Priority::SafetyCritical),
-        ..from_peer(QUERY_HEARTBEAT)
-    };
-    rig.hear(&Frame {
-        sequence: 99,
-        ..urgent
-    });
-    assert_eq!(
-        rig.received().len(),
-        5,
-        "the urgent one has a queue of its own"
-    );
-    assert_eq!(rig.count(Counter::DeliveryQueueFull), 6);
-    assert_eq!(rig.count(Counter::MessagesDelivered), 5);
-}
-
-#[test]
 fn datagrams_that_nobody_polls_are_refused() {
     let mut rig = Rig::with(small());
     rig.meet_peer();
@@ -155,36 +129,10 @@ fn counters_are_listed_by_name_and_only_if_something_happened() {
 }
 
 #[test]
-fn what_there_is_no_room_for_is_not_acknowledged_and_taken_when_it_comes_again() {
-    let mut rig = Rig::with(Config {
-        queue_limit: 4,
-        ..Config::default()
-    });
-    let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
-    let requests = (1..=6).map(|sequence| Frame {
-        flags: ask,
-        sequence,
-        ..from_peer(QUERY_HEARTBEAT)
-    });
-    let mut acknowledged = 0;
-    let mut delivered = 0;
-    for _try in 0..2 {
-        for request in requests.clone() {
-            rig.hear(&request);
-            acknowledged += rig.sent().len();
-        }
-        delivered += rig.received().len();
-        rig.pass(Duration::from_millis(100));
-    }
-    assert_eq!(rig.count(Counter::ReceiverBusy), 2);
-    assert_eq!((acknowledged, delivered), (4 + 6, 6));
-}
-
-#[test]
 fn a_broadcast_that_asks_for_an_acknowledgement_reaches_those_who_have_room() {
     let mut rig = Rig::new();
     rig.endpoint.attach(SIBLING).unwrap();
-    rig.endpoint.set_busy(SIBLING, true);
+    rig.inbox.full.push(SIBLING);
     let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
     rig.hear(&Frame {
         flags: ask,
@@ -196,20 +144,20 @@ fn a_broadcast_that_asks_for_an_acknowledgement_reaches_those_who_have_room() {
 }
 
 #[test]
-fn a_broadcast_that_siblings_have_no_room_for_is_refused_and_not_half_delivered() {
-    let mut rig = Rig::with(small());
-    for component in 2..=4 {
-        rig.endpoint.attach(JausId::new(101, 1, component)).unwrap();
-    }
-    let broadcast = Outgoing {
-        destination: JausId::EVERYONE,
-        ..to_peer()
+fn an_acknowledged_message_to_a_sibling_without_room_is_refused() {
+    let mut rig = Rig::new();
+    rig.endpoint.attach(SIBLING).unwrap();
+    rig.inbox.full.push(SIBLING);
+    let message = Outgoing {
+        acknowledge: true,
+        ..Outgoing::new(US, SIBLING, Bytes::from_static(QUERY_HEARTBEAT))
     };
-    rig.send(broadcast.clone()).unwrap();
-    let refused = rig.send(broadcast.clone());
-    assert_eq!(refused, Err(SendError::QueueFull { limit: 4 }));
-    assert_eq!((rig.received().len(), rig.transmits().len()), (3, 1));
-    assert!(rig.send(broadcast).is_ok());
+    let refused = rig.send(message.clone());
+    assert_eq!(refused, Err(SendError::ReceiverFull(SIBLING)));
+    assert!(rig.is_silent());
+    rig.inbox.full.clear();
+    assert!(rig.send(message).is_ok());
+    assert_eq!(rig.received().len(), 1);
 }
 
 #[test]

@@ -183,10 +183,10 @@ fn sixteen_mebibytes_are_sent_and_more_is_refused_while_they_wait() {
     let mut wire = Wire::with(1, Conditions::default(), &config);
     let payload = large(16 << 20);
     wire.send(reliable(payload.clone()));
-    assert_eq!(
-        wire.ends[0].send(wire.now, reliable(large(5 << 20))),
-        Err(SendError::TooMuchUnacknowledged { limit: 20 << 20 })
-    );
+    let more = reliable(large(5 << 20));
+    let refused = wire.ends[0].send(wire.now, more, &mut Vec::new());
+    let limit = 20 << 20;
+    assert_eq!(refused, Err(SendError::TooMuchUnacknowledged { limit }));
     wire.run_for(MINUTE);
     assert!(wire.delivered() == [payload]);
     let status = wire.ends[0].flow(PEER).unwrap();
@@ -294,7 +294,8 @@ fn on_a_connection_nothing_is_sent_again_for_want_of_a_quick_answer() {
             sequence,
             ..from_peer(payload)
         };
-        rig.endpoint.handle_frame(rig.now, connection, &frame);
+        rig.endpoint
+            .handle_frame(rig.now, connection, &frame, &mut rig.inbox);
     };
     let positive = Flags::default().with_acknowledgement(Acknowledgement::Positive);
     hear(&mut rig, Flags::default(), 900, QUERY_HEARTBEAT);

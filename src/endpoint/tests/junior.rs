@@ -199,9 +199,15 @@ fn hear_as_sent(rig: &mut Rig, frame: &Frame, to_all: bool) {
     let datagram = judp::encode(frame).unwrap();
     let from = path(PEER_HOST);
     if to_all {
-        rig.endpoint.handle_datagram_to_all(rig.now, from, datagram);
+        rig.hear_datagram(
+            Ingress {
+                path: from,
+                to_all: true,
+            },
+            datagram,
+        );
     } else {
-        rig.endpoint.handle_datagram(rig.now, from, datagram);
+        rig.hear_datagram(from, datagram);
     }
 }
 

@@ -50,9 +50,27 @@ fn path(host: u8) -> Path {
 const OUR_HOST: u8 = 1;
 const PEER_HOST: u8 = 2;
 
+/// What components were given, and who has no room for more.
+#[derive(Default)]
+struct Inbox {
+    messages: Vec<Received>,
+    full: Vec<JausId>,
+}
+
+impl Sink for Inbox {
+    fn has_room(&self, to: JausId, _: Priority) -> bool {
+        !self.full.contains(&to)
+    }
+
+    fn deliver(&mut self, message: Received) {
+        self.messages.push(message);
+    }
+}
+
 /// An endpoint with a link and [`US`] attached, and a clock.
 struct Rig {
     endpoint: Endpoint,
+    inbox: Inbox,
     now: Instant,
 }
 
@@ -71,6 +89,7 @@ impl Rig {
         endpoint.attach(US).unwrap();
         Self {
             endpoint,
+            inbox: Inbox::default(),
             now: Instant::now(),
         }
     }
@@ -89,8 +108,12 @@ impl Rig {
     }
 
     fn hear_octets(&mut self, host: u8, datagram: Bytes) {
+        self.hear_datagram(path(host), datagram);
+    }
+
+    fn hear_datagram(&mut self, from: impl Into<Ingress>, datagram: Bytes) {
         self.endpoint
-            .handle_datagram(self.now, path(host), datagram);
+            .handle_datagram(self.now, from, datagram, &mut self.inbox);
     }
 
     /// Lets a peer have acknowledged something, where it was heard.
@@ -107,27 +130,30 @@ impl Rig {
         });
         self.vouch_for(PEER);
         self.events();
+        self.received();
     }
 
     fn send(&mut self, message: Outgoing) -> Result<MessageHandle, SendError> {
-        self.endpoint.send(self.now, message)
+        self.endpoint.send(self.now, message, &mut self.inbox)
     }
 
     fn events(&mut self) -> Vec<Event> {
         std::iter::from_fn(|| self.endpoint.poll_event()).collect()
     }
 
-    /// The messages among the events.
+    /// The messages for components.
     fn received(&mut self) -> Vec<Received> {
-        let message = |event| match event {
-            Event::Received(received) => Some(received),
-            _ => None,
-        };
-        self.events().into_iter().filter_map(message).collect()
+        std::mem::take(&mut self.inbox.messages)
     }
 
     fn transmits(&mut self) -> Vec<Transmit> {
         std::iter::from_fn(|| self.endpoint.poll_transmit(self.now)).collect()
+    }
+
+    /// Whether nothing was delivered, told or sent since somebody looked.
+    fn is_silent(&mut self) -> bool {
+        let (messages, events) = (self.received(), self.events());
+        messages.is_empty() && events.is_empty() && self.transmits().is_empty()
     }
 
     /// What is sent, read again.

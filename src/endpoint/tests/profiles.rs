@@ -196,7 +196,8 @@ fn links_of_answer(rig: &mut Rig) -> Vec<LinkId> {
         peer: SocketAddr::from(([10, 0, 0, PEER_HOST], 33_918)).into(),
     };
     let frame = from_peer(QUERY_IDENTIFICATION);
-    rig.endpoint.handle_frame(rig.now, connection, &frame);
+    rig.endpoint
+        .handle_frame(rig.now, connection, &frame, &mut rig.inbox);
     rig.send(to_peer()).unwrap();
     rig.transmits().iter().map(|it| it.link).collect()
 }
@@ -260,7 +261,7 @@ fn juniors_priority_zero_fault_is_dropped_and_counted_by_its_name() {
         flags: Flags(0xFF),
         ..from_peer(QUERY_IDENTIFICATION)
     });
-    assert_eq!(rig.events(), []);
+    assert_eq!((rig.events(), rig.received()), (vec![], vec![]));
     assert_eq!(rig.count(Counter::PriorityFault), 1);
     assert_eq!(rig.endpoint.peers().next().unwrap().profile, Known::Junior);
 }

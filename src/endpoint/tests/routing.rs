@@ -23,6 +23,7 @@ struct Plug {
 struct World {
     now: Instant,
     nodes: Vec<Endpoint>,
+    inboxes: Vec<Inbox>,
     plugs: Vec<Plug>,
     flying: VecDeque<(usize, usize, Bytes)>,
     carried: usize,
@@ -37,6 +38,7 @@ impl World {
         Self {
             now: Instant::now(),
             nodes: Vec::new(),
+            inboxes: Vec::new(),
             plugs: Vec::new(),
             flying: VecDeque::new(),
             carried: 0,
@@ -57,6 +59,7 @@ impl World {
 
     fn add(&mut self, config: Config, networks: &[usize]) -> usize {
         self.nodes.push(Endpoint::new(config));
+        self.inboxes.push(Inbox::default());
         let node = self.nodes.len() - 1;
         for &network in networks {
             self.plug(node, network, Framing::Judp);
@@ -119,7 +122,8 @@ impl World {
     }
 
     fn send(&mut self, node: usize, message: Outgoing) -> MessageHandle {
-        let handle = self.nodes[node].send(self.now, message).unwrap();
+        let inbox = &mut self.inboxes[node];
+        let handle = self.nodes[node].send(self.now, message, inbox).unwrap();
         self.collect(node);
         handle
     }
@@ -133,11 +137,12 @@ impl World {
             self.now += Duration::from_micros(1);
             let (node, path) = (self.plugs[to].node, self.path(from, to));
             // The same octets, but that a connection hands over frames.
+            let (now, inbox) = (self.now, &mut self.inboxes[node]);
             match self.plugs[to].framing {
-                Framing::Judp => self.nodes[node].handle_datagram(self.now, path, octets),
+                Framing::Judp => self.nodes[node].handle_datagram(now, path, octets, inbox),
                 _ => {
                     for frame in judp::frames(octets).unwrap() {
-                        self.nodes[node].handle_frame(self.now, path, &frame.unwrap());
+                        self.nodes[node].handle_frame(now, path, &frame.unwrap(), inbox);
                     }
                 }
             }
@@ -173,11 +178,7 @@ impl World {
 
     /// The messages that have come to a node.
     fn received(&mut self, node: usize) -> Vec<Received> {
-        let message = |event| match event {
-            Event::Received(received) => Some(received),
-            _ => None,
-        };
-        self.events(node).into_iter().filter_map(message).collect()
+        std::mem::take(&mut self.inboxes[node].messages)
     }
 
     fn count(&self, node: usize, counter: Counter) -> u64 {
@@ -455,8 +456,8 @@ impl Between {
             peer: SocketAddr::from(([10, 0, network, host], judp::PORT)).into(),
         };
         let datagram = judp::encode(frame).unwrap();
-        let now = self.world.now;
-        self.world.nodes[self.router].handle_datagram(now, path, datagram);
+        let (now, inbox) = (self.world.now, &mut self.world.inboxes[self.router]);
+        self.world.nodes[self.router].handle_datagram(now, path, datagram, inbox);
     }
 
     fn sent(&mut self) -> Vec<(LinkId, To, Frame)> {

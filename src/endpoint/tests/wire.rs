@@ -39,8 +39,9 @@ pub(super) struct Wire {
     chance: u64,
     sent: u64,
     under_way: BinaryHeap<Reverse<Arrival>>,
-    /// What was told at either end.
+    /// What was told, and delivered, at either end.
     pub(super) told: [Vec<Event>; 2],
+    inboxes: [Inbox; 2],
     /// How many datagrams each end has sent.
     pub(super) datagrams: [usize; 2],
 }
@@ -69,6 +70,7 @@ impl Wire {
             sent: 0,
             under_way: BinaryHeap::new(),
             told: [Vec::new(), Vec::new()],
+            inboxes: Default::default(),
             datagrams: [0, 0],
         }
     }
@@ -82,7 +84,8 @@ impl Wire {
     }
 
     pub(super) fn send(&mut self, message: Outgoing) -> MessageHandle {
-        let message = self.ends[0].send(self.now, message).unwrap();
+        let inbox = &mut self.inboxes[0];
+        let message = self.ends[0].send(self.now, message, inbox).unwrap();
         self.carry();
         message
     }
@@ -136,7 +139,8 @@ impl Wire {
             && let Some(Reverse((_, _, to, datagram))) = self.under_way.pop()
         {
             let from = path([PEER_HOST, OUR_HOST][to]);
-            self.ends[to].handle_datagram(self.now, from, datagram.into());
+            let inbox = &mut self.inboxes[to];
+            self.ends[to].handle_datagram(self.now, from, datagram.into(), inbox);
         }
         for end in &mut self.ends {
             if end.poll_timeout().is_some_and(|at| at <= self.now) {
@@ -156,11 +160,8 @@ impl Wire {
 
     /// The payloads that were delivered at the other end.
     pub(super) fn delivered(&mut self) -> Vec<Bytes> {
-        let payload = |event| match event {
-            Event::Received(received) => Some(received.payload),
-            _ => None,
-        };
-        self.told[1].drain(..).filter_map(payload).collect()
+        let messages = self.inboxes[1].messages.drain(..);
+        messages.map(|received| received.payload).collect()
     }
 
     /// What was told about messages at our end.

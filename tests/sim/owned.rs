@@ -1,0 +1,86 @@
+//! An endpoint with a place for what it delivers, as a node has mailboxes.
+
+use std::collections::VecDeque;
+use std::ops::{Deref, DerefMut};
+use std::time::Instant;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::endpoint::{self, Endpoint, Ingress, MessageHandle, Outgoing, Received, SendError, Sink};
+use jaus::wire::Priority;
+
+/// Messages of each priority that may wait.
+const ROOM: usize = 1024;
+
+/// What comes out of an endpoint for its owner.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A message for a component.
+    Received(Received),
+    /// Anything else.
+    News(endpoint::Event),
+}
+
+/// An endpoint whose messages wait until its owner takes them.
+#[derive(Debug)]
+pub struct OwnedEndpoint {
+    endpoint: Endpoint,
+    inbox: Inbox,
+}
+
+#[derive(Debug, Default)]
+struct Inbox([VecDeque<Received>; Priority::ALL.len()]);
+
+impl Sink for Inbox {
+    fn has_room(&self, _: JausId, priority: Priority) -> bool {
+        self.0[usize::from(priority.bits())].len() < ROOM
+    }
+
+    fn deliver(&mut self, message: Received) {
+        if self.has_room(message.to, message.priority) {
+            self.0[usize::from(message.priority.bits())].push_back(message);
+        }
+    }
+}
+
+impl OwnedEndpoint {
+    pub fn new(endpoint: Endpoint) -> Self {
+        Self {
+            endpoint,
+            inbox: Inbox::default(),
+        }
+    }
+
+    pub fn send(&mut self, now: Instant, message: Outgoing) -> Result<MessageHandle, SendError> {
+        self.endpoint.send(now, message, &mut self.inbox)
+    }
+
+    pub fn handle_datagram(&mut self, now: Instant, from: impl Into<Ingress>, datagram: Bytes) {
+        self.endpoint
+            .handle_datagram(now, from, datagram, &mut self.inbox);
+    }
+
+    /// The next thing that the owner is to take: news first, then the most urgent message.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        let news = self.endpoint.poll_event().map(Event::News);
+        news.or_else(|| {
+            let mut most_urgent_first = self.inbox.0.iter_mut().rev();
+            let message = most_urgent_first.find_map(VecDeque::pop_front);
+            message.map(Event::Received)
+        })
+    }
+}
+
+impl Deref for OwnedEndpoint {
+    type Target = Endpoint;
+
+    fn deref(&self) -> &Endpoint {
+        &self.endpoint
+    }
+}
+
+impl DerefMut for OwnedEndpoint {
+    fn deref_mut(&mut self) -> &mut Endpoint {
+        &mut self.endpoint
+    }
+}
