@@ -1,6 +1,6 @@
 //! What a datagram costs: its header alone, the whole frame, and its way through an endpoint.
 
-#![expect(clippy::expect_used, clippy::panic, reason = "a benchmark")]
+#![expect(clippy::expect_used, reason = "a benchmark")]
 
 use std::hint::black_box;
 use std::net::SocketAddr;

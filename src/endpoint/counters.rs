@@ -96,9 +96,12 @@ counters! {
     /// Dropped: a part of a large message of which the rest did not come in time, or for which
     /// there is no room.
     FragmentsForgotten = "dropped: unfinished large message",
+    /// Dropped, and not acknowledged: a part of a large message from elsewhere than where its sender has
+    /// proven to be.
+    PartFromElsewhere = "dropped: part of a message from elsewhere",
     /// Not sent: a fragment that its header cannot carry.
     CannotSend = "not sent: its header cannot carry it",
-    /// Not sent: a datagram that waited for a link that was removed.
+    /// Not sent: a datagram for a link that was removed.
     LinkGone = "not sent: the link is gone",
     /// Dropped: a datagram to send, because too many wait to be sent.
     TransmitQueueFull = "dropped: transmit queue full",

@@ -52,7 +52,7 @@ impl Endpoint {
                     .map_err(|_| Counter::CannotForward)
             });
         let outcome = passed.err().unwrap_or(Counter::MessagesForwarded);
-        trace!(%source, %destination, %outcome);
+        trace!(%source, %destination, %outcome, "passing on");
         self.counters.add(outcome);
     }
 

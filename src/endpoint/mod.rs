@@ -155,8 +155,7 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Lets a local component go. What was already received for it can still be polled; its messages
-    /// that wait for acknowledgements are given up.
+    /// Lets a local component go. Its messages that wait for acknowledgements are given up.
     pub fn detach(&mut self, id: JausId) {
         self.components.detach(id);
         let given_up = self.deliveries.forget_source(id);
@@ -222,11 +221,12 @@ impl Endpoint {
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         let mut most_urgent_first = Priority::ALL.into_iter().rev();
         let next = most_urgent_first.find_map(|priority| {
-            let whole = self.dequeue(now, Level::whole(priority)).or_else(|| {
-                self.send_deliveries(now, priority);
-                self.dequeue(now, Level::whole(priority))
-            });
-            whole.or_else(|| self.dequeue(now, Level::fragments(priority)))
+            loop {
+                let whole = self.dequeue(now, Level::whole(priority));
+                if whole.is_some() || !self.send_deliveries(now, priority) {
+                    break whole.or_else(|| self.dequeue(now, Level::fragments(priority)));
+                }
+            }
         });
         // What may not leave before its address is proven has queued a challenge instead.
         next.or_else(|| self.dequeue(now, Level::whole(CHALLENGE_FLAGS.priority())))

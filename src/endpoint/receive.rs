@@ -187,6 +187,7 @@ impl Endpoint {
             return Err(Counter::PeersFull);
         }
         if is_for_us {
+            self.check_part(now, path, frame, seen)?;
             match frame.flags.acknowledgement() {
                 Acknowledgement::Positive | Acknowledgement::Negative => {
                     return self.receive_acknowledgement(now, path, frame);
@@ -268,6 +269,32 @@ impl Endpoint {
             warn!(%id, from = %from.peer, "refused: peers says that this id is at another address");
         }
         Err(Counter::PinnedElsewhere)
+    }
+
+    /// Refuses a part of a message from where its sender is not proven to be, if it is proven to be
+    /// elsewhere, and does not acknowledge it: it may be forged. If it is not, a challenge shows that,
+    /// and the part comes again. A copy of what has come from there needs no challenge.
+    fn check_part(
+        &mut self,
+        now: Instant,
+        from: Path,
+        frame: &Frame,
+        seen: Fingerprint,
+    ) -> Result<(), Counter> {
+        let is_part = frame.flags.data() != DataControl::Single;
+        if !is_part || !self.peers.is_proven_elsewhere(frame.source, from) {
+            return Ok(());
+        }
+        let seen = seen.in_round(self.peers.round(frame));
+        let window = self.config.retransmission_window;
+        if self.heard.contains(now, &seen, window) {
+            return Err(Counter::Duplicate);
+        }
+        self.learn(now, from, frame)?;
+        if self.peers.is_proven_elsewhere(frame.source, from) {
+            return Err(Counter::PartFromElsewhere);
+        }
+        Ok(())
     }
 
     /// Delivers a message to components of ours when it is whole.

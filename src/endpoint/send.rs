@@ -255,7 +255,9 @@ impl Endpoint {
         let pacing = self.pacing(whole.destination);
         for hop in hops {
             let message = FragmentedSend::new(whole, cut, first, pacing);
-            self.egress.push_fragmented(now, hop, message);
+            if let Err(reason) = self.egress.push_fragmented(now, hop, message) {
+                self.counters.add(reason);
+            }
         }
         Ok(())
     }
@@ -282,12 +284,8 @@ impl Endpoint {
         if !self.may_send(now, frame.destination, path, octets.len()) {
             return Ok(false);
         }
-        let priority = frame.flags.priority();
-        let queued = self.egress.push(now, path.into(), priority, octets);
-        if !queued {
-            self.counters.add(Counter::TransmitQueueFull);
-        }
-        Ok(queued)
+        let queued = self.egress.push(now, path.into(), frame.flags, octets);
+        Ok(queued.map_err(|reason| self.counters.add(reason)).is_ok())
     }
 
     /// Sends a frame of ours to everybody. One for a component whose address is unknown asks it for
@@ -315,10 +313,8 @@ impl Endpoint {
         hops: &[Hop],
         frame: &Frame,
     ) -> Result<(), EncodeError> {
-        let refused = self.egress.push_to_many(now, hops, frame)?;
-        self.counters
-            .add_many(Counter::TransmitQueueFull, refused as u64);
-        Ok(())
+        self.egress
+            .push_to_many(now, hops, frame, &mut self.counters)
     }
 
     /// How messages to `destination` are cut.

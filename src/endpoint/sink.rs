@@ -7,11 +7,12 @@ use crate::wire::Priority;
 /// Takes the messages for local components.
 ///
 /// An endpoint asks for room before it acknowledges a message, and hands it over in the same call.
-/// So nothing is acknowledged that its receiver does not get.
+/// So nothing is acknowledged that its receiver does not get, if the sink keeps its word.
 pub trait Sink {
-    /// Whether a message of that priority can be handed to a component without the loss of one.
-    /// If not, a message that wants an acknowledgement is left alone, not even acknowledged, so
-    /// that its sender tries again; others are handed over, for the sink to choose what goes.
+    /// Whether a message of that priority, once handed over, stays until its component reads it.
+    /// Messages that want no acknowledgement are handed over without asking, so a sink needs room
+    /// in reserve for them. Without room, a message that wants an acknowledgement is not even
+    /// acknowledged, so that its sender tries again.
     fn has_room(&self, to: JausId, priority: Priority) -> bool;
 
     /// Takes a message for the component [`Received::to`].

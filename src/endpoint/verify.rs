@@ -159,7 +159,7 @@ impl Endpoint {
         (rival, rival_is_stream): (Path, bool),
     ) {
         if let Some(local) = local
-            && self.peers.may_challenge(now, id)
+            && self.peers.may_challenge(now, id, rival)
         {
             let rival = Some(rival);
             let doubt = Doubt {
@@ -177,7 +177,7 @@ impl Endpoint {
     pub(super) fn challenge(&mut self, now: Instant, id: JausId) {
         if let Some(local) = self.challenger(id)
             && let Some((incumbent, _)) = self.route(id)
-            && self.peers.may_challenge(now, id)
+            && self.peers.may_challenge(now, id, incumbent)
         {
             let doubt = Doubt {
                 local,

@@ -20,45 +20,82 @@ pub(crate) struct Bounds {
 #[derive(Debug)]
 pub(crate) struct Backlog<T> {
     bounds: Bounds,
-    /// By priority, low first; each item with its octets.
-    queues: [VecDeque<(usize, T)>; Priority::ALL.len()],
-    items: usize,
+    /// By priority, low first.
+    levels: [Level<T>; Priority::ALL.len()],
+}
+
+/// What waits of one priority.
+#[derive(Debug)]
+struct Level<T> {
+    /// The items, each with its octets.
+    items: VecDeque<(usize, T)>,
     octets: usize,
 }
+
+impl<T> Default for Level<T> {
+    fn default() -> Self {
+        Self {
+            items: VecDeque::new(),
+            octets: 0,
+        }
+    }
+}
+
+impl<T> Level<T> {
+    fn pop(&mut self) -> Option<T> {
+        let (octets, item) = self.items.pop_front()?;
+        self.octets -= octets;
+        if self.items.is_empty() && self.items.capacity() > 2 * KEPT {
+            self.items.shrink_to(KEPT);
+        }
+        Some(item)
+    }
+}
+
+/// The memory, in items, that an empty level keeps. A burst may need more, but a node has many
+/// components whose only burst is the discovery at its beginning.
+const KEPT: usize = 32;
 
 impl<T> Backlog<T> {
     pub(crate) fn new(bounds: Bounds) -> Self {
         Self {
             bounds,
-            queues: Default::default(),
-            items: 0,
-            octets: 0,
+            levels: Default::default(),
         }
     }
 
-    pub(crate) const fn len(&self) -> usize {
-        self.items
+    pub(crate) fn len(&self) -> usize {
+        self.levels.iter().map(|level| level.items.len()).sum()
     }
 
-    pub(crate) const fn octets(&self) -> usize {
-        self.octets
+    pub(crate) fn octets(&self) -> usize {
+        self.levels.iter().map(|level| level.octets).sum()
     }
 
-    pub(crate) const fn is_empty(&self) -> bool {
-        self.items == 0
+    pub(crate) fn is_empty(&self) -> bool {
+        self.len() == 0
     }
 
     /// Whether so many more items fit, and less than half of the octets wait.
-    pub(crate) const fn has_room(&self, items: usize) -> bool {
-        self.items + items <= self.bounds.items && self.octets <= self.bounds.octets / 2
+    pub(crate) fn has_room(&self, items: usize) -> bool {
+        self.len() + items <= self.bounds.items && self.octets() <= self.bounds.octets / 2
+    }
+
+    /// Whether less than half of the room is taken by what is as urgent or more. What is put in
+    /// then does not go because of less urgent items.
+    pub(crate) fn has_reserve(&self, priority: Priority) -> bool {
+        let as_urgent = &self.levels[usize::from(priority.bits())..];
+        let items: usize = as_urgent.iter().map(|level| level.items.len()).sum();
+        let octets: usize = as_urgent.iter().map(|level| level.octets).sum();
+        items < self.bounds.items.div_ceil(2) && octets <= self.bounds.octets / 2
     }
 
     /// Takes an item in; returns how many items went for it.
     #[must_use]
     pub(crate) fn push(&mut self, priority: Priority, octets: usize, item: T) -> u64 {
-        self.items += 1;
-        self.octets += octets;
-        self.queues[usize::from(priority.bits())].push_back((octets, item));
+        let level = &mut self.levels[usize::from(priority.bits())];
+        level.items.push_back((octets, item));
+        level.octets += octets;
         let mut dropped = 0;
         while self.is_overfull() && self.drop_least() {
             dropped += 1;
@@ -68,38 +105,18 @@ impl<T> Backlog<T> {
 
     /// Takes out the oldest of the most urgent items.
     pub(crate) fn pop(&mut self) -> Option<T> {
-        let taken = self.queues.iter_mut().rev().find_map(take_first);
-        self.account(taken)
+        self.levels.iter_mut().rev().find_map(Level::pop)
     }
 
-    const fn is_overfull(&self) -> bool {
-        self.items > 1 && (self.items > self.bounds.items || self.octets > self.bounds.octets)
+    fn is_overfull(&self) -> bool {
+        let items = self.len();
+        items > 1 && (items > self.bounds.items || self.octets() > self.bounds.octets)
     }
 
     /// Drops the oldest of the least urgent items; whether there was one.
     pub(crate) fn drop_least(&mut self) -> bool {
-        let taken = self.queues.iter_mut().find_map(VecDeque::pop_front);
-        self.account(taken).is_some()
+        self.levels.iter_mut().find_map(Level::pop).is_some()
     }
-
-    fn account(&mut self, taken: Option<(usize, T)>) -> Option<T> {
-        let (octets, item) = taken?;
-        self.items -= 1;
-        self.octets -= octets;
-        Some(item)
-    }
-}
-
-/// The memory, in items, that an empty queue keeps. A burst may need more, but a node has many
-/// components whose only burst is the discovery at its beginning.
-const KEPT: usize = 32;
-
-fn take_first<T>(queue: &mut VecDeque<T>) -> Option<T> {
-    let first = queue.pop_front()?;
-    if queue.is_empty() && queue.capacity() > 2 * KEPT {
-        queue.shrink_to(KEPT);
-    }
-    Some(first)
 }
 
 #[cfg(test)]

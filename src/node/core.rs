@@ -108,10 +108,9 @@ pub(super) struct Receivers<'a> {
 }
 
 impl Sink for Receivers<'_> {
-    fn has_room(&self, to: JausId, _priority: Priority) -> bool {
-        self.mailboxes
-            .get(&to)
-            .is_none_or(|mailbox| !mailbox.is_full())
+    fn has_room(&self, to: JausId, priority: Priority) -> bool {
+        let mailbox = self.mailboxes.get(&to);
+        mailbox.is_none_or(|mailbox| mailbox.has_reserve(priority))
     }
 
     fn deliver(&mut self, message: Received) {
@@ -318,8 +317,7 @@ impl Core {
         .min()
     }
 
-    /// Hands on what the endpoint has to say: datagrams to links, messages to mailboxes.
-    /// Says whether anything went to a link.
+    /// Sends queued datagrams and publishes events; returns whether anything went to a link.
     fn pump(&mut self, now: Instant) -> bool {
         let mut transmitted = false;
         self.gathered = 0;

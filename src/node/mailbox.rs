@@ -11,6 +11,7 @@ use std::task::{Context, Poll, Waker};
 use super::config::units;
 use crate::endpoint::Received;
 use crate::link::backlog::{Backlog, Bounds};
+use crate::wire::Priority;
 
 /// Who waits for room is woken when the number of messages is a multiple of this.
 const WAKE_WRITER: usize = 128;
@@ -146,10 +147,10 @@ impl Mailbox {
         Poll::Pending
     }
 
-    /// Whether the next message makes another go, or may do so.
-    pub(super) fn is_full(&self) -> bool {
-        let inner = self.lock();
-        !inner.messages.is_empty() && !inner.messages.has_room(1)
+    /// Whether a message that is acknowledged stays until it is read: the other half of the room is
+    /// for what cannot be refused.
+    pub(super) fn has_reserve(&self, priority: Priority) -> bool {
+        self.lock().messages.has_reserve(priority)
     }
 
     /// Messages taken out until now.
@@ -211,7 +212,7 @@ mod tests {
 
     use super::*;
     use crate::address::JausId;
-    use crate::wire::{Broadcast, Priority};
+    use crate::wire::Broadcast;
 
     fn message(priority: Priority) -> Received {
         Received {
@@ -223,6 +224,25 @@ mod tests {
             payload: Bytes::from_static(b"12345678"),
             path: None,
         }
+    }
+
+    #[test]
+    fn what_was_acknowledged_stays_whatever_comes_that_cannot_be_refused() {
+        let mailbox = Mailbox::new(MailboxLimits {
+            messages: 8,
+            octets: 1000,
+        });
+        let mut acknowledged = 0;
+        while mailbox.has_reserve(Priority::Standard) {
+            mailbox.push(message(Priority::Standard));
+            acknowledged += 1;
+        }
+        (0..4).for_each(|_| mailbox.push(message(Priority::Standard)));
+        assert_eq!((acknowledged, mailbox.counters().dropped), (4, 0));
+        assert!(
+            mailbox.has_reserve(Priority::SafetyCritical),
+            "a stop gets in"
+        );
     }
 
     #[test]

@@ -68,7 +68,6 @@ fn acknowledged_messages_arrive_in_a_flood_of_rubbish() {
 }
 
 #[test]
-#[ignore = "fragments are put together from any address yet"]
 fn acknowledged_messages_arrive_whole_among_forged_fragments() {
     acknowledged_messages_arrive("overlapping");
 }

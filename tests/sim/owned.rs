@@ -33,12 +33,15 @@ struct Inbox([VecDeque<Received>; Priority::ALL.len()]);
 
 impl Sink for Inbox {
     fn has_room(&self, _: JausId, priority: Priority) -> bool {
-        self.0[usize::from(priority.bits())].len() < ROOM
+        self.0[usize::from(priority.bits())].len() < ROOM / 2
     }
 
+    /// The other half is for what cannot be refused; when it is full too, the oldest goes.
     fn deliver(&mut self, message: Received) {
-        if self.has_room(message.to, message.priority) {
-            self.0[usize::from(message.priority.bits())].push_back(message);
+        let waiting = &mut self.0[usize::from(message.priority.bits())];
+        waiting.push_back(message);
+        if waiting.len() > ROOM {
+            waiting.pop_front();
         }
     }
 }

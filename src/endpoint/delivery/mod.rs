@@ -266,8 +266,9 @@ impl Endpoint {
             .push(now, message.destination, handle, parcel)
     }
 
-    /// Sends the packets that are next of this priority, as many as one flow may send in its turn.
-    pub(super) fn send_deliveries(&mut self, now: Instant, priority: Priority) {
+    /// Sends the packets that are next of this priority, as many as one flow may send in its turn;
+    /// whether there were any.
+    pub(super) fn send_deliveries(&mut self, now: Instant, priority: Priority) -> bool {
         let mut sent = 0;
         while sent < TURN
             && let Some(destination) = self.deliveries.next_ready(priority)
@@ -280,6 +281,7 @@ impl Endpoint {
                 sent += 1;
             }
         }
+        sent > 0
     }
 
     /// Sends the next packet to a destination, if there is one. If no way leads there, it counts as

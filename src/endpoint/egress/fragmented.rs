@@ -56,7 +56,8 @@ impl Pacing {
         datagram: usize,
     ) -> Result<(), Duration> {
         let burst = self.time_for(self.burst as u64);
-        if let Some(excess) = bucket.debt(now).checked_sub(burst) {
+        let excess = bucket.debt(now).saturating_sub(burst);
+        if !excess.is_zero() {
             // Not for each datagram: timers are coarse.
             return Err(excess + burst / 4);
         }

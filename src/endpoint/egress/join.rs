@@ -149,7 +149,9 @@ impl<'a> Joined<'a> {
         // A message without its version octet.
         let room = |joined: &Self| 1 + longest - (joined.len() - start);
         for queue in queues.iter_mut().rev() {
-            while let Some(next) = pop_if(queue, |it| is_todays(it) && it.len() <= room(self)) {
+            while let Some(next) =
+                pop_if(queue, |it| has_current_header(it) && it.len() <= room(self))
+            {
                 self.push(next.get(1..).unwrap_or_default());
             }
         }
@@ -174,10 +176,10 @@ fn pop_if(queue: &mut VecDeque<Bytes>, is_wanted: impl FnOnce(&Bytes) -> bool) -
 
 /// Whether another message fits behind a datagram with today's header.
 pub(super) fn may_pack(datagram: &[u8], longest: usize) -> bool {
-    is_todays(datagram) && datagram.len() + as5669a::MIN_LEN <= longest
+    has_current_header(datagram) && datagram.len() + as5669a::MIN_LEN <= longest
 }
 
-/// Whether it is a datagram with today's header.
-fn is_todays(datagram: &[u8]) -> bool {
+/// Whether a datagram has today's header, AS5669A's.
+fn has_current_header(datagram: &[u8]) -> bool {
     datagram.first() == Some(&judp::VERSION_AS5669A)
 }

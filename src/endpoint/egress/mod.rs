@@ -1,4 +1,4 @@
-//! What leaves: a queue for each other end of a link, by priority.
+//! Outgoing datagrams: one queue per link and remote, by priority.
 //!
 //! One [dequeue](Egress::dequeue) serves them all. It takes the most urgent datagram, packs further
 //! small messages to the same place into it, and puts further datagrams of the same length behind
@@ -18,7 +18,7 @@ use bytes::{Bytes, BytesMut};
 
 use super::recent::{Fingerprint, Recent};
 use super::{Config, Counter, Counters, LinkId, LinkProfile, Path, To, Transmit};
-use crate::wire::{EncodeError, Frame, Framing, Priority, as5669a, judp};
+use crate::wire::{Acknowledgement, EncodeError, Flags, Frame, Framing, Priority, as5669a, judp};
 pub(super) use fragmented::FragmentedSend;
 pub use fragmented::Pacing;
 use join::{Fragments, may_pack};
@@ -159,19 +159,24 @@ impl Egress {
         encode(self.framing(link), &mut self.buffer, frame)
     }
 
-    /// Queues a datagram; false if too many of its priority wait.
-    #[must_use]
+    /// Queues a datagram with a message of these flags, or tells why it cannot be.
     pub(super) fn push(
         &mut self,
         now: Instant,
         hop: Hop,
-        priority: Priority,
+        flags: Flags,
         octets: Bytes,
-    ) -> bool {
-        if !self.has_room(priority, 1) {
-            return false;
+    ) -> Result<(), Counter> {
+        if !self.has_link(hop.0) {
+            return Err(Counter::LinkGone);
         }
-        let may_wait = may_pack(&octets, self.longest_packed);
+        let priority = flags.priority();
+        if !self.has_room(priority, 1) {
+            return Err(Counter::TransmitQueueFull);
+        }
+        // Its sender waits for the answer.
+        let is_awaited = flags.acknowledgement() == Acknowledgement::Request;
+        let may_wait = !is_awaited && may_pack(&octets, self.longest_packed);
         let patience = self.patience.filter(|_| may_wait);
         let is_packed = patience.filter(|_| self.framing(hop.0) == Framing::Judp);
         let held_until = is_packed.map(|patience| now + patience);
@@ -179,16 +184,18 @@ impl Egress {
         queue.push(priority, octets, held_until);
         self.turns.list(hop, queue, self.longest_packed);
         self.waiting[usize::from(priority.bits())] += 1;
-        true
+        Ok(())
     }
 
-    /// Queues a message to several places, encoded once for each framing; how many had no room.
+    /// Queues a message to several places, encoded once for each framing. What is not queued is
+    /// counted.
     pub(super) fn push_to_many(
         &mut self,
         now: Instant,
         hops: &[Hop],
         frame: &Frame,
-    ) -> Result<usize, EncodeError> {
+        counters: &mut Counters,
+    ) -> Result<(), EncodeError> {
         let mut encoded: Vec<(Framing, Bytes)> = Vec::new();
         for &(link, _) in hops {
             let framing = self.framing(link);
@@ -196,23 +203,32 @@ impl Egress {
                 encoded.push((framing, self.encode(link, frame)?));
             }
         }
-        let priority = frame.flags.priority();
-        let mut refused = 0;
         for &hop in hops {
             let framing = self.framing(hop.0);
             for (_, octets) in encoded.iter().filter(|(known, _)| *known == framing) {
-                refused += usize::from(!self.push(now, hop, priority, octets.clone()));
+                if let Err(reason) = self.push(now, hop, frame.flags, octets.clone()) {
+                    counters.add(reason);
+                }
             }
         }
-        Ok(refused)
+        Ok(())
     }
 
-    /// Queues a message that leaves in fragments.
-    pub(super) fn push_fragmented(&mut self, now: Instant, hop: Hop, message: FragmentedSend) {
+    /// Queues a message that leaves in fragments, if there is a link.
+    pub(super) fn push_fragmented(
+        &mut self,
+        now: Instant,
+        hop: Hop,
+        message: FragmentedSend,
+    ) -> Result<(), Counter> {
+        if !self.has_link(hop.0) {
+            return Err(Counter::LinkGone);
+        }
         self.fragmented += message.remaining();
         let queue = self.queues.get(now, hop);
         queue.push_fragmented(message);
         self.turns.list(hop, queue, self.longest_packed);
+        Ok(())
     }
 
     /// Remembers a message of ours that goes to a group.
@@ -238,6 +254,9 @@ impl Egress {
             let Some(link) = self.links.get(&hop.0) else {
                 continue;
             };
+            if !queue.is_ready(level, self.longest_packed) {
+                continue;
+            }
             let joined = if level.is_fragments() {
                 let mut leaving = Fragments {
                     now,

@@ -74,7 +74,7 @@ impl HopQueue {
     }
 
     /// Whether something of a level can be sent, where datagrams are packed up to `longest` octets.
-    fn is_ready(&self, level: Level, longest: usize) -> bool {
+    pub(super) fn is_ready(&self, level: Level, longest: usize) -> bool {
         let priority = usize::from(level.priority().bits());
         if level.is_fragments() {
             return self.blocked_until.is_none() && !self.fragmented[priority].is_empty();
@@ -89,6 +89,9 @@ impl HopQueue {
 
     /// The levels into whose lists it is to be put.
     pub(super) fn list(&mut self, longest: usize) -> impl Iterator<Item = Level> + '_ {
+        if self.whole.iter().all(VecDeque::is_empty) {
+            self.held_until = None;
+        }
         Level::all().filter(move |level| {
             let is_new = !self.listed[level.index()] && self.is_ready(*level, longest);
             self.listed[level.index()] |= is_new;
@@ -96,7 +99,7 @@ impl HopQueue {
         })
     }
 
-    /// It stands in the list of a level no more.
+    /// Notes that it was taken from the list of a level.
     pub(super) fn take_turn(&mut self, level: Level) {
         self.listed[level.index()] = false;
     }
@@ -150,7 +153,7 @@ impl HopQueue {
         })
     }
 
-    /// Whether it is as good as none.
+    /// Whether it can be dropped without loss.
     pub(super) fn is_idle(&self, now: Instant) -> bool {
         self.waiting() == [0; PRIORITIES] && self.fragments().0 == 0 && self.bucket.is_full(now)
     }

@@ -7,12 +7,13 @@
 //! conversation with us stay as long as they are heard now and then: if nobody else can go, a
 //! newcomer is not taken in. So invented ids replace each other.
 
+mod challenges;
 mod evidence;
 mod places;
 mod route;
 mod state;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 use super::rate::Origin;
@@ -20,6 +21,7 @@ use super::{Config, LinkId, Path, StaticPeer};
 use crate::address::JausId;
 use crate::peer::{Assignment, Recogniser};
 use crate::wire::{Frame, Version};
+use challenges::Challenges;
 use places::{Places, Standing};
 pub use route::RouteState;
 use route::has_own_number;
@@ -29,8 +31,8 @@ pub(super) use route::{
 use state::PeerState;
 pub use state::{Peer, Traffic};
 
-/// The most challenges under way.
-const MOST_CHALLENGES: usize = 64;
+/// By so many other ways can a peer be known to be reached.
+const MOST_WAYS: usize = 4;
 /// After a challenge has moved nobody who proved it, its peer is not challenged again for so long.
 const SETTLED: Duration = Duration::from_secs(2);
 /// After a path has not answered, it is not challenged again for so long.
@@ -76,8 +78,7 @@ pub(super) struct Peers {
     places: Places,
     /// How many peers have proven that they are there.
     proven: HashMap<Path, usize>,
-    /// When to look at which challenge.
-    challenges: BTreeSet<(Instant, JausId)>,
+    challenges: Challenges,
     configured: Vec<StaticPeer>,
     assigned: Vec<Assignment>,
     limit: usize,
@@ -89,7 +90,7 @@ impl Peers {
             states: HashMap::new(),
             places: Places::default(),
             proven: HashMap::new(),
-            challenges: BTreeSet::new(),
+            challenges: Challenges::default(),
             configured: config.static_peers.clone(),
             assigned: config.profiles.clone(),
             limit: config.max_peers.max(1),
@@ -142,10 +143,12 @@ impl Peers {
         self.pin(id).is_some() && !pins.any(|pin| pin.path.is_near(from))
     }
 
-    /// Whether it is proven that a peer is at another host than the one at the end of this path.
+    /// Whether it is proven that a peer is at another host than the one at the end of this path, and
+    /// not that it is there too.
     pub(super) fn is_proven_elsewhere(&self, id: JausId, from: Path) -> bool {
         self.states.get(&id).is_some_and(|state| {
-            state.peer.route == RouteState::Verified && !state.peer.path.is_near(from)
+            let mut proven = state.also_at.iter().chain([&state.peer.path]);
+            state.peer.route == RouteState::Verified && !proven.any(|path| path.is_near(from))
         })
     }
 
@@ -160,7 +163,7 @@ impl Peers {
         let pin = self.pin(frame.source);
         let path = pin.unwrap_or(seen.path);
         let number = self.counted_on(frame);
-        let can_challenge = seen.can_challenge && self.challenges.len() < MOST_CHALLENGES;
+        let can_challenge = seen.can_challenge && self.challenges.has_room(seen.path.into());
         let Some(state) = self.states.get_mut(&frame.source) else {
             return self.take_in(seen, path, number, pin.is_some());
         };
@@ -311,9 +314,9 @@ impl Peers {
         }
     }
 
-    /// Whether a peer may be challenged now.
-    pub(super) fn may_challenge(&self, now: Instant, id: JausId) -> bool {
-        self.challenges.len() < MOST_CHALLENGES
+    /// Whether a peer may be challenged now because of what came from an address.
+    pub(super) fn may_challenge(&self, now: Instant, id: JausId, cause: Path) -> bool {
+        self.challenges.has_room(cause.into())
             && self.pin(id).is_none()
             && self.states.get(&id).is_some_and(|state| {
                 state.challenge.is_none() && state.settled_until.is_none_or(|until| until <= now)
@@ -340,7 +343,7 @@ impl Peers {
         let silence = now.saturating_duration_since(state.heard_on_route);
         let is_near = |rival: Probe| rival.path.is_near(incumbent.path);
         let due = now + route::TRY_INTERVAL;
-        state.challenge = Some(Challenge {
+        let challenge = Challenge {
             doubt,
             incumbent,
             rival,
@@ -348,10 +351,12 @@ impl Peers {
             at_once: rival.is_some_and(is_near) || silence >= route::SILENT,
             rival_answered: doubt.rival_is_stream,
             incumbent_heard: false,
+            incumbent_answered: false,
             tries: 1,
             due,
-        });
-        self.challenges.insert((due, id));
+        };
+        self.challenges.begin(due, id, challenge.cause());
+        state.challenge = Some(challenge);
     }
 
     /// An acknowledgement came that no message waits for; what it is for a challenge, and which.
@@ -365,8 +370,17 @@ impl Peers {
         let challenge = state.challenge.as_mut()?;
         let answer = challenge.handle_answer(frame.destination, frame.sequence, from)?;
         let challenge = *challenge;
+        if challenge.has_proven_rival(frame.sequence) && !state.also_at.contains(&from) {
+            if state.also_at.len() == MOST_WAYS {
+                state.also_at.remove(0);
+            }
+            state.also_at.push(from);
+        }
+        let is_at_home = state.peer.path == challenge.incumbent.path;
         if let Answer::Decides(finding) = answer {
             self.settle(now, frame.source, finding);
+        } else if challenge.incumbent_answered && is_at_home {
+            self.set_route(frame.source, challenge.incumbent.path, RouteState::Verified);
         }
         self.raise(frame.source, Standing::Answered);
         Some((answer, challenge))
@@ -378,26 +392,23 @@ impl Peers {
         &mut self,
         now: Instant,
     ) -> Option<(JausId, Challenge, Option<Finding>)> {
-        let (due, id) = self.challenges.first().copied()?;
+        let (due, id) = self.challenges.first()?;
         if due > now {
             return None;
         }
-        self.challenges.pop_first();
         let challenge = self.states.get_mut(&id)?.challenge.as_mut()?;
         let finding = challenge.handle_timeout(now);
         let challenge = *challenge;
         match finding {
             Some(finding) => self.settle(now, id, finding),
-            None => {
-                self.challenges.insert((challenge.due, id));
-            }
+            None => self.challenges.postpone(id, due, challenge.due),
         }
         Some((id, challenge, finding))
     }
 
     /// When the next challenge is due.
     pub(super) fn next_deadline(&self) -> Option<Instant> {
-        self.challenges.first().map(|&(due, _)| due)
+        self.challenges.first().map(|(due, _)| due)
     }
 
     /// Does what a challenge has shown.
@@ -432,7 +443,7 @@ impl Peers {
 
     fn end_challenge(&mut self, id: JausId) -> Option<Challenge> {
         let challenge = self.states.get_mut(&id)?.challenge.take()?;
-        self.challenges.remove(&(challenge.due, id));
+        self.challenges.end(challenge.due, id, challenge.cause());
         Some(challenge)
     }
 
@@ -581,9 +592,21 @@ impl Peers {
     }
 
     fn forget_where(&mut self, gone: impl Fn(Path) -> bool) {
-        let states = self.states.values().map(|state| &state.peer);
-        let gone: Vec<_> = states.filter(|it| gone(it.path)).map(|it| it.id).collect();
-        gone.into_iter().for_each(|id| self.forget(id));
+        let ids: Vec<_> = self.states.keys().copied().collect();
+        for id in ids {
+            let Some(state) = self.states.get(&id) else {
+                continue;
+            };
+            let challenge = state.challenge.iter();
+            let mut probes = challenge
+                .flat_map(|it| [Some(it.incumbent), it.rival])
+                .flatten();
+            if gone(state.peer.path) {
+                self.forget(id);
+            } else if probes.any(|probe| gone(probe.path)) {
+                self.end_challenge(id);
+            }
+        }
     }
 
     /// All of them, in order of their ids.

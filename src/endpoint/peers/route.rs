@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use crate::address::JausId;
 use crate::endpoint::Path;
+use crate::endpoint::rate::Origin;
 use crate::wire::{Acknowledgement, Flags, Frame, Priority};
 
 /// A challenge is a Query Heartbeat Pulse, which every peer understands and which changes nothing.
@@ -71,6 +72,7 @@ pub(in crate::endpoint) struct Challenge {
     pub(super) at_once: bool,
     pub(super) rival_answered: bool,
     pub(super) incumbent_heard: bool,
+    pub(super) incumbent_answered: bool,
     pub(super) tries: u32,
     pub(super) due: Instant,
 }
@@ -87,6 +89,11 @@ pub(in crate::endpoint) enum Finding {
 }
 
 impl Challenge {
+    /// The network address because of which it began.
+    pub(super) fn cause(&self) -> Origin {
+        self.rival.unwrap_or(self.incumbent).path.into()
+    }
+
     /// An acknowledgement with this number came along `path`. `None` if it is not the one that is
     /// waited for, or does not decide yet.
     pub(super) fn handle_answer(
@@ -100,17 +107,26 @@ impl Challenge {
             return None;
         }
         if probe == self.incumbent {
-            return Some(Answer::Decides(Finding::Stays));
-        }
-        if Some(probe) != self.rival {
+            self.incumbent_answered = true;
+        } else if Some(probe) == self.rival {
+            self.rival_answered = true;
+        } else {
             return None;
         }
-        self.rival_answered = true;
-        Some(if self.at_once {
-            Answer::Decides(Finding::Moves { verified: true })
-        } else {
-            Answer::Counts
+        // Where nothing hangs on it, both have time to answer: a peer may be reached by two ways.
+        Some(match (self.incumbent_answered, self.rival_answered) {
+            (true, true) => Answer::Decides(Finding::Stays),
+            (true, false) if self.at_once || self.rival.is_none() => {
+                Answer::Decides(Finding::Stays)
+            }
+            (false, true) if self.at_once => Answer::Decides(Finding::Moves { verified: true }),
+            _ => Answer::Counts,
         })
+    }
+
+    /// Whether an answer with that number is the rival's.
+    pub(super) fn has_proven_rival(&self, number: u16) -> bool {
+        self.rival.is_some_and(|rival| rival.number == number)
     }
 
     /// The time for an answer is over: `None` if the challenge is to be sent once more.
@@ -121,6 +137,7 @@ impl Challenge {
             return None;
         }
         Some(match self.rival {
+            _ if self.incumbent_answered => Finding::Stays,
             Some(_) if self.incumbent_heard => Finding::Unanswered,
             Some(_) if self.rival_answered => Finding::Moves { verified: true },
             Some(_) if !self.doubt.was_verified => Finding::Moves { verified: false },

@@ -86,6 +86,8 @@ pub(super) struct PeerState {
     pub(super) latest: Option<u32>,
     /// Who it is.
     pub(super) recogniser: Recogniser,
+    /// Where else it has answered a challenge since it began.
+    pub(super) also_at: Vec<Path>,
     /// When it was heard last where it is.
     pub(super) heard_on_route: Instant,
     pub(super) challenge: Option<Challenge>,
@@ -124,6 +126,7 @@ impl PeerState {
             place,
             latest: number,
             recogniser,
+            also_at: Vec::new(),
             heard_on_route: now,
             challenge: None,
             settled_until: None,
@@ -160,6 +163,7 @@ impl PeerState {
     pub(super) fn begin_anew(&mut self, frame: &Frame, number: Option<u32>) {
         self.latest = number.or(self.latest);
         self.heard_on_route = self.peer.last_heard;
+        self.also_at.clear();
         self.recogniser = Recogniser::new();
         self.recogniser.handle_frame(frame, 0);
     }

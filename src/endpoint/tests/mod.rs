@@ -7,6 +7,7 @@ mod bounds;
 mod delivery;
 mod flood;
 mod fragments;
+mod hosts;
 mod identity;
 mod junior;
 mod output;

@@ -147,7 +147,7 @@ fn messages_to_different_places_do_not_share_a_datagram() {
 }
 
 #[test]
-fn messages_wait_for_company_as_long_as_is_said_but_not_the_safety_critical() {
+fn messages_wait_for_others_as_long_as_is_said_but_not_the_safety_critical() {
     let mut rig = with_packing(Packing::Within(Duration::from_millis(5)));
     rig.send(to_peer()).unwrap();
     rig.pass(Duration::from_millis(3));
@@ -253,7 +253,7 @@ fn acknowledgements_leave_several_at_once() {
 }
 
 #[test]
-fn two_large_messages_to_two_places_take_turns_without_tearing_the_trains() {
+fn two_large_messages_to_two_places_take_turns_without_tearing_the_batches() {
     let mut rig = Rig::with(Config {
         initial_window: 128,
         ..Config::default()
@@ -358,4 +358,78 @@ fn what_waits_for_a_link_that_is_removed_is_counted() {
         (0..1024).all(|_| rig.send(to_peer()).is_ok()),
         "nothing left"
     );
+}
+
+#[test]
+fn messages_on_a_connection_are_not_joined() {
+    let mut rig = with_packing(Packing::Within(Duration::from_millis(5)));
+    let connection = LinkId(1);
+    let profile = LinkProfile {
+        framing: crate::wire::Framing::Jtcp,
+        ..LinkProfile::default()
+    };
+    rig.endpoint.add_link(connection, profile);
+    let path = Path {
+        link: connection,
+        ..path(3)
+    };
+    let source = JausId::new(43, 1, 1);
+    let frame = Frame {
+        source,
+        ..from_peer(QUERY_HEARTBEAT)
+    };
+    rig.endpoint
+        .handle_frame(rig.now, path, &frame, &mut rig.inbox);
+    for _message in 0..3 {
+        rig.send(Outgoing {
+            destination: source,
+            ..to_peer()
+        })
+        .unwrap();
+    }
+    let sent = rig.transmits();
+    assert_eq!(sent.len(), 3, "each is a message of its own, and at once");
+}
+
+#[test]
+fn a_message_that_is_to_be_acknowledged_does_not_wait_for_others() {
+    let [alone, packed] =
+        [Packing::Off, Packing::Within(Duration::from_millis(2))].map(|packing| {
+            let mut rig = with_packing(packing);
+            for number in 0..100_u8 {
+                let payload = vec![0x02, 0x22, number].into();
+                rig.send(reliable(payload)).unwrap();
+            }
+            let sent = rig.transmits();
+            sent.iter()
+                .map(|transmit| messages(transmit).len())
+                .sum::<usize>()
+        });
+    assert_eq!(alone, packed);
+    assert!(alone > 1, "{alone}");
+}
+
+#[test]
+fn what_goes_to_a_link_that_is_gone_is_counted_and_holds_no_place() {
+    let mut rig = Rig::with(Config {
+        static_peers: vec![StaticPeer {
+            id: PEER,
+            path: Path {
+                link: LinkId(9),
+                ..path(9)
+            },
+            gets_broadcasts: true,
+        }],
+        queue_limit: 4,
+        ..Config::default()
+    });
+    for _time in 0..10 {
+        let everybody = Outgoing {
+            destination: JausId::EVERYONE,
+            ..to_peer()
+        };
+        rig.send(everybody).unwrap();
+        assert_eq!(rig.transmits().len(), 1);
+    }
+    assert_eq!(rig.count(Counter::LinkGone), 10);
 }

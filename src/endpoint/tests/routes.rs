@@ -174,6 +174,28 @@ fn a_forged_sender_gets_nothing_for_a_peer_that_was_not_asked_yet() {
 }
 
 #[test]
+fn who_starts_many_challenges_keeps_nobody_else_from_being_challenged() {
+    let mut rig = Rig::new();
+    let invented = |number: u16| JausId::new(1000 + number / 200, 1, (number % 200 + 1) as u8);
+    for source in (0..500).map(invented) {
+        rig.hear_from(ELSEWHERE, &Frame { source, ..again(1) });
+        rig.hear_from(ELSEWHERE + 1, &Frame { source, ..again(2) });
+    }
+    assert_eq!(rig.count(Counter::ChallengesSent), 64, "two for each");
+    rig.transmits();
+    rig.hear(&again(1));
+    rig.hear_from(PEER_HOST + 1, &again(2));
+    assert!(rig.endpoint.peers.is_challenged(PEER));
+    // Those that nobody answers are over soon, and their places are free again.
+    rig.pass(Duration::from_secs(2));
+    rig.pass(Duration::from_secs(2));
+    let source = invented(499);
+    rig.hear_from(ELSEWHERE, &Frame { source, ..again(3) });
+    rig.hear_from(ELSEWHERE + 1, &Frame { source, ..again(4) });
+    assert!(rig.endpoint.peers.is_challenged(source));
+}
+
+#[test]
 fn an_acknowledgement_that_nobody_waits_for_teaches_nothing_and_moves_nobody() {
     let mut rig = Rig::new();
     rig.hear(&acknowledgement_of(&Frame::new(US, PEER, Bytes::new())));

@@ -106,12 +106,12 @@ impl Connection {
     }
 
     /// Messages that wait for the other side.
-    pub(super) const fn waiting(&self) -> usize {
+    pub(super) fn waiting(&self) -> usize {
         self.backlog.len()
     }
 
     /// Octets of them.
-    pub(super) const fn waiting_octets(&self) -> usize {
+    pub(super) fn waiting_octets(&self) -> usize {
         self.backlog.octets()
     }
 

@@ -23,7 +23,7 @@ const LONGEST_PACKING: Duration = Duration::from_secs(1);
 /// patience = "3s"          # until a message that is not acknowledged is given up
 /// window = 512             # packets on their way to one destination, at most
 /// waiting = "64MiB"        # of messages that wait for acknowledgements
-/// packing = "off"          # or for how long small messages wait for company: "2ms"
+/// packing = "off"          # or for how long small messages wait for others: "2ms"
 /// pace_burst = "192kB"     # of a receive buffer that a large message may fill at once
 /// pace_rate = "200MB"      # of it that is emptied each second; 0: no pacing
 /// repeat_code_to = ["7.255.255"]   # JAUS++ nodes, whose large messages are cut otherwise
@@ -48,7 +48,7 @@ pub struct Delivery {
     /// The most octets of messages that wait for acknowledgements.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub waiting: usize,
-    /// Whether small messages share datagrams; they wait for company up to 1 s.
+    /// Whether small messages share datagrams; they wait for others up to 1 s.
     #[cfg_attr(
         feature = "serde",
         serde(deserialize_with = "read_packing", serialize_with = "write_packing")
