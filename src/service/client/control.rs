@@ -110,6 +110,8 @@ struct Control {
     /// When the peer had to begin to count the lifetime, at the latest known.
     confirmed: Instant,
     next: Instant,
+    /// When it was last given back, by this request or the one before it.
+    released: Option<Instant>,
     status: Status,
 }
 
@@ -130,6 +132,9 @@ enum State {
     Lost(ControlLost),
     /// Since when it is being given back.
     Releasing(Instant),
+    /// The application has been told its end. It is remembered for as long as a peer may yet answer
+    /// a release.
+    Over,
 }
 
 impl Controls {
@@ -162,12 +167,17 @@ impl Controls {
             denied: false,
             confirmed: now,
             next: now,
+            released: None,
             status: Status::default(),
         };
-        control.ask(now, peer, out);
-        if let Some(before) = self.all.insert(peer, control) {
-            self.news.push_back((before.id, ControlNews::Released));
+        if let Some(before) = self.all.remove(&peer) {
+            control.released = before.released;
+            if before.state != State::Over {
+                self.news.push_back((before.id, ControlNews::Released));
+            }
         }
+        control.ask(now, peer, out);
+        self.all.insert(peer, control);
         Ok(id)
     }
 
@@ -178,16 +188,17 @@ impl Controls {
             return;
         };
         // Else the peer may hold its end for as long as nobody tells it.
-        if let State::Lost(ControlLost::TakenBack | ControlLost::Outranked) = control.state {
-            self.all.remove(&peer);
-            self.news.push_back((id, ControlNews::Released));
-            return;
+        match control.state {
+            State::Lost(ControlLost::TakenBack | ControlLost::Outranked) => {
+                control.state = State::Over;
+                self.news.push_back((id, ControlNews::Released));
+            }
+            State::Releasing(_) | State::Over => {}
+            State::Asking | State::Held | State::Lost(_) => {
+                control.state = State::Releasing(now);
+                control.give_back(now, peer, out);
+            }
         }
-        if matches!(control.state, State::Releasing(_)) {
-            return;
-        }
-        control.state = State::Releasing(now);
-        control.give_back(now, peer, out);
     }
 
     /// Whether something is being given back, and its peer has not confirmed that.
@@ -219,10 +230,10 @@ impl Controls {
             Some(ConfirmControl::CODE) => read::<ConfirmControl>(message)
                 .and_then(|it| control.handle_confirm(now, peer, it.response_code.0, out)),
             Some(RejectControl::CODE) => read::<RejectControl>(message)
-                .and_then(|it| control.handle_reject(it.response_code.0)),
+                .and_then(|it| control.handle_reject(now, peer, it.response_code.0, out)),
             Some(ReportControl::CODE) => read::<ReportControl>(message).and_then(|it| {
                 let controller = JausId::new(it.subsystem_id, it.node_id, it.component_id);
-                control.handle_report(now, controller == out.source())
+                control.handle_report(now, peer, controller == out.source(), out)
             }),
             Some(ReportStatus::CODE) => {
                 read::<ReportStatus>(message).and_then(|it| control.handle_status(it.status.0))
@@ -236,7 +247,7 @@ impl Controls {
             _ => return Handled::No,
         };
         if news.is_some_and(ControlNews::is_the_end) {
-            self.all.remove(&peer);
+            control.state = State::Over;
         }
         self.news.extend(news.map(|news| (id, news)));
         Handled::Yes
@@ -247,7 +258,10 @@ impl Controls {
         self.all.retain(|&peer, control| {
             let told = control.handle_timeout(now, peer, out);
             news.extend(told.map(|told| (control.id, told)));
-            !told.is_some_and(ControlNews::is_the_end)
+            if told.is_some_and(ControlNews::is_the_end) {
+                control.state = State::Over;
+            }
+            control.state != State::Over || control.awaits_answer_to_release(now)
         });
     }
 
@@ -285,7 +299,8 @@ impl Control {
     /// Control that is not confirmed for so long is lost, however long it lasts; and so long it
     /// lasts if the peer does not say. It is JAUS++'s time-out.
     const LIFETIME: Duration = Duration::from_secs(5);
-    /// A release that is not confirmed is repeated for so long: by then control has timed out.
+    /// A release that is not confirmed is repeated for so long: by then control has timed out. For
+    /// so long after it, an answer may come.
     const RELEASE_LIMIT: Duration = Duration::from_secs(5);
 
     /// For how long a confirmation is good.
@@ -315,11 +330,17 @@ impl Control {
             self.lifetime_asked += 1;
             out.send(peer, &QueryTimeout {});
         }
-        if self.state == State::Held {
-            // Before the request: its answer shows whether the peer still knows of its client, which
-            // one that was started again does not.
-            out.send(peer, &QueryControl {});
-        }
+        self.request(now, peer, out);
+    }
+
+    fn renew(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
+        // Before the request: its answer shows whether the peer still knows of its client, which
+        // one that was started again does not.
+        out.send(peer, &QueryControl {});
+        self.ask(now, peer, out);
+    }
+
+    fn request(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
         let authority_code = self.authority;
         out.send(peer, &RequestControl { authority_code });
         if self.asked == 0 {
@@ -335,7 +356,15 @@ impl Control {
 
     fn give_back(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
         out.send(peer, &ReleaseControl {});
+        self.released = Some(now);
         self.next = now + self.patience.interval;
+    }
+
+    /// Whether the peer may yet answer a release, which then is not the end of what was requested
+    /// after it: a network may bring the request first.
+    fn awaits_answer_to_release(&self, now: Instant) -> bool {
+        self.released
+            .is_some_and(|released| now < released + Self::RELEASE_LIMIT)
     }
 
     fn handle_confirm(
@@ -373,10 +402,10 @@ impl Control {
             // A renewal was on its way when control was lost, and has brought it back behind the
             // application's back.
             (State::Lost(_), 0) => {
-                out.send(peer, &ReleaseControl {});
+                self.give_back(now, peer, out);
                 None
             }
-            (State::Lost(_) | State::Releasing(_), _) => None,
+            (State::Lost(_) | State::Releasing(_) | State::Over, _) => None,
         }
     }
 
@@ -389,15 +418,21 @@ impl Control {
 
     /// The peer reports who controls it. What it does not renew lasts on if it lasts for ever, and
     /// ends with its lifetime otherwise.
-    fn handle_report(&mut self, now: Instant, is_ours: bool) -> Option<ControlNews> {
+    fn handle_report(
+        &mut self,
+        now: Instant,
+        peer: JausId,
+        is_ours: bool,
+        out: &mut Outbox,
+    ) -> Option<ControlNews> {
         if self.state != State::Held {
             return None;
         }
+        if !is_ours && self.denied {
+            return self.lose(ControlLost::NotAvailable);
+        }
         if !is_ours {
-            return self.lose(match self.denied {
-                true => ControlLost::NotAvailable,
-                false => ControlLost::Restarted,
-            });
+            return self.lose_or_ask_again(now, peer, ControlLost::Restarted, out);
         }
         if self.denied && self.lifetime == Some(Duration::ZERO) {
             self.confirmed = now;
@@ -405,14 +440,37 @@ impl Control {
         None
     }
 
-    fn handle_reject(&mut self, code: u8) -> Option<ControlNews> {
+    fn handle_reject(
+        &mut self,
+        now: Instant,
+        peer: JausId,
+        code: u8,
+        out: &mut Outbox,
+    ) -> Option<ControlNews> {
         match (self.state, code) {
-            (State::Held, 0) => self.lose(ControlLost::TakenBack),
+            (State::Held, 0) => self.lose_or_ask_again(now, peer, ControlLost::TakenBack, out),
             (State::Held, _) => self.lose(ControlLost::NotAvailable),
             (State::Releasing(_), _) => Some(ControlNews::Released),
             // The end of a control before this one.
-            (State::Asking | State::Lost(_), _) => None,
+            (State::Asking | State::Lost(_) | State::Over, _) => None,
         }
+    }
+
+    /// The peer says that it is not controlled any more. If a release may have come after the request
+    /// that was granted, that is what ended it, and control is requested again: whoever else has it
+    /// by now keeps it, and the answer says so.
+    fn lose_or_ask_again(
+        &mut self,
+        now: Instant,
+        peer: JausId,
+        why: ControlLost,
+        out: &mut Outbox,
+    ) -> Option<ControlNews> {
+        if !self.awaits_answer_to_release(now) {
+            return self.lose(why);
+        }
+        self.request(now, peer, out);
+        None
     }
 
     fn lose(&mut self, why: ControlLost) -> Option<ControlNews> {
@@ -446,7 +504,7 @@ impl Control {
                     waited: now.saturating_duration_since(self.first_asked),
                 };
                 // Its answers may be what was lost.
-                out.send(peer, &ReleaseControl {});
+                self.give_back(now, peer, out);
                 Some(ControlNews::Refused(ControlRefused::NoAnswer(no_answer)))
             }
             State::Held if now >= self.confirmed + self.lifetime() => {
@@ -457,8 +515,12 @@ impl Control {
                 })
             }
             State::Held if self.next > now => None,
-            State::Asking | State::Held => {
+            State::Asking => {
                 self.ask(now, peer, out);
+                None
+            }
+            State::Held => {
+                self.renew(now, peer, out);
                 None
             }
             State::Releasing(since) if now >= since + Self::RELEASE_LIMIT => {
@@ -468,7 +530,7 @@ impl Control {
                 self.give_back(now, peer, out);
                 None
             }
-            State::Lost(_) => None,
+            State::Lost(_) | State::Over => None,
         }
     }
 
@@ -496,6 +558,10 @@ impl Control {
                     .min()
             }
             State::Lost(_) => None,
+            State::Over => {
+                let answered = |released| released + Self::RELEASE_LIMIT;
+                Some(self.released.map_or(self.first_asked, answered))
+            }
         }
     }
 }

@@ -374,3 +374,47 @@ fn a_peer_that_was_started_again_is_lost_and_the_control_that_it_grants_anew_giv
     );
     assert_eq!(bench.sent::<ReleaseControl>().len(), 1);
 }
+
+/// A bench whose first request was given up, with a release that is still on its way when the
+/// second is granted.
+fn held_before_the_release_arrives() -> Bench {
+    let mut bench = Bench::new();
+    request(&mut bench);
+    bench.run_ms(3000);
+    let [ControlNews::Refused(ControlRefused::NoAnswer(_))] = news(&mut bench)[..] else {
+        panic!("it is given up");
+    };
+    assert_eq!(bench.sent::<ReleaseControl>().len(), 1);
+    request(&mut bench);
+    bench.hear(PEER, &confirm(0));
+    assert_eq!(news(&mut bench), [ControlNews::Granted]);
+    bench.sent.clear();
+    bench
+}
+
+#[test]
+fn a_release_that_arrives_after_the_next_request_does_not_end_it() {
+    let mut bench = held_before_the_release_arrives();
+    bench.hear(PEER, &reject(0));
+    bench.hear(PEER, &ReportControl::default());
+    assert!(!bench.sent::<RequestControl>().is_empty());
+    bench.hear(PEER, &confirm(0));
+    renew_for(&mut bench, Duration::from_secs(5));
+    assert_eq!(news(&mut bench), []);
+    bench.hear(PEER, &reject(0));
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::TakenBack)]
+    );
+}
+
+#[test]
+fn who_has_taken_control_after_a_late_release_keeps_it() {
+    let mut bench = held_before_the_release_arrives();
+    bench.hear(PEER, &reject(0));
+    bench.hear(PEER, &confirm(2));
+    assert_eq!(
+        news(&mut bench),
+        [ControlNews::Lost(ControlLost::Outranked)]
+    );
+}
