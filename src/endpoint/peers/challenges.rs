@@ -1,15 +1,26 @@
-//! Which challenges are under way, and when to look at them.
+//! Which challenges are under way, when to look at them, and what comes of them.
 
 use std::collections::{BTreeSet, HashMap};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+use super::places::Standing;
+use super::{Answer, Challenge, Doubt, Finding, Peers, Probe, RouteState, route};
 use crate::address::JausId;
+use crate::endpoint::Path;
 use crate::endpoint::rate::Origin;
+use crate::peer::Recogniser;
+use crate::wire::Frame;
 
 /// The most challenges under way.
 const MOST: usize = 256;
 /// The most of them because of what one network address has sent.
 const MOST_OF_ADDRESS: usize = 32;
+/// By so many other ways can a peer be known to be reached.
+const MOST_WAYS: usize = 4;
+/// After a challenge has moved nobody who proved it, its peer is not challenged again for so long.
+const SETTLED: Duration = Duration::from_secs(2);
+/// After a path has not answered, it is not challenged again for so long.
+const UNANSWERED: Duration = Duration::from_secs(10);
 
 /// The challenges under way, in the order of their times, and the share of each network address.
 #[derive(Debug, Default)]
@@ -48,5 +59,140 @@ impl Challenges {
     /// The one to look at next.
     pub(super) fn first(&self) -> Option<(Instant, JausId)> {
         self.due.first().copied()
+    }
+}
+
+impl Peers {
+    /// Whether a peer may be challenged now because of what came from an address.
+    pub(in crate::endpoint) fn may_challenge(&self, now: Instant, id: JausId, cause: Path) -> bool {
+        self.challenges.has_room(cause.into())
+            && self.pin(id).is_none()
+            && self.states.get(&id).is_some_and(|state| {
+                state.challenge.is_none() && state.settled_until.is_none_or(|until| until <= now)
+            })
+    }
+
+    pub(in crate::endpoint) fn is_challenged(&self, id: JausId) -> bool {
+        let state = self.states.get(&id);
+        state.is_some_and(|state| state.challenge.is_some())
+    }
+
+    /// A challenge is sent with these numbers, to where the peer is or, if it has a rival, to both.
+    pub(in crate::endpoint) fn begin_challenge(
+        &mut self,
+        now: Instant,
+        id: JausId,
+        doubt: Doubt,
+        incumbent: Probe,
+        rival: Option<Probe>,
+    ) {
+        let Some(state) = self.states.get_mut(&id) else {
+            return;
+        };
+        let silence = now.saturating_duration_since(state.heard_on_route);
+        let is_near = |rival: Probe| rival.path.is_near(incumbent.path);
+        let due = now + route::TRY_INTERVAL;
+        let challenge = Challenge {
+            doubt,
+            incumbent,
+            rival,
+            was_provisional: rival.is_some_and(|rival| rival.path == state.peer.path),
+            at_once: rival.is_some_and(is_near) || silence >= route::SILENT,
+            rival_answered: doubt.rival_is_stream,
+            incumbent_heard: false,
+            incumbent_answered: false,
+            tries: 1,
+            due,
+        };
+        self.challenges.begin(due, id, challenge.cause());
+        state.challenge = Some(challenge);
+    }
+
+    /// An acknowledgement came that no message waits for; what it is for a challenge, and which.
+    pub(in crate::endpoint) fn answer_challenge(
+        &mut self,
+        now: Instant,
+        frame: &Frame,
+        from: Path,
+    ) -> Option<(Answer, Challenge)> {
+        let state = self.states.get_mut(&frame.source)?;
+        let challenge = state.challenge.as_mut()?;
+        let answer = challenge.handle_answer(frame.destination, frame.sequence, from)?;
+        let challenge = *challenge;
+        if challenge.has_proven_rival(frame.sequence) && !state.also_at.contains(&from) {
+            if state.also_at.len() == MOST_WAYS {
+                state.also_at.remove(0);
+            }
+            state.also_at.push(from);
+        }
+        let is_at_home = state.peer.path == challenge.incumbent.path;
+        if let Answer::Decides(finding) = answer {
+            self.settle(now, frame.source, finding);
+        } else if challenge.incumbent_answered && is_at_home {
+            self.set_route(frame.source, challenge.incumbent.path, RouteState::Verified);
+        }
+        self.raise(frame.source, Standing::Answered);
+        Some((answer, challenge))
+    }
+
+    /// The next challenge that is due: whose, and what it has shown; `None` for one that is to be
+    /// sent again.
+    pub(in crate::endpoint) fn next_due(
+        &mut self,
+        now: Instant,
+    ) -> Option<(JausId, Challenge, Option<Finding>)> {
+        let (due, id) = self.challenges.first()?;
+        if due > now {
+            return None;
+        }
+        let challenge = self.states.get_mut(&id)?.challenge.as_mut()?;
+        let finding = challenge.handle_timeout(now);
+        let challenge = *challenge;
+        match finding {
+            Some(finding) => self.settle(now, id, finding),
+            None => self.challenges.postpone(id, due, challenge.due),
+        }
+        Some((id, challenge, finding))
+    }
+
+    /// When the next challenge is due.
+    pub(in crate::endpoint) fn next_deadline(&self) -> Option<Instant> {
+        self.challenges.first().map(|(due, _)| due)
+    }
+
+    /// Does what a challenge has shown.
+    fn settle(&mut self, now: Instant, id: JausId, finding: Finding) {
+        let Some(challenge) = self.end_challenge(id) else {
+            return;
+        };
+        let Some(state) = self.states.get_mut(&id) else {
+            return;
+        };
+        let before = challenge.incumbent.path;
+        let (path, route) = match (finding, challenge.rival) {
+            (Finding::Moves { verified }, Some(rival)) => {
+                if !rival.path.is_near(before) {
+                    state.recogniser = Recogniser::new();
+                }
+                (rival.path, RouteState::of(verified))
+            }
+            (Finding::Stays, _) => (before, RouteState::Verified),
+            _ => (before, RouteState::of(challenge.doubt.was_verified)),
+        };
+        // Who has moved and proven it may move on at once: programs that run one after the other
+        // have an id in common.
+        let pause = match finding {
+            Finding::Moves { verified: true } => Duration::ZERO,
+            Finding::Unanswered if challenge.rival.is_none() => UNANSWERED,
+            _ => SETTLED,
+        };
+        state.settled_until = Some(now + pause);
+        self.set_route(id, path, route);
+    }
+
+    pub(super) fn end_challenge(&mut self, id: JausId) -> Option<Challenge> {
+        let challenge = self.states.get_mut(&id)?.challenge.take()?;
+        self.challenges.end(challenge.due, id, challenge.cause());
+        Some(challenge)
     }
 }

@@ -1,11 +1,7 @@
 //! Who is where: addresses learned from what peers send, and configured ones.
 //!
-//! There is one record for each peer. The table is bounded, and so is the share of it that one
-//! network address can hold: a newcomer from elsewhere takes the place of a peer of the address
-//! that holds most. Otherwise who was only heard goes first, then whom we have spoken to, then who
-//! has acknowledged something of ours; among equals the one heard longest ago. Those in
-//! conversation with us stay as long as they are heard now and then: if nobody else can go, a
-//! newcomer is not taken in. So invented ids replace each other.
+//! There is one record for each peer, in a bounded table of which each network address can hold a
+//! share ([`places`]).
 
 mod challenges;
 mod evidence;
@@ -14,12 +10,12 @@ mod route;
 mod state;
 
 use std::collections::HashMap;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::rate::Origin;
 use super::{Config, LinkId, Path, StaticPeer};
 use crate::address::JausId;
-use crate::peer::{Assignment, Recogniser};
+use crate::peer::Assignment;
 use crate::wire::{Frame, Version};
 use challenges::Challenges;
 use places::{Places, Standing};
@@ -30,13 +26,6 @@ pub(super) use route::{
 };
 use state::PeerState;
 pub use state::{Peer, Traffic};
-
-/// By so many other ways can a peer be known to be reached.
-const MOST_WAYS: usize = 4;
-/// After a challenge has moved nobody who proved it, its peer is not challenged again for so long.
-const SETTLED: Duration = Duration::from_secs(2);
-/// After a path has not answered, it is not challenged again for so long.
-const UNANSWERED: Duration = Duration::from_secs(10);
 
 /// Where a message came from and what it teaches.
 #[derive(Clone, Copy, Debug)]
@@ -314,139 +303,6 @@ impl Peers {
         }
     }
 
-    /// Whether a peer may be challenged now because of what came from an address.
-    pub(super) fn may_challenge(&self, now: Instant, id: JausId, cause: Path) -> bool {
-        self.challenges.has_room(cause.into())
-            && self.pin(id).is_none()
-            && self.states.get(&id).is_some_and(|state| {
-                state.challenge.is_none() && state.settled_until.is_none_or(|until| until <= now)
-            })
-    }
-
-    pub(super) fn is_challenged(&self, id: JausId) -> bool {
-        let state = self.states.get(&id);
-        state.is_some_and(|state| state.challenge.is_some())
-    }
-
-    /// A challenge is sent with these numbers, to where the peer is or, if it has a rival, to both.
-    pub(super) fn begin_challenge(
-        &mut self,
-        now: Instant,
-        id: JausId,
-        doubt: Doubt,
-        incumbent: Probe,
-        rival: Option<Probe>,
-    ) {
-        let Some(state) = self.states.get_mut(&id) else {
-            return;
-        };
-        let silence = now.saturating_duration_since(state.heard_on_route);
-        let is_near = |rival: Probe| rival.path.is_near(incumbent.path);
-        let due = now + route::TRY_INTERVAL;
-        let challenge = Challenge {
-            doubt,
-            incumbent,
-            rival,
-            was_provisional: rival.is_some_and(|rival| rival.path == state.peer.path),
-            at_once: rival.is_some_and(is_near) || silence >= route::SILENT,
-            rival_answered: doubt.rival_is_stream,
-            incumbent_heard: false,
-            incumbent_answered: false,
-            tries: 1,
-            due,
-        };
-        self.challenges.begin(due, id, challenge.cause());
-        state.challenge = Some(challenge);
-    }
-
-    /// An acknowledgement came that no message waits for; what it is for a challenge, and which.
-    pub(super) fn answer_challenge(
-        &mut self,
-        now: Instant,
-        frame: &Frame,
-        from: Path,
-    ) -> Option<(Answer, Challenge)> {
-        let state = self.states.get_mut(&frame.source)?;
-        let challenge = state.challenge.as_mut()?;
-        let answer = challenge.handle_answer(frame.destination, frame.sequence, from)?;
-        let challenge = *challenge;
-        if challenge.has_proven_rival(frame.sequence) && !state.also_at.contains(&from) {
-            if state.also_at.len() == MOST_WAYS {
-                state.also_at.remove(0);
-            }
-            state.also_at.push(from);
-        }
-        let is_at_home = state.peer.path == challenge.incumbent.path;
-        if let Answer::Decides(finding) = answer {
-            self.settle(now, frame.source, finding);
-        } else if challenge.incumbent_answered && is_at_home {
-            self.set_route(frame.source, challenge.incumbent.path, RouteState::Verified);
-        }
-        self.raise(frame.source, Standing::Answered);
-        Some((answer, challenge))
-    }
-
-    /// The next challenge that is due: whose, and what it has shown; `None` for one that is to be
-    /// sent again.
-    pub(super) fn next_due(
-        &mut self,
-        now: Instant,
-    ) -> Option<(JausId, Challenge, Option<Finding>)> {
-        let (due, id) = self.challenges.first()?;
-        if due > now {
-            return None;
-        }
-        let challenge = self.states.get_mut(&id)?.challenge.as_mut()?;
-        let finding = challenge.handle_timeout(now);
-        let challenge = *challenge;
-        match finding {
-            Some(finding) => self.settle(now, id, finding),
-            None => self.challenges.postpone(id, due, challenge.due),
-        }
-        Some((id, challenge, finding))
-    }
-
-    /// When the next challenge is due.
-    pub(super) fn next_deadline(&self) -> Option<Instant> {
-        self.challenges.first().map(|(due, _)| due)
-    }
-
-    /// Does what a challenge has shown.
-    fn settle(&mut self, now: Instant, id: JausId, finding: Finding) {
-        let Some(challenge) = self.end_challenge(id) else {
-            return;
-        };
-        let Some(state) = self.states.get_mut(&id) else {
-            return;
-        };
-        let before = challenge.incumbent.path;
-        let (path, route) = match (finding, challenge.rival) {
-            (Finding::Moves { verified }, Some(rival)) => {
-                if !rival.path.is_near(before) {
-                    state.recogniser = Recogniser::new();
-                }
-                (rival.path, RouteState::of(verified))
-            }
-            (Finding::Stays, _) => (before, RouteState::Verified),
-            _ => (before, RouteState::of(challenge.doubt.was_verified)),
-        };
-        // Who has moved and proven it may move on at once: programs that run one after the other
-        // have an id in common.
-        let pause = match finding {
-            Finding::Moves { verified: true } => Duration::ZERO,
-            Finding::Unanswered if challenge.rival.is_none() => UNANSWERED,
-            _ => SETTLED,
-        };
-        state.settled_until = Some(now + pause);
-        self.set_route(id, path, route);
-    }
-
-    fn end_challenge(&mut self, id: JausId) -> Option<Challenge> {
-        let challenge = self.states.get_mut(&id)?.challenge.take()?;
-        self.challenges.end(challenge.due, id, challenge.cause());
-        Some(challenge)
-    }
-
     /// The round of its sequence numbers in which a sender is with this frame; 0 if its number is not
     /// the sender's next.
     pub(super) fn round(&self, frame: &Frame) -> u16 {
@@ -465,74 +321,6 @@ impl Peers {
         let latest = latest.unwrap_or(FIRST_ROUND | u32::from(frame.sequence));
         let ahead = frame.sequence.wrapping_sub(latest as u16) as i16;
         has_own_number(frame).then(|| latest.wrapping_add_signed(ahead.into()))
-    }
-
-    /// Whether somebody is known or could be: there is room, or somebody can go.
-    pub(super) fn has_room_for(&mut self, now: Instant, id: JausId, from: Path) -> bool {
-        self.knows(id)
-            || self.states.len() < self.limit
-            || self.next_to_go(now, from.into()).is_some()
-    }
-
-    /// Who can be forgotten for a newcomer from a network address. An address that holds a quarter of
-    /// the table gets no more of it, and makes room for those that hold less, whoever it holds.
-    fn next_to_go(&mut self, now: Instant, newcomer: Origin) -> Option<JausId> {
-        let (most, holder) = self.places.most()?;
-        let own = self.places.held(newcomer);
-        let (is_excessive, own_is) = (most * 4 > self.limit, own * 4 > self.limit);
-        if most > own + 1 {
-            let found = Standing::ALL.into_iter().find_map(|standing| {
-                let silence = if is_excessive {
-                    Duration::ZERO
-                } else {
-                    standing.silence()
-                };
-                self.longest_silent(now, Some(holder), standing, silence)
-            });
-            if found.is_some() {
-                return found;
-            }
-        }
-        let of = own_is.then_some(newcomer);
-        Standing::ALL
-            .into_iter()
-            .find_map(|standing| self.longest_silent(now, of, standing, standing.silence()))
-    }
-
-    /// Who of a standing was heard longest ago, if that is long enough. Who was heard since it got
-    /// its place goes to the end; so a look costs no more than was heard.
-    fn longest_silent(
-        &mut self,
-        now: Instant,
-        of: Option<Origin>,
-        standing: Standing,
-        silence: Duration,
-    ) -> Option<JausId> {
-        loop {
-            let id = self.places.first(standing, of)?;
-            let state = self.states.get(&id)?;
-            let heard = state.peer.last_heard;
-            if heard > state.place.heard {
-                self.place_anew(id, standing);
-                continue;
-            }
-            return (now.saturating_duration_since(heard) >= silence).then_some(id);
-        }
-    }
-
-    fn place_anew(&mut self, id: JausId, standing: Standing) {
-        if let Some(state) = self.states.get_mut(&id) {
-            self.places.remove(id, state.place);
-            let (origin, heard) = (state.place.origin, state.peer.last_heard);
-            state.place = self.places.insert(id, origin, standing, heard);
-        }
-    }
-
-    fn raise(&mut self, id: JausId, standing: Standing) {
-        let state = self.states.get(&id);
-        if state.is_some_and(|state| state.place.standing < standing) {
-            self.place_anew(id, standing);
-        }
     }
 
     /// A component of ours sent `octets` to it alone.

@@ -1,9 +1,17 @@
 //! Which peer is forgotten when the table is full, and how many peers each network address holds.
+//!
+//! A newcomer takes the place of a peer of the address that holds most, if that is another. Otherwise
+//! who was only heard goes first, then whom we have spoken to, then who has acknowledged something
+//! of ours; among equals the one heard longest ago. Those in conversation with us stay as long as
+//! they are heard now and then: if nobody else can go, a newcomer is not taken in. So invented ids
+//! replace each other.
 
 use std::collections::{BTreeSet, HashMap};
 use std::time::{Duration, Instant};
 
+use super::Peers;
 use crate::address::JausId;
+use crate::endpoint::Path;
 use crate::endpoint::rate::Origin;
 
 /// What we have had to do with a peer.
@@ -121,6 +129,81 @@ impl Places {
                 let next = self.overall.range(from..).next();
                 next.filter(|(is, ..)| *is == standing).map(|&(.., id)| id)
             }
+        }
+    }
+}
+
+impl Peers {
+    /// Whether somebody is known or could be: there is room, or somebody can go.
+    pub(in crate::endpoint) fn has_room_for(
+        &mut self,
+        now: Instant,
+        id: JausId,
+        from: Path,
+    ) -> bool {
+        self.knows(id)
+            || self.states.len() < self.limit
+            || self.next_to_go(now, from.into()).is_some()
+    }
+
+    /// Who can be forgotten for a newcomer from a network address. An address that holds a quarter of
+    /// the table gets no more of it, and makes room for those that hold less, whoever it holds.
+    pub(super) fn next_to_go(&mut self, now: Instant, newcomer: Origin) -> Option<JausId> {
+        let (most, holder) = self.places.most()?;
+        let own = self.places.held(newcomer);
+        let (is_excessive, own_is) = (most * 4 > self.limit, own * 4 > self.limit);
+        if most > own + 1 {
+            let found = Standing::ALL.into_iter().find_map(|standing| {
+                let silence = if is_excessive {
+                    Duration::ZERO
+                } else {
+                    standing.silence()
+                };
+                self.longest_silent(now, Some(holder), standing, silence)
+            });
+            if found.is_some() {
+                return found;
+            }
+        }
+        let of = own_is.then_some(newcomer);
+        Standing::ALL
+            .into_iter()
+            .find_map(|standing| self.longest_silent(now, of, standing, standing.silence()))
+    }
+
+    /// Who of a standing was heard longest ago, if that is long enough. Who was heard since it got
+    /// its place goes to the end; so a look costs no more than was heard.
+    fn longest_silent(
+        &mut self,
+        now: Instant,
+        of: Option<Origin>,
+        standing: Standing,
+        silence: Duration,
+    ) -> Option<JausId> {
+        loop {
+            let id = self.places.first(standing, of)?;
+            let state = self.states.get(&id)?;
+            let heard = state.peer.last_heard;
+            if heard > state.place.heard {
+                self.place_anew(id, standing);
+                continue;
+            }
+            return (now.saturating_duration_since(heard) >= silence).then_some(id);
+        }
+    }
+
+    fn place_anew(&mut self, id: JausId, standing: Standing) {
+        if let Some(state) = self.states.get_mut(&id) {
+            self.places.remove(id, state.place);
+            let (origin, heard) = (state.place.origin, state.peer.last_heard);
+            state.place = self.places.insert(id, origin, standing, heard);
+        }
+    }
+
+    pub(super) fn raise(&mut self, id: JausId, standing: Standing) {
+        let state = self.states.get(&id);
+        if state.is_some_and(|state| state.place.standing < standing) {
+            self.place_anew(id, standing);
         }
     }
 }
