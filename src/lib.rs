@@ -18,6 +18,7 @@
 #[cfg(feature = "ground")]
 pub mod actuator;
 pub mod address;
+mod as_text;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod codec;

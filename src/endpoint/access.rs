@@ -11,6 +11,7 @@ use std::str::FromStr;
 
 use super::Counter;
 use crate::address::JausId;
+use crate::as_text::serde_as_text;
 
 /// The lists. Who is denied is out; if a list of allowed is not empty, who is not on it is out too.
 /// So deny wins, and empty lists let everybody in.
@@ -203,39 +204,7 @@ impl fmt::Display for Network {
     }
 }
 
-/// As texts.
-#[cfg(feature = "serde")]
-mod text {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
-
-    use super::{Network, Subsystems};
-
-    impl<'de> Deserialize<'de> for Subsystems {
-        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-            let text = String::deserialize(deserializer)?;
-            text.parse().map_err(de::Error::custom)
-        }
-    }
-
-    impl Serialize for Subsystems {
-        fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-            serializer.collect_str(self)
-        }
-    }
-
-    impl<'de> Deserialize<'de> for Network {
-        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-            let text = String::deserialize(deserializer)?;
-            text.parse().map_err(de::Error::custom)
-        }
-    }
-
-    impl Serialize for Network {
-        fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-            serializer.collect_str(self)
-        }
-    }
-}
+serde_as_text!(Subsystems, Network);
 
 #[cfg(test)]
 mod tests {

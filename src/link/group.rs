@@ -5,6 +5,8 @@ use std::fmt;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV4, SocketAddrV6};
 use std::str::FromStr;
 
+use crate::as_text::serde_as_text;
+
 /// The port that IANA assigned to JAUS, for UDP and TCP.
 pub const STANDARD_PORT: u16 = 3794;
 
@@ -143,20 +145,7 @@ impl<A: GroupAddress> fmt::Display for Group<A> {
     }
 }
 
-#[cfg(feature = "serde")]
-impl<'de, A: GroupAddress> serde::Deserialize<'de> for Group<A> {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        text.parse().map_err(serde::de::Error::custom)
-    }
-}
-
-#[cfg(feature = "serde")]
-impl<A: GroupAddress> serde::Serialize for Group<A> {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
+serde_as_text!(Group, Group6);
 
 #[cfg(test)]
 mod tests {

@@ -49,6 +49,8 @@ mod tests;
 use std::fmt;
 use std::str::FromStr;
 
+use crate::as_text::serde_as_text;
+
 pub use assignment::Assignment;
 pub use departure::{Entry, Source, Told, table};
 pub use entries::Departure;
@@ -158,19 +160,4 @@ impl FromStr for Peer {
     }
 }
 
-/// As its name.
-#[cfg(feature = "serde")]
-impl serde::Serialize for Peer {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-/// From its name.
-#[cfg(feature = "serde")]
-impl<'de> serde::Deserialize<'de> for Peer {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        text.parse().map_err(serde::de::Error::custom)
-    }
-}
+serde_as_text!(Peer);

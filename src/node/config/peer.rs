@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use super::ConfigError;
 use crate::address::JausId;
+use crate::as_text::serde_as_text;
 use crate::link::Place;
 
 /// A peer that is spoken to by unicast from the start: `10.0.0.2`, which means port 3794,
@@ -70,20 +71,7 @@ impl From<SocketAddrV4> for Peer {
     }
 }
 
-#[cfg(feature = "serde")]
-impl<'de> serde::Deserialize<'de> for Peer {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        text.parse().map_err(serde::de::Error::custom)
-    }
-}
-
-#[cfg(feature = "serde")]
-impl serde::Serialize for Peer {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
+serde_as_text!(Peer);
 
 #[cfg(test)]
 mod tests {

@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use super::RaId;
+use crate::as_text::serde_as_text;
 
 /// Not an id of the Reference Architecture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -36,22 +37,7 @@ impl FromStr for RaId {
     }
 }
 
-/// As text, `"20.1.33.1"`.
-#[cfg(feature = "serde")]
-impl serde::Serialize for RaId {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(self)
-    }
-}
-
-/// From text, `"20.1.33.1"`.
-#[cfg(feature = "serde")]
-impl<'de> serde::Deserialize<'de> for RaId {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        text.parse().map_err(serde::de::Error::custom)
-    }
-}
+serde_as_text!(RaId);
 
 #[cfg(test)]
 mod tests {
