@@ -33,12 +33,20 @@ pub(crate) struct Client {
     queue: VecDeque<Bytes>,
     unacknowledged: Option<MessageHandle>,
     is_driving: bool,
+    /// Whether the vehicle has ever reported that it is ready.
+    was_ready: bool,
     next: Instant,
+    /// When it looks whether the vehicle is ready.
+    check: Instant,
 }
 
 impl Client {
     /// The interval of setpoints that are repeated.
     const PERIOD: Duration = Duration::from_millis(100);
+    /// So long after Resume the vehicle is ready, unless control lapsed while Resume was on its way.
+    const READY_WITHIN: Duration = Duration::from_secs(1);
+    /// Ready in Report Status.
+    const READY: u8 = 1;
 
     pub(crate) fn new(
         now: Instant,
@@ -63,7 +71,9 @@ impl Client {
             queue: VecDeque::new(),
             unacknowledged: None,
             is_driving: false,
+            was_ready: false,
             next: now,
+            check: now,
         }
     }
 
@@ -130,6 +140,7 @@ impl Client {
                 self.queue.pop_front();
                 self.is_driving = self.queue.is_empty();
                 self.next = now;
+                self.check = now + Self::READY_WITHIN;
             }
             EndpointEvent::News(News::NotAcknowledged { message, .. })
                 if self.unacknowledged == Some(message) =>
@@ -174,7 +185,10 @@ impl Client {
                 continue;
             }
             match news {
-                ControlNews::Status(_) => continue,
+                ControlNews::Status(status) => {
+                    self.was_ready |= status == Self::READY;
+                    continue;
+                }
                 ControlNews::Granted => self.next = now,
                 ControlNews::Refused(_) | ControlNews::Released => self.control = None,
                 ControlNews::Lost(_) => {}
@@ -190,6 +204,10 @@ impl Client {
                 .stack
                 .request_control(now, VEHICLE, self.authority, patience);
             self.control = request.ok();
+        }
+        if self.is_driving && !self.was_ready && self.check <= now {
+            self.is_driving = false;
+            self.drive();
         }
         if self.holds
             && self.unacknowledged.is_none()

@@ -86,7 +86,8 @@ fn fresh_seeds_stop() {
         }
     }
     let printed = Printed(Table::default());
-    seeds::for_fresh_seeds("fresh_seeds_stop", FRESH_SEEDS, |seed| {
+    let kept = include_str!("failed_seeds.txt");
+    seeds::for_kept_and_fresh_seeds("fresh_seeds_stop", kept, FRESH_SEEDS, |seed| {
         let (cell, outcome) = (trial::cell_of(seed), trial::run(seed));
         printed.0.note(cell, seed, &outcome);
         match outcome.broken.first() {

@@ -36,7 +36,18 @@ pub(crate) fn for_kept_and_fresh_seeds(
     for seed in kept_seeds(test, kept) {
         run_seeds(test, seed..seed + 1, &run);
     }
-    for_fresh_seeds(test, usual, &run);
+    // The hasher's keys are the operating system's randomness. Fewer digits are easier to type.
+    let first = RandomState::new().hash_one(test) % 1_000_000_000_000;
+    let seeds = match number_in("JAUS_SEED") {
+        Some(seed) => seed..seed + 1,
+        None => first..first + number_in("JAUS_SEEDS").unwrap_or(usual),
+    };
+    announce(&format!(
+        "{test}: seeds {} to {}",
+        seeds.start,
+        seeds.end - 1
+    ));
+    run_seeds(test, seeds, &run);
     number_in("JAUS_SEED").is_none() && number_in("JAUS_SEEDS").is_none_or(|seeds| seeds >= usual)
 }
 
@@ -51,27 +62,6 @@ fn kept_seeds(test: &str, kept: &str) -> Vec<u64> {
         _ => panic!("a test and a seed are expected: {words:?}"),
     };
     words.filter_map(seed).collect()
-}
-
-/// Runs `JAUS_SEED` if it is set, or else `JAUS_SEEDS` (or `usual`) seeds that no run before had:
-/// they are printed.
-pub(crate) fn for_fresh_seeds(
-    test: &str,
-    usual: u64,
-    run: impl Fn(u64) -> Result<(), String> + Sync,
-) {
-    // The hasher's keys are the operating system's randomness. Fewer digits are easier to type.
-    let first = RandomState::new().hash_one(test) % 1_000_000_000_000;
-    let seeds = match number_in("JAUS_SEED") {
-        Some(seed) => seed..seed + 1,
-        None => first..first + number_in("JAUS_SEEDS").unwrap_or(usual),
-    };
-    announce(&format!(
-        "{test}: seeds {} to {}",
-        seeds.start,
-        seeds.end - 1
-    ));
-    run_seeds(test, seeds, run);
 }
 
 /// Prints a line past the test harness, which keeps the output of tests that pass.
