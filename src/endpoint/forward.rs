@@ -67,7 +67,7 @@ impl Endpoint {
         if destination.is_unicast() {
             self.config.access.check_source(destination)?;
             if let Some((path, version)) = self.route(destination) {
-                // What went to a network's group was heard by all on that network.
+                // A multicast reaches every node on its network.
                 let shared = from.link == path.link
                     && self.framing(from.link) == Framing::Judp
                     && frame.flags.broadcast() != Some(Broadcast::None);

@@ -151,7 +151,7 @@ impl Rig {
         std::iter::from_fn(|| self.endpoint.poll_transmit(self.now)).collect()
     }
 
-    /// Whether nothing was delivered, told or sent since somebody looked.
+    /// Whether there are no new deliveries, events or transmits.
     fn is_silent(&mut self) -> bool {
         let (messages, events) = (self.received(), self.events());
         messages.is_empty() && events.is_empty() && self.transmits().is_empty()

@@ -1,0 +1,202 @@
+//! What one router makes of a frame that it passes on.
+
+use super::*;
+
+/// A router with A known on network 0 and C on network 1, fed by hand.
+struct Between {
+    world: World,
+    router: usize,
+}
+
+impl Between {
+    fn new(config: Config) -> Self {
+        let mut world = World::new();
+        let router = world.add(config, &[0, 1]);
+        let mut between = Self { world, router };
+        between.hear(0, 7, &message(A, JausId::EVERYONE, 1));
+        between.hear(1, 8, &message(C, JausId::EVERYONE, 1));
+        between.sent();
+        between
+    }
+
+    fn hear(&mut self, network: u8, host: u8, frame: &Frame) {
+        let path = Path {
+            link: LinkId(network.into()),
+            peer: SocketAddr::from(([10, 0, network, host], judp::PORT)).into(),
+        };
+        let datagram = judp::encode(frame).unwrap();
+        let (now, inbox) = (self.world.now, &mut self.world.inboxes[self.router]);
+        self.world.nodes[self.router].handle_datagram(now, path, datagram, inbox);
+    }
+
+    fn sent(&mut self) -> Vec<(LinkId, To, Frame)> {
+        let now = self.world.now;
+        let router = &mut self.world.nodes[self.router];
+        let read = |transmit: Transmit| {
+            let mut frames = judp::frames(transmit.payload).unwrap();
+            let frame = frames.next().unwrap().unwrap();
+            (transmit.link, transmit.to, frame)
+        };
+        std::iter::from_fn(|| router.poll_transmit(now))
+            .map(read)
+            .collect()
+    }
+
+    fn count(&self, counter: Counter) -> u64 {
+        self.world.count(self.router, counter)
+    }
+}
+
+fn message(source: JausId, destination: JausId, sequence: u16) -> Frame {
+    let payload = Bytes::from_static(QUERY_IDENTIFICATION);
+    Frame {
+        sequence,
+        ..Frame::new(source, destination, payload)
+    }
+}
+
+/// As recorded: Junior sends a message for an unknown id to the group, with the flags of a global
+/// broadcast and the wish to be acknowledged, and its relay leaves them so.
+#[test]
+fn flags_ids_and_number_stay_as_they_came() {
+    let mut between = Between::new(router_config());
+    let flags = Flags::new(Priority::High)
+        .with_broadcast(Broadcast::Global)
+        .with_acknowledgement(Acknowledgement::Request);
+    let frame = Frame {
+        flags,
+        ..message(A, C, 77)
+    };
+    between.hear(0, 7, &frame);
+    let there = To::Peer(SocketAddr::from(([10, 0, 1, 8], judp::PORT)).into());
+    assert_eq!(between.sent(), [(LinkId(1), there, frame)]);
+}
+
+#[test]
+fn a_repeated_message_is_passed_on_again_and_a_copy_from_elsewhere_is_not() {
+    let mut between = Between::new(router_config());
+    let wish = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    let frame = Frame {
+        flags: wish,
+        ..message(A, C, 5)
+    };
+    for _try in 0..3 {
+        between.hear(0, 7, &frame);
+        between.hear(0, 7, &frame);
+        between.hear(0, 99, &frame);
+        assert_eq!(between.sent().len(), 1, "once for each true repetition");
+        between.world.now += Duration::from_millis(100);
+    }
+    let once = message(A, C, 6);
+    between.hear(0, 7, &once);
+    between.world.now += Duration::from_millis(50);
+    between.hear(0, 7, &once);
+    assert_eq!(between.sent().len(), 1, "nobody waits for it");
+    let known = between.world.whereabouts(between.router, A).unwrap();
+    assert_eq!(known.peer, SocketAddr::from(([10, 0, 0, 7], judp::PORT)));
+}
+
+#[test]
+fn the_next_hops_header_is_spoken() {
+    let mut between = Between::new(router_config());
+    let old = |frame| Frame {
+        version: Version::Ra,
+        ..frame
+    };
+    between.hear(1, 8, &old(message(C, A, 0)));
+    assert_eq!(between.sent()[0].2.version, Version::As5669a);
+    between.hear(0, 7, &message(A, C, 9));
+    let there = between.sent();
+    assert_eq!(there[0].2.version, Version::Ra);
+    assert_eq!(there[0].2.payload, QUERY_IDENTIFICATION);
+    let wish = Flags::default().with_acknowledgement(Acknowledgement::Positive);
+    let answer = Frame {
+        flags: wish,
+        ..old(message(C, A, 9))
+    };
+    let bare = answer.payload.slice(..2);
+    between.hear(
+        1,
+        8,
+        &Frame {
+            payload: bare,
+            ..answer
+        },
+    );
+    let back = between.sent();
+    assert!(back[0].2.is_acknowledgement() && back[0].2.version == Version::As5669a);
+    let later = Flags::default().with_data(crate::wire::DataControl::Last);
+    between.hear(
+        0,
+        7,
+        &Frame {
+            flags: later,
+            ..message(A, C, 10)
+        },
+    );
+    assert_eq!(between.sent(), [], "an older header would need the code");
+    assert_eq!(between.count(Counter::CannotForward), 1);
+}
+
+#[test]
+fn broadcasts_are_passed_on_at_a_bounded_rate_and_only_from_where_their_sender_is() {
+    let mut between = Between::new(router_config());
+    for sequence in 0..10_000 {
+        between.hear(0, 7, &message(A, JausId::EVERYONE, sequence));
+        between.world.now += Duration::from_micros(100);
+    }
+    let passed = between.count(Counter::MessagesForwarded);
+    assert!((1400..=1600).contains(&passed), "{passed} in a second");
+    between.sent();
+    between.world.now += Duration::from_millis(100);
+    between.hear(0, 7, &message(A, JausId::EVERYONE, 20_000));
+    assert_eq!(between.sent().len(), 1);
+    between.hear(1, 66, &message(A, JausId::EVERYONE, 20_001));
+    assert_eq!(
+        between.sent(),
+        [],
+        "A was heard on the other network just now"
+    );
+    assert_eq!(between.count(Counter::NotTheWayBack), 1);
+}
+
+#[test]
+fn nothing_goes_back_to_where_it_came_from() {
+    let mut between = Between::new(router_config());
+    between.hear(0, 7, &message(B, JausId::EVERYONE, 1));
+    between.sent();
+    // Both live at one address, or heard each other through the group.
+    between.hear(0, 7, &message(A, B, 2));
+    let group = Flags::default().with_broadcast(Broadcast::Global);
+    between.hear(
+        0,
+        9,
+        &Frame {
+            flags: group,
+            ..message(JausId::new(4, 1, 1), A, 3)
+        },
+    );
+    assert_eq!(between.sent(), []);
+    // Sent to us alone, to be passed on to a neighbour.
+    between.hear(0, 9, &message(JausId::new(4, 1, 1), A, 4));
+    assert_eq!(between.sent().len(), 1);
+}
+
+#[test]
+fn what_the_lists_do_not_allow_is_not_passed_on() {
+    let mut between = Between::new(Config {
+        access: Access {
+            deny_subsystems: vec!["3".parse().unwrap(), "5-6".parse().unwrap()],
+            ..Access::default()
+        },
+        ..router_config()
+    });
+    between.hear(0, 7, &message(A, C, 2));
+    between.hear(0, 7, &message(JausId::new(6, 1, 1), A, 2));
+    assert_eq!(between.sent(), []);
+    assert_eq!(
+        between.count(Counter::SubsystemDenied),
+        3,
+        "C at first, too"
+    );
+}
