@@ -222,7 +222,8 @@ impl Controls {
         out: &mut Outbox,
     ) -> Handled {
         let peer = message.source;
-        let Some(control) = self.all.get_mut(&peer) else {
+        let known = self.all.get_mut(&peer);
+        let Some(control) = known.filter(|control| control.state != State::Over) else {
             return Handled::No;
         };
         let id = control.id;
