@@ -1,84 +1,50 @@
-//! The local link: streams of records, as a node reads them from a component and the other way
-//! round, in pieces.
+//! The local link: streams of records, as node and component read them, in pieces.
 //!
-//! The first octet chooses the side, the second the length of the pieces; the rest is the stream.
+//! The first octet is the length of the pieces; the rest is the stream.
 #![no_main]
 
-use bytes::Bytes;
-use jaus::link::local::record::{RecordError, Reply, Request};
-use jaus::link::local::{Assembler, Body};
+use jaus::link::local::Assembler;
+use jaus::link::local::record::{LENGTH, Record, RecordError};
 use libfuzzer_sys::fuzz_target;
 
 /// Longer than the inputs, so that records may well announce more than ever comes.
-const LIMIT: usize = 1 << 24;
-/// More than ever is kept of small records, and of what a large one has announced but not brought.
-const KEPT: usize = 512 << 10;
+const LIMIT: usize = 1 << 20;
 
 fuzz_target!(|octets: &[u8]| {
-    let Some((&[side, piece], stream)) = octets.split_first_chunk() else {
-        return;
-    };
-    let piece = 1 + usize::from(piece) * 8;
-    if side % 2 == 0 {
-        read(stream, piece, |body| {
-            let request = Request::decode(body)?;
-            comes_back(&request, Request::decode, |request, to| {
-                request.encode_head(to).cloned()
-            });
-            Ok(())
-        });
-    } else {
-        read(stream, piece, |body| {
-            let reply = Reply::decode(body)?;
-            comes_back(&reply, Reply::decode, |reply, to| {
-                reply.encode_head(to).cloned()
-            });
-            Ok(())
-        });
+    if let Some((&piece, stream)) = octets.split_first() {
+        // Nothing more is read from a stream with an error.
+        let _ = read(stream, 1 + usize::from(piece) * 8);
     }
 });
 
 /// Reads a stream in pieces, as a connection does.
-fn read(stream: &[u8], piece: usize, mut each: impl FnMut(&Body<'_>) -> Result<(), RecordError>) {
+fn read(mut stream: &[u8], piece: usize) -> Result<(), RecordError> {
     let mut assembler = Assembler::new(LIMIT);
-    for mut octets in stream.chunks(piece) {
-        while !octets.is_empty() {
-            let taken = match assembler.room() {
-                Some((buffer, room)) => {
-                    assert!(buffer.capacity() <= KEPT + 2 * stream.len());
-                    let now = octets.len().min(room);
-                    buffer.extend_from_slice(&octets[..now]);
-                    let result = assembler.filled().map_or(Ok(()), |body| each(&body));
-                    result.map(|()| now)
-                }
-                None => {
-                    let chunk = [assembler.begun(), octets].concat();
-                    let result = assembler.take(&chunk, |body| each(&body));
-                    assert!(assembler.begun().len() <= KEPT);
-                    result.map(|()| octets.len())
-                }
-            };
-            match taken {
-                Ok(taken) => octets = &octets[taken..],
-                // Nothing more is read from such a stream.
-                Err(_) => return,
-            }
+    while !stream.is_empty() {
+        let mut now = stream.len().min(piece);
+        if let Some(room) = assembler.room() {
+            assert!(room.len() < LENGTH + LIMIT);
+            now = now.min(room.len());
+            room[..now].copy_from_slice(&stream[..now]);
+            assembler.advance(now);
+        } else {
+            assembler.append(&stream[..now]);
         }
+        while let Some(record) = assembler.next_record()? {
+            comes_back(&record);
+        }
+        stream = &stream[now..];
     }
+    Ok(())
 }
 
-/// What was understood is understood the same when it is written again. (Its octets may differ:
-/// names are cut, and what is no text in them is replaced.)
-fn comes_back<T: PartialEq + std::fmt::Debug>(
-    record: &T,
-    decode: impl Fn(&Body<'_>) -> Result<T, RecordError>,
-    encode: impl Fn(&T, &mut Vec<u8>) -> Option<Bytes>,
-) {
+/// What was understood is understood the same when it is written again. (Its octets may differ: a
+/// path's address may be written in two ways.)
+fn comes_back(record: &Record) {
     let mut octets = Vec::new();
-    if let Some(payload) = encode(record, &mut octets) {
-        octets.extend_from_slice(&payload);
-    }
-    let (head, body) = octets.split_first_chunk::<4>().expect("a length");
-    assert_eq!(u32::from_le_bytes(*head) as usize, body.len());
-    assert_eq!(decode(&Body::Small(body)).as_ref(), Ok(record));
+    record.encode_head(&mut octets);
+    octets.extend_from_slice(&record.payload);
+    let (length, body) = octets.split_first_chunk().expect("a length");
+    assert_eq!(u32::from_le_bytes(*length) as usize, body.len());
+    assert_eq!(Record::decode(body.to_vec().into()).as_ref(), Ok(record));
 }

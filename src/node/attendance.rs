@@ -1,15 +1,11 @@
-//! Which components are attached, and from which process; the news about them.
+//! Which components are attached, and from which process; the events about them.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
-use tokio::sync::broadcast;
-
+use super::events::EventSender;
 use crate::address::JausId;
 use crate::link::local::Process;
-
-/// Events kept for a slow listener.
-const KEPT: usize = 256;
 
 /// News about the components of a node.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,15 +28,15 @@ pub enum ComponentEvent {
         /// Why.
         why: Departure,
     },
-    /// Somebody was not attached.
+    /// A component was not attached.
     Refused {
-        /// Who it was.
+        /// Its process.
         process: Process,
-        /// What it was told.
+        /// The reason that it was given.
         why: String,
     },
-    /// A component process reads nothing. Its messages wait, up to the bounds of its mailbox, and
-    /// nobody else's are concerned.
+    /// A component process reads nothing. Its messages wait, up to the bounds of its mailbox; those
+    /// of other components are not concerned.
     Stuck {
         /// Who.
         id: JausId,
@@ -106,38 +102,37 @@ impl fmt::Display for Departure {
     }
 }
 
-/// Who is here.
+/// The attached components of other processes.
 #[derive(Debug)]
 pub(super) struct Attendance {
-    /// Those of other processes.
-    guests: BTreeMap<JausId, Process>,
-    /// Gone when the node has stopped, which ends the listeners' streams.
-    events: Option<broadcast::Sender<ComponentEvent>>,
+    /// Of components in other processes.
+    processes: BTreeMap<JausId, Process>,
+    pub(super) events: EventSender<ComponentEvent>,
 }
 
 impl Attendance {
     pub(super) fn new() -> Self {
         Self {
-            guests: BTreeMap::new(),
-            events: Some(broadcast::Sender::new(KEPT)),
+            processes: BTreeMap::new(),
+            events: EventSender::new(),
         }
     }
 
     /// The process of a component, unless that is the node's own.
     pub(super) fn process(&self, id: JausId) -> Option<&Process> {
-        self.guests.get(&id)
+        self.processes.get(&id)
     }
 
     pub(super) fn arrive(&mut self, id: JausId, process: Option<Process>) {
         if let Some(process) = &process {
             tracing::info!(%id, %process, "component attached");
-            self.guests.insert(id, process.clone());
+            self.processes.insert(id, process.clone());
         }
-        self.announce(ComponentEvent::Attached { id, process });
+        self.events.send(ComponentEvent::Attached { id, process });
     }
 
     pub(super) fn depart(&mut self, id: JausId, why: Departure) {
-        let process = self.guests.remove(&id);
+        let process = self.processes.remove(&id);
         if let Some(process) = &process {
             match &why {
                 Departure::Left | Departure::Stopped => {
@@ -146,28 +141,15 @@ impl Attendance {
                 why => tracing::warn!(%id, %process, %why, "component lost"),
             }
         }
-        self.announce(ComponentEvent::Detached { id, process, why });
-    }
-
-    pub(super) fn announce(&self, event: ComponentEvent) {
-        if let Some(events) = &self.events {
-            // Nobody listening is no error.
-            let _ = events.send(event);
-        }
+        self.events
+            .send(ComponentEvent::Detached { id, process, why });
     }
 
     /// The node has stopped, and everybody goes.
     pub(super) fn end(&mut self) {
-        for id in std::mem::take(&mut self.guests).into_keys() {
+        for id in std::mem::take(&mut self.processes).into_keys() {
             tracing::debug!(%id, "component detached: the node has stopped");
         }
-        self.events = None;
-    }
-
-    pub(super) fn subscribe(&self) -> broadcast::Receiver<ComponentEvent> {
-        let ended = || broadcast::channel(1).1;
-        self.events
-            .as_ref()
-            .map_or_else(ended, broadcast::Sender::subscribe)
+        self.events.end();
     }
 }

@@ -1,4 +1,4 @@
-//! Who wants to know what became of which message.
+//! The messages whose senders wait for an acknowledgement.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -6,25 +6,24 @@ use std::sync::Arc;
 use tokio::sync::oneshot;
 
 use super::error::Undelivered;
-use super::replies::Replies;
+use super::local::Answers;
 use crate::address::JausId;
 use crate::endpoint::{Event, MessageHandle};
-use crate::link::local::record::Reply;
 
-/// Messages whose fate somebody waits for, at most. The endpoint gives up each of them some day,
-/// so that this is only reached if it forgets to say so.
+/// The most messages. The endpoint gives up each of them some day, so that this is only reached if it
+/// forgets to say so.
 const MOST: usize = 65_536;
 
-/// Who waits.
+/// A sender that waits.
 #[derive(Debug)]
 pub(super) enum Waiter {
     /// A task of this process.
     Here(oneshot::Sender<Result<(), Undelivered>>),
-    /// A component process, which knows the message by a number of its own.
-    There { replies: Arc<Replies>, handle: u64 },
+    /// A component process, with its own number for the message.
+    There { answers: Arc<Answers>, handle: u64 },
 }
 
-/// All who wait.
+/// All that wait.
 #[derive(Debug, Default)]
 pub(super) struct Awaiting {
     waiters: HashMap<MessageHandle, (JausId, Waiter)>,
@@ -40,32 +39,43 @@ impl Awaiting {
         }
     }
 
-    /// Tells whoever waits for it.
+    /// Tells the sender that waits for it.
     pub(super) fn handle_event(&mut self, event: &Event) {
-        let (Event::Acknowledged { message, .. } | Event::NotAcknowledged { message, .. }) = event
-        else {
-            return;
+        let (message, outcome) = match *event {
+            Event::Acknowledged { message, .. } => (message, Ok(())),
+            Event::NotAcknowledged {
+                message,
+                destination,
+                reason,
+                acknowledged,
+                length,
+            } => {
+                let undelivered = Undelivered::NotAcknowledged {
+                    destination,
+                    reason,
+                    acknowledged,
+                    length,
+                };
+                (message, Err(undelivered))
+            }
+            _ => return,
         };
-        match self.waiters.remove(message) {
+        match self.waiters.remove(&message) {
             Some((_, Waiter::Here(sender))) => {
-                // An error means that nobody waits any more.
-                let _ = sender.send(outcome(event));
+                // An error means that the sender waits no more.
+                let _ = sender.send(outcome);
             }
-            Some((_, Waiter::There { replies, handle })) => {
-                if let Some(reply) = reply(event, handle) {
-                    replies.push(reply);
-                }
-            }
+            Some((_, Waiter::There { answers, handle })) => answers.send(handle, outcome),
             None => {}
         }
     }
 
-    /// A component is gone, and nothing will be heard of its messages.
+    /// A component is gone, and with it its interest.
     pub(super) fn forget_source(&mut self, source: JausId) {
         self.waiters.retain(|_, (of, _)| *of != source);
     }
 
-    /// Nothing will be heard of any message.
+    /// No outcome of any message will be known.
     pub(super) fn clear(&mut self) {
         self.waiters.clear();
     }
@@ -77,44 +87,5 @@ impl Waiter {
             Self::Here(sender) => !sender.is_closed(),
             Self::There { .. } => true,
         }
-    }
-}
-
-fn outcome(event: &Event) -> Result<(), Undelivered> {
-    match *event {
-        Event::NotAcknowledged {
-            destination,
-            reason,
-            acknowledged,
-            length,
-            ..
-        } => Err(Undelivered::NotAcknowledged {
-            destination,
-            reason,
-            acknowledged,
-            length,
-        }),
-        _ => Ok(()),
-    }
-}
-
-fn reply(event: &Event, handle: u64) -> Option<Reply> {
-    let octets = |octets: usize| u32::try_from(octets).unwrap_or(u32::MAX);
-    match *event {
-        Event::NotAcknowledged {
-            destination,
-            reason,
-            acknowledged,
-            length,
-            ..
-        } => Some(Reply::NotAcknowledged {
-            handle,
-            destination,
-            reason,
-            acknowledged: octets(acknowledged),
-            length: octets(length),
-        }),
-        Event::Acknowledged { by, .. } => Some(Reply::Acknowledged { handle, by }),
-        _ => None,
     }
 }

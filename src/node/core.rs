@@ -11,12 +11,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant, SystemTime};
 
-use tokio::sync::{broadcast, watch};
+use tokio::sync::watch;
 
 use super::Config;
 use super::attendance::{Attendance, Departure};
 use super::awaiting::{Awaiting, Waiter};
 use super::error::SendError;
+use super::events::EventSender;
 use super::links::{Links, Survey};
 use super::mailbox::{Mailbox, MailboxLimits};
 use super::resident::Residents;
@@ -32,8 +33,6 @@ use crate::wire::Priority;
 
 /// Messages of one burst that are gathered to leave together.
 const BURST: usize = 64;
-/// Node events kept for a slow listener.
-const EVENTS: usize = 256;
 /// How long a node that shuts down tries to send what waits.
 pub(super) const LAST_WORDS: Duration = Duration::from_millis(250);
 
@@ -129,8 +128,7 @@ pub(super) struct Core {
     pub(super) attendance: Attendance,
     awaiting: Awaiting,
     limits: MailboxLimits,
-    /// Gone when the node has stopped, which ends the listeners' streams.
-    events: Option<broadcast::Sender<Event>>,
+    pub(super) events: EventSender<Event>,
     slab: Slab,
     pub(super) taps: Taps,
     /// Messages sent since the last [`pump`](Self::pump).
@@ -149,7 +147,7 @@ impl Core {
             attendance: Attendance::new(),
             awaiting: Awaiting::default(),
             limits,
-            events: Some(broadcast::Sender::new(EVENTS)),
+            events: EventSender::new(),
             slab: Slab::new(),
             taps: Taps::default(),
             gathered: 0,
@@ -222,13 +220,6 @@ impl Core {
 
     pub(super) const fn is_stopping(&self) -> bool {
         self.stop_at.is_some()
-    }
-
-    pub(super) fn subscribe(&self) -> broadcast::Receiver<Event> {
-        let ended = || broadcast::channel(1).1;
-        self.events
-            .as_ref()
-            .map_or_else(ended, broadcast::Sender::subscribe)
     }
 
     /// Sends a message; `waiter` is told what becomes of it, if it wants an acknowledgement.
@@ -341,10 +332,7 @@ impl Core {
     fn announce(&mut self) {
         while let Some(event) = self.endpoint.poll_event() {
             self.awaiting.handle_event(&event);
-            if let Some(events) = &self.events {
-                // Nobody listening is no error.
-                let _ = events.send(event);
-            }
+            self.events.send(event);
         }
     }
 
@@ -397,7 +385,7 @@ impl Core {
         }
         self.links.close();
         self.taps.end();
-        self.events = None;
+        self.events.end();
     }
 
     fn wake_driver(&mut self) {

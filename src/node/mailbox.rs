@@ -137,7 +137,7 @@ impl Mailbox {
     /// Waits until so many more messages fit, or none waits.
     pub(super) fn poll_room(&self, cx: &mut Context<'_>, messages: usize) -> Poll<()> {
         let mut inner = self.lock();
-        if inner.messages.is_empty() || inner.messages.has_room(messages) {
+        if inner.has_room(messages) {
             return Poll::Ready(());
         }
         match &inner.writer {
@@ -145,6 +145,11 @@ impl Mailbox {
             _ => inner.writer = Some(cx.waker().clone()),
         }
         Poll::Pending
+    }
+
+    /// Whether so many more messages fit, or none waits.
+    pub(super) fn has_room(&self, messages: usize) -> bool {
+        self.lock().has_room(messages)
     }
 
     /// Whether a message that is acknowledged stays until it is read: the other half of the room is
@@ -181,6 +186,10 @@ impl Mailbox {
 }
 
 impl Inner {
+    fn has_room(&self, messages: usize) -> bool {
+        self.messages.is_empty() || self.messages.has_room(messages)
+    }
+
     fn pop(&mut self) -> Option<Received> {
         let message = self.messages.pop();
         if let Some(writer) = self

@@ -39,6 +39,7 @@ mod config;
 mod core;
 mod driver;
 mod error;
+mod events;
 mod follower;
 mod host;
 mod link;
@@ -46,14 +47,11 @@ mod links;
 mod local;
 mod mailbox;
 mod port;
-mod replies;
 mod resident;
 mod tap;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
-
-use tokio::sync::broadcast;
 
 pub use self::attendance::{ComponentEvent, Departure};
 pub use self::config::{
@@ -61,6 +59,7 @@ pub use self::config::{
     Tcp, units,
 };
 pub use self::error::{HostError, SendError, StartError, Undelivered};
+pub use self::events::EventStream;
 pub use self::host::{Host, HostEvent, HostEvents};
 pub use self::mailbox::{MailboxCounters, MailboxLimits};
 pub use self::port::{Port, Sender};
@@ -73,11 +72,11 @@ use self::core::Shared;
 use self::driver::Driver;
 use self::follower::Follower;
 use self::links::Links;
-use self::local::Reception;
+use self::local::Server;
 use self::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
-use crate::link::local::Door;
+use crate::link::local::Listener;
 #[cfg(feature = "serial")]
 use crate::link::serial;
 use crate::link::{Interface, tcp, udp};
@@ -112,9 +111,9 @@ impl Node {
         config.validate()?;
         let runtime = tokio::runtime::Handle::try_current().map_err(|_| StartError::NoRuntime)?;
         let links = Links::open(&config)?;
-        let door = match &config.local {
+        let listener = match &config.local {
             Local::Off => None,
-            Local::At(address) => Some(Door::open(address)?),
+            Local::At(address) => Some(Listener::open(address)?),
         };
         let follows = links.follows();
         let shared = Arc::new(Shared::new(&config, links));
@@ -122,12 +121,13 @@ impl Node {
         if follows {
             runtime.spawn(Follower::new(shared.clone(), &config).run());
         }
-        let local_place = door.as_ref().map(|door| door.place().into());
-        if let Some(door) = door {
-            tracing::info!(place = door.place(), "components of this host may attach");
-            let node = (config.subsystem, config.node);
-            let reception = Reception::new(shared.clone(), node, config.max_message);
-            runtime.spawn(reception.open(door));
+        let local_place = listener.as_ref().map(|listener| listener.place().into());
+        if let Some(listener) = listener {
+            tracing::info!(
+                place = listener.place(),
+                "components of this host may attach"
+            );
+            runtime.spawn(Server::new(listener, shared.clone(), &config).run());
         }
         Ok(Self {
             config: Arc::new(config),
@@ -246,10 +246,10 @@ impl Node {
         core.mailboxes.iter().map(report).collect()
     }
 
-    /// News from now on about components: who comes, goes, or reads nothing.
+    /// Events from now on about components that attach, leave, or read nothing.
     #[must_use]
     pub fn component_events(&self) -> ComponentEvents {
-        ComponentEvents(self.shared().lock().attendance.subscribe())
+        self.shared().lock().attendance.events.subscribe()
     }
 
     /// A look at everything that passes the node from now on, and from which `limit` passages may
@@ -269,13 +269,10 @@ impl Node {
             .find_map(|(id, open)| (id == link).then(|| open.name()))
     }
 
-    /// News from now on: peers learned and moved, id conflicts, acknowledgements.
+    /// Events from now on: peers learned and moved, id conflicts, acknowledgements.
     #[must_use]
     pub fn events(&self) -> Events {
-        Events {
-            receiver: self.shared().lock().subscribe(),
-            missed: 0,
-        }
+        self.shared().lock().events.subscribe()
     }
 
     /// Stops the node: lets the components of this process stop what they move and release what they
@@ -353,46 +350,8 @@ pub struct LinkReport {
     pub kernel_drops: Option<u64>,
 }
 
-/// A listener to a node's news. One that falls behind by more than 256 misses the oldest.
-#[derive(Debug)]
-pub struct Events {
-    receiver: broadcast::Receiver<Event>,
-    missed: u64,
-}
+/// A listener to a node's [`Event`]s, until the node is gone.
+pub type Events = EventStream<Event>;
 
-impl Events {
-    /// Waits for the next event; `None` when the node is gone.
-    pub async fn recv(&mut self) -> Option<Event> {
-        loop {
-            match self.receiver.recv().await {
-                Ok(event) => return Some(event),
-                Err(broadcast::error::RecvError::Lagged(missed)) => self.missed += missed,
-                Err(broadcast::error::RecvError::Closed) => return None,
-            }
-        }
-    }
-
-    /// How many events this listener has missed.
-    #[must_use]
-    pub const fn missed(&self) -> u64 {
-        self.missed
-    }
-}
-
-/// A listener to the news about a node's components. One that falls behind by more than 256 misses
-/// the oldest.
-#[derive(Debug)]
-pub struct ComponentEvents(broadcast::Receiver<ComponentEvent>);
-
-impl ComponentEvents {
-    /// Waits for the next event; `None` when the node is gone.
-    pub async fn recv(&mut self) -> Option<ComponentEvent> {
-        loop {
-            match self.0.recv().await {
-                Ok(event) => return Some(event),
-                Err(broadcast::error::RecvError::Lagged(_)) => {}
-                Err(broadcast::error::RecvError::Closed) => return None,
-            }
-        }
-    }
-}
+/// A listener to the events of a node's components, until the node is gone.
+pub type ComponentEvents = EventStream<ComponentEvent>;

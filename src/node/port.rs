@@ -1,4 +1,4 @@
-//! A component's door to the node: it sends here and reads its mailbox. The node is in the same
+//! A component's port to the node: it sends here and reads its mailbox. The node is in the same
 //! process, or in another one of the same host.
 
 use std::any::Any;
@@ -10,7 +10,8 @@ use tokio::sync::oneshot;
 use super::attendance::Departure;
 use super::awaiting::Waiter;
 use super::core::Shared;
-use super::host::{HostEvents, Line};
+use super::events::EventSender;
+use super::host::{Client, HostEvents};
 use super::mailbox::{Mailbox, MailboxCounters};
 use super::resident::Resident;
 use super::{Guard, SendError, Undelivered};
@@ -39,9 +40,9 @@ impl Port {
         }
     }
 
-    pub(super) fn to_host(line: Arc<Line>) -> Self {
-        let (id, mailbox) = (line.id(), line.mailbox().clone());
-        let way = Way::Host(line);
+    pub(super) fn to_host(client: Arc<Client>) -> Self {
+        let (id, mailbox) = (client.id(), client.mailbox().clone());
+        let way = Way::Host(client);
         Self {
             sender: Sender { id, way },
             mailbox,
@@ -126,12 +127,12 @@ impl Port {
         self.sender.is_connected()
     }
 
-    /// News from now on about the line to the host's node; none for a node in the same process.
+    /// News from now on about the connection to the host's node; none for a node in the same process.
     #[must_use]
     pub fn host_events(&self) -> HostEvents {
         match &self.sender.way {
-            Way::Here(_) => HostEvents::none(),
-            Way::Host(line) => line.events(),
+            Way::Here(_) => EventSender::new().subscribe(),
+            Way::Host(client) => client.events(),
         }
     }
 }
@@ -143,7 +144,7 @@ impl Drop for Port {
                 let mut core = shared.lock();
                 core.detach(self.sender.id, &self.mailbox, Departure::Left);
             }
-            Way::Host(line) => line.leave(),
+            Way::Host(client) => client.leave(),
         }
     }
 }
@@ -159,7 +160,7 @@ pub struct Sender {
 #[derive(Clone, Debug)]
 enum Way {
     Here(Arc<Shared>),
-    Host(Arc<Line>),
+    Host(Arc<Client>),
 }
 
 impl Sender {
@@ -169,11 +170,12 @@ impl Sender {
         self.id
     }
 
-    /// Sends a message, up to the network's door: when this returns, the datagram is with the
-    /// operating system, or a local receiver has it in its mailbox. Of a burst that holds for the
-    /// first; the others leave together, as soon as the sender lets the node's task have a turn;
-    /// those above standard priority never wait. To the node of another process, when this returns the message is on its way there; what that node finds wrong
-    /// with it comes as [`HostEvent::Rejected`](super::HostEvent::Rejected).
+    /// Sends a message: when this returns, the datagram is with the operating system, or a local
+    /// receiver has it in its mailbox. Of a burst that holds for the first message; the others leave
+    /// together, as soon as the sender lets the node's task have a turn; those above standard
+    /// priority never wait. To the node of another process, the message is on its way when this
+    /// returns; what that node finds wrong with it comes as
+    /// [`HostEvent::Rejected`](super::HostEvent::Rejected).
     ///
     /// # Errors
     /// What the endpoint says is wrong with the message; also when its source is not this
@@ -183,7 +185,7 @@ impl Sender {
         self.check_source(&message)?;
         match &self.way {
             Way::Here(shared) => shared.lock().send(message, None),
-            Way::Host(line) => line.send(message, None),
+            Way::Host(client) => client.send(message, None),
         }
     }
 
@@ -198,7 +200,7 @@ impl Sender {
         let (tell, told) = oneshot::channel();
         match &self.way {
             Way::Here(shared) => shared.lock().send(message, Some(Waiter::Here(tell))),
-            Way::Host(line) => line.send(message, Some(tell)),
+            Way::Host(client) => client.send(message, Some(tell)),
         }?;
         told.await.unwrap_or(Err(Undelivered::Lost))
     }
@@ -206,8 +208,8 @@ impl Sender {
     /// Waits until the host's node has taken all that was sent. A node of the same process takes
     /// everything at once.
     pub async fn flushed(&self) {
-        if let Way::Host(line) = &self.way {
-            line.flushed().await;
+        if let Way::Host(client) = &self.way {
+            client.flushed().await;
         }
     }
 
@@ -216,7 +218,7 @@ impl Sender {
     pub fn is_connected(&self) -> bool {
         match &self.way {
             Way::Here(shared) => !*shared.stopped.borrow(),
-            Way::Host(line) => line.is_connected(),
+            Way::Host(client) => client.is_connected(),
         }
     }
 
@@ -229,7 +231,7 @@ impl Sender {
                 // An error cannot be: the sender is in what we hold.
                 let _ = stopped.wait_for(|stopped| *stopped).await;
             }
-            Way::Host(line) => line.disconnected().await,
+            Way::Host(client) => client.disconnected().await,
         }
     }
 

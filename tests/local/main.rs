@@ -10,7 +10,8 @@
 )]
 
 mod attaching;
-mod door;
+mod listener;
 mod place;
 mod processes;
+mod raw;
 mod records;

@@ -48,8 +48,8 @@ fn main() -> Result<()> {
         "narrow",
         &[&[1], &in_order.concat()],
     )?;
-    write(&corpus.join("local"), "component", &[&[0, 1], &component()])?;
-    write(&corpus.join("local"), "node", &[&[1, 30], &node()])?;
+    write(&corpus.join("local"), "component", &[&[1], &component()])?;
+    write(&corpus.join("local"), "node", &[&[30], &node()])?;
     for entry in jsidl::catalogue::entries() {
         let name = entry.path.replace('/', "-");
         write(
@@ -85,80 +85,69 @@ fn framed(payload: &[u8]) -> [Vec<u8>; 3] {
         .map(|framing| framing.encode(&frame).expect("a short message").into())
 }
 
-/// What a component says to its host's node: a greeting, a message, and a long one.
+/// What a component writes to its host's node: its first record, a message, and a long one.
 fn component() -> Vec<u8> {
     use jaus::address::JausId;
-    use jaus::link::local::record::{Hello, Request, Send, VERSION, Want};
-    use jaus::wire::{Broadcast, Priority};
-    let mut octets = Vec::new();
-    let want = Want::Id(JausId::new(101, 1, 33));
-    let name = "rover".to_owned();
-    let version = VERSION;
-    Request::Hello(Hello {
-        version,
-        want,
-        name,
-    })
-    .encode_head(&mut octets);
-    for payload in [vec![0x02, 0x22], vec![0x4D; 5000]] {
-        let send = Request::Send(Send {
+    use jaus::link::local::record::{Head, Record};
+    use jaus::wire::{Acknowledgement, Flags};
+    let flags = Flags::default().with_acknowledgement(Acknowledgement::Request);
+    let send = |payload: Vec<u8>| Record {
+        head: Head::Send {
+            flags,
             handle: 1,
             destination: JausId::new(101, 1, 1),
-            priority: Priority::High,
-            broadcast: Broadcast::None,
-            acknowledge: true,
-            payload: payload.into(),
-        });
-        if let Some(payload) = send.encode_head(&mut octets).cloned() {
-            octets.extend_from_slice(&payload);
-        }
-    }
-    Request::Leave.encode_head(&mut octets);
-    octets
+        },
+        payload: payload.into(),
+    };
+    records(&[
+        Record::hello(JausId::new(101, 1, 33), "rover"),
+        send(vec![0x02, 0x22]),
+        send(vec![0x4D; 5000]),
+        Head::Leave.into(),
+    ])
 }
 
-/// What the node says to a component: welcome, a message from the network, and outcomes.
+/// What the node writes to a component: welcome, a message from the network, and outcomes.
 fn node() -> Vec<u8> {
     use jaus::address::JausId;
     use jaus::endpoint::{LinkId, Path, Unacknowledged};
-    use jaus::link::local::record::{Delivery, Reply, Welcome};
-    use jaus::wire::{Broadcast, Priority};
+    use jaus::link::local::record::{Head, Outcome, Reason, Record};
+    use jaus::wire::Flags;
     let id = JausId::new(101, 1, 33);
     let peer = std::net::SocketAddr::from(([10, 0, 0, 2], 3794)).into();
-    let replies = [
-        Reply::Welcome(Welcome {
-            id,
-            max_message: 1 << 20,
-        }),
-        Reply::Deliver(Delivery {
-            source: JausId::new(42, 1, 1),
-            destination: id,
-            priority: Priority::Standard,
-            broadcast: Broadcast::Global,
-            path: Some(Path {
-                link: LinkId(0),
-                peer,
-            }),
+    let link = LinkId(0);
+    let deliver = Head::Deliver {
+        flags: Flags::default(),
+        source: JausId::new(42, 1, 1),
+        destination: id,
+        path: Some(Path { link, peer }),
+    };
+    let unacknowledged = Outcome::NotAcknowledged {
+        destination: id,
+        reason: Unacknowledged::TimedOut,
+        acknowledged: 5,
+        length: 10,
+    };
+    let outcome = |handle, outcome| Record::from(Head::Outcome { handle, outcome });
+    let max_message = 1 << 20;
+    records(&[
+        Head::Welcome { id, max_message }.into(),
+        Record {
+            head: deliver,
             payload: vec![0x02, 0x42].into(),
-        }),
-        Reply::Acknowledged { handle: 1, by: id },
-        Reply::NotAcknowledged {
-            handle: 2,
-            destination: id,
-            reason: Unacknowledged::TimedOut,
-            acknowledged: 5,
-            length: 10,
         },
-        Reply::Rejected {
-            handle: 3,
-            words: "no".to_owned(),
-        },
-    ];
+        outcome(1, Outcome::Acknowledged),
+        outcome(2, unacknowledged),
+        Record::rejected(3, "no"),
+        Record::refused(Reason::Taken, "no"),
+    ])
+}
+
+fn records(records: &[jaus::link::local::record::Record]) -> Vec<u8> {
     let mut octets = Vec::new();
-    for reply in &replies {
-        if let Some(payload) = reply.encode_head(&mut octets).cloned() {
-            octets.extend_from_slice(&payload);
-        }
+    for record in records {
+        record.encode_head(&mut octets);
+        octets.extend_from_slice(&record.payload);
     }
     octets
 }

@@ -1,154 +1,93 @@
-//! Whole records out of a stream of octets: they may come in any pieces.
-//!
-//! What arrives is looked at where it is; only the beginning of a record whose end is not there yet
-//! is kept. A large record gets a buffer of its own, into which the rest can be read directly and
-//! of which its payload then is a slice, so that a large message is copied by the kernel alone.
-//! Such a buffer grows with what arrives, whatever the record's head announces.
+//! Takes a stream apart into records.
 
-use bytes::Bytes;
+use bytes::{Buf, Bytes, BytesMut};
 
-use super::record::{LENGTH, RecordError};
+use super::record::{LENGTH, Record, RecordError};
 
-/// Records above so many octets get a buffer of their own.
-const LARGE: usize = 4096;
-/// A buffer grows by so many octets at least, and at most to twice what has arrived.
-const GROWTH: usize = 256 << 10;
+/// Up to this length a record is copied out of what was read, so that a small payload that is kept
+/// does not hold on to a large buffer. A longer one gets a buffer of its own.
+const COPIED: usize = 4096;
 
-/// The octets of one record, without its length.
-#[derive(Clone, Debug)]
-pub enum Body<'a> {
-    /// Somewhere in what was read; payloads are copied out.
-    Small(&'a [u8]),
-    /// In a buffer of its own; payloads are slices of it.
-    Large(Bytes),
-}
-
-impl Body<'_> {
-    /// All octets, beginning with the kind.
-    #[must_use]
-    pub fn octets(&self) -> &[u8] {
-        match self {
-            Self::Small(octets) => octets,
-            Self::Large(octets) => octets,
-        }
-    }
-
-    /// The octets from `at` on, to be kept.
-    pub(super) fn payload(&self, at: usize) -> Bytes {
-        match self {
-            Self::Small(octets) => Bytes::copy_from_slice(octets.get(at..).unwrap_or_default()),
-            Self::Large(octets) => octets.slice(at.min(octets.len())..),
-        }
-    }
-}
-
-/// Takes in pieces of a stream.
+/// Octets in, in any pieces; records out.
 #[derive(Debug)]
 pub struct Assembler {
     /// The longest record, in octets without its length.
     limit: usize,
-    /// The beginning of a small record, with its length.
-    begun: Vec<u8>,
-    large: Option<Large>,
-}
-
-/// The beginning of a large record, without its length.
-#[derive(Debug)]
-struct Large {
-    length: usize,
-    octets: Vec<u8>,
+    /// The octets that were not taken out yet, and behind them room for the rest of a long record.
+    buffer: BytesMut,
+    /// How many octets have arrived.
+    filled: usize,
 }
 
 impl Assembler {
-    /// One that takes records of at most `limit` octets.
+    /// For records of at most `limit` octets.
     #[must_use]
-    pub const fn new(limit: usize) -> Self {
+    pub fn new(limit: usize) -> Self {
         Self {
             limit,
-            begun: Vec::new(),
-            large: None,
+            buffer: BytesMut::new(),
+            filled: 0,
         }
     }
 
-    /// From now on records may be that long.
+    /// From now on records may have that many octets.
     pub const fn set_limit(&mut self, limit: usize) {
         self.limit = limit;
     }
 
-    /// The beginning of a record, after which the octets that come next must stand when all goes to
-    /// [`take`](Self::take). It is at most 4 KiB.
-    #[must_use]
-    pub fn begun(&self) -> &[u8] {
-        &self.begun
+    /// Takes in what has arrived.
+    pub fn append(&mut self, octets: &[u8]) {
+        self.buffer.truncate(self.filled);
+        self.buffer.extend_from_slice(octets);
+        self.filled = self.buffer.len();
     }
 
-    /// A buffer to which the next octets are best appended, if a large record has begun: so many
-    /// and not more. Then call [`filled`](Self::filled).
-    pub fn room(&mut self) -> Option<(&mut Vec<u8>, usize)> {
-        let large = self.large.as_mut()?;
-        let missing = large.length - large.octets.len();
-        let growth = missing.min(large.octets.len().max(GROWTH));
-        if large.octets.capacity() == large.octets.len() {
-            large.octets.reserve_exact(growth);
-        }
-        let room = large.octets.capacity() - large.octets.len();
-        Some((&mut large.octets, missing.min(room)))
+    /// If a long record has begun, where the rest of it is best read to. Then call
+    /// [`advance`](Self::advance).
+    pub fn room(&mut self) -> Option<&mut [u8]> {
+        let room = self.buffer.get_mut(self.filled..);
+        room.filter(|room| !room.is_empty())
     }
 
-    /// The large record, if all of it has come.
-    pub fn filled(&mut self) -> Option<Body<'static>> {
-        let whole = |large: &mut Large| large.octets.len() == large.length;
-        let large = self.large.take_if(whole)?;
-        Some(Body::Large(large.octets.into()))
+    /// So many octets of the room were filled.
+    pub fn advance(&mut self, octets: usize) {
+        self.filled = self.buffer.len().min(self.filled + octets);
     }
 
-    /// Takes octets in, and gives each whole record to `each`. What is left of a record that has
-    /// only begun is kept.
+    /// The next record, or `None` if it has not arrived in full. An assembler that waits for a new
+    /// record holds no memory.
     ///
     /// # Errors
-    /// A record that is too long, or what `each` says; then the stream cannot be read any further.
-    pub fn take<E: From<RecordError>>(
-        &mut self,
-        mut octets: &[u8],
-        mut each: impl FnMut(Body<'_>) -> Result<(), E>,
-    ) -> Result<(), E> {
-        while let Some((buffer, room)) = self.room() {
-            let now = octets.len().min(room);
-            buffer.extend_from_slice(&octets[..now]);
-            octets = &octets[now..];
-            match self.filled() {
-                Some(body) => each(body)?,
-                None if octets.is_empty() => return Ok(()),
-                None => {}
+    /// A record that is too long or cannot be read: nothing behind it can be trusted.
+    pub fn next_record(&mut self) -> Result<Option<Record>, RecordError> {
+        let Some(length) = self.buffer[..self.filled].first_chunk() else {
+            if self.filled == 0 {
+                self.buffer = BytesMut::new();
             }
+            return Ok(None);
+        };
+        let (length, limit) = (u32::from_le_bytes(*length) as usize, self.limit);
+        if length > limit {
+            return Err(RecordError::TooLong { length, limit });
         }
-        while let Some((head, rest)) = octets.split_first_chunk::<LENGTH>() {
-            let length = u32::from_le_bytes(*head) as usize;
-            if length > self.limit {
-                let limit = self.limit;
-                return Err(RecordError::TooLong { length, limit }.into());
+        let end = LENGTH + length;
+        if self.filled < end {
+            if length > COPIED && self.buffer.len() < end {
+                // Zeros from the operating system, which takes memory only for what is written.
+                let mut whole = BytesMut::zeroed(end);
+                whole[..self.filled].copy_from_slice(&self.buffer[..self.filled]);
+                self.buffer = whole;
             }
-            match rest.split_at_checked(length) {
-                Some((body, next)) => {
-                    each(Body::Small(body))?;
-                    octets = next;
-                }
-                None if length > LARGE => {
-                    self.begin_large(length, rest);
-                    return Ok(());
-                }
-                None => break,
-            }
+            return Ok(None);
         }
-        self.begun.clear();
-        self.begun.extend_from_slice(octets);
-        Ok(())
-    }
-
-    fn begin_large(&mut self, length: usize, beginning: &[u8]) {
-        let mut octets = Vec::with_capacity(length.min(GROWTH.max(2 * beginning.len())));
-        octets.extend_from_slice(beginning);
-        self.begun.clear();
-        self.large = Some(Large { length, octets });
+        self.filled -= end;
+        let octets = if length > COPIED {
+            self.buffer.split_to(end).freeze().slice(LENGTH..)
+        } else {
+            let octets = Bytes::copy_from_slice(&self.buffer[LENGTH..end]);
+            self.buffer.advance(end);
+            octets
+        };
+        Record::decode(octets).map(Some)
     }
 }

@@ -1,83 +1,279 @@
-//! The reading side of a connection: octets in, whole records out.
+//! A connection of the local link: records in, records out. Both sides use the same two halves.
 
 use std::cell::RefCell;
-use std::task::{Context, Poll, ready};
+use std::collections::VecDeque;
+use std::io::{self, IoSlice};
+use std::task::{Context, Poll, Waker, ready};
 
-use super::record::RecordError;
-use super::stream::ReadHalf;
-use super::{Assembler, Body, Error};
+use bytes::{Buf, Bytes};
 
-/// Octets read at once, unless a large record is on its way.
+use super::record::{Record, RecordError};
+use super::stream::{ReadHalf, WriteHalf};
+use super::{Assembler, Error};
+
+/// Octets read at once, unless a long record is on its way.
 const CHUNK: usize = 16 << 10;
+/// Payloads from so many octets on are written from where they are.
+const LARGE: usize = 8192;
+/// The most pieces given to the kernel at once.
+const PIECES: usize = 16;
+/// Octets collected before a sender writes them itself.
+const COLLECTED: usize = 16 << 10;
+/// Octets of memory that an idle connection keeps.
+const KEPT: usize = 1024;
 
 thread_local! {
-    /// What is read into. All connections of a thread share it, so that one on which nothing
-    /// happens has no buffer at all.
+    /// What is read into. All connections of a thread share it, so that an idle one has no buffer.
     static SHARED: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
-/// What is read from the other side.
+/// The half that is read.
 #[derive(Debug)]
-pub(crate) struct Connection {
+pub(crate) struct Reader {
     stream: ReadHalf,
     assembler: Assembler,
 }
 
-impl Connection {
-    /// A connection whose other side may say records of at most `limit` octets.
-    pub(crate) const fn new(stream: ReadHalf, limit: usize) -> Self {
-        Self {
-            stream,
-            assembler: Assembler::new(limit),
-        }
+impl Reader {
+    /// For records of at most `limit` octets.
+    pub(crate) fn new(stream: ReadHalf, limit: usize) -> Self {
+        let assembler = Assembler::new(limit);
+        Self { stream, assembler }
     }
 
-    /// From now on records may be that long.
+    /// From now on records may have that many octets.
     pub(crate) const fn set_limit(&mut self, limit: usize) {
         self.assembler.set_limit(limit);
     }
 
-    /// Reads once, and gives whole records to `each`. Pending if nothing has arrived.
-    pub(crate) fn poll_read(
-        &mut self,
-        cx: &mut Context<'_>,
-        mut each: impl FnMut(Body<'_>) -> Result<(), RecordError>,
-    ) -> Poll<Result<(), Error>> {
-        if let Some((buffer, missing)) = self.assembler.room() {
-            let read = ready!(self.stream.poll_append(cx, buffer, missing));
-            if read.map_err(failed)? == 0 {
-                return Poll::Ready(Err(Error::Closed));
-            }
-            if let Some(body) = self.assembler.filled() {
-                each(body)?;
-            }
-            return Poll::Ready(Ok(()));
-        }
-        let mut chunk = SHARED.take();
-        chunk.resize(CHUNK, 0);
-        let result = self.poll_chunk(cx, &mut chunk, each);
-        SHARED.set(chunk);
-        result
+    /// The next record of what was read, if it is whole.
+    pub(crate) fn next_record(&mut self) -> Result<Option<Record>, RecordError> {
+        self.assembler.next_record()
     }
 
-    fn poll_chunk(
-        &mut self,
-        cx: &mut Context<'_>,
-        chunk: &mut [u8],
-        each: impl FnMut(Body<'_>) -> Result<(), RecordError>,
-    ) -> Poll<Result<(), Error>> {
-        let begun = self.assembler.begun().len();
-        let (before, room) = chunk.split_at_mut(begun);
-        let read = ready!(self.stream.poll_read(cx, room)).map_err(failed)?;
-        if read == 0 {
-            return Poll::Ready(Err(Error::Closed));
+    /// Reads once. Pending if nothing has arrived.
+    pub(crate) fn poll_read(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Error>> {
+        let read = match self.assembler.room() {
+            Some(room) => {
+                let read = ready!(self.stream.poll_read(cx, room));
+                self.assembler.advance(*read.as_ref().unwrap_or(&0));
+                read
+            }
+            None => {
+                let mut chunk = SHARED.take();
+                chunk.resize(CHUNK, 0);
+                let read = self.stream.poll_read(cx, &mut chunk);
+                if let Poll::Ready(Ok(octets)) = read {
+                    self.assembler.append(&chunk[..octets]);
+                }
+                SHARED.set(chunk);
+                ready!(read)
+            }
+        };
+        Poll::Ready(match read {
+            Ok(0) => Err(Error::Closed),
+            Ok(_) => Ok(()),
+            Err(error) => Err(failed("reading from", error)),
+        })
+    }
+
+    /// Waits for the next record.
+    pub(crate) async fn read(&mut self) -> Result<Record, Error> {
+        loop {
+            if let Some(record) = self.next_record()? {
+                return Ok(record);
+            }
+            std::future::poll_fn(|cx| self.poll_read(cx)).await?;
         }
-        before.copy_from_slice(self.assembler.begun());
-        let taken = self.assembler.take(&chunk[..begun + read], each);
-        Poll::Ready(taken.map_err(Error::Record))
     }
 }
 
-fn failed(source: std::io::Error) -> Error {
-    Error::io("reading from the local link")(source)
+/// The half that is written: small records are collected, so that one call carries many; large
+/// payloads are not copied.
+#[derive(Debug, Default)]
+pub(crate) struct Writer {
+    /// `None` once it is closed.
+    stream: Option<WriteHalf>,
+    /// What goes first: finished collections and large payloads.
+    pieces: VecDeque<Bytes>,
+    /// The records collected after the last piece.
+    collected: Vec<u8>,
+    /// Octets of these that are written.
+    taken: usize,
+    /// Octets that wait.
+    waiting: usize,
+    /// Octets written since the connection stands.
+    written: u64,
+    /// Whether a sender has written since the task's turn.
+    had_turn: bool,
+    /// Whether the socket takes no more.
+    is_full: bool,
+    task: Option<Waker>,
+}
+
+impl Writer {
+    pub(crate) fn new(stream: WriteHalf) -> Self {
+        Self {
+            stream: Some(stream),
+            ..Self::default()
+        }
+    }
+
+    pub(crate) const fn is_open(&self) -> bool {
+        self.stream.is_some()
+    }
+
+    /// Octets that wait.
+    pub(crate) const fn len(&self) -> usize {
+        self.waiting
+    }
+
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.waiting == 0
+    }
+
+    /// Octets written since the connection stands.
+    pub(crate) const fn written(&self) -> u64 {
+        self.written
+    }
+
+    /// Queues a record; on a closed connection it is dropped.
+    pub(crate) fn queue(&mut self, record: &Record) {
+        if !self.is_open() {
+            return;
+        }
+        let before = self.collected.len();
+        record.encode_head(&mut self.collected);
+        self.waiting += self.collected.len() - before + record.payload.len();
+        if record.payload.len() < LARGE {
+            self.collected.extend_from_slice(&record.payload);
+            return;
+        }
+        let mut collected = Bytes::from(std::mem::take(&mut self.collected));
+        collected.advance(std::mem::take(&mut self.taken));
+        self.pieces.extend([collected, record.payload.clone()]);
+    }
+
+    /// Queues a record from outside the task that writes.
+    pub(crate) fn send(&mut self, record: &Record) {
+        self.queue(record);
+        self.wake_task();
+    }
+
+    /// The same, and perhaps writes what waits. The first after the task's turn does, the next ones
+    /// when enough has been collected: a burst costs a few calls and not one for each record.
+    pub(crate) fn send_now(&mut self, record: &Record) {
+        self.queue(record);
+        if !self.is_full && (!self.had_turn || self.waiting >= COLLECTED) {
+            self.had_turn = true;
+            // The task finds the error too, and knows what to do.
+            let _ = self.try_flush();
+        }
+        self.wake_task();
+    }
+
+    fn wake_task(&mut self) {
+        if let Some(task) = self.task.take() {
+            task.wake();
+        }
+    }
+
+    /// Writes as much as the socket takes; whether nothing waits any more.
+    pub(crate) fn try_flush(&mut self) -> Result<bool, Error> {
+        while !self.is_empty() {
+            match self.write() {
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                    self.is_full = true;
+                    return Ok(false);
+                }
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(failed("writing to", error)),
+                Ok(octets) => self.advance(octets),
+            }
+        }
+        self.is_full = false;
+        Ok(true)
+    }
+
+    /// Writes all, for the task that is woken by [`send`](Self::send) as well.
+    pub(crate) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Error>> {
+        self.await_more(cx);
+        loop {
+            if let Some(stream) = self.stream.as_mut().filter(|_| self.is_full) {
+                ready!(stream.poll_room(cx)).map_err(|error| failed("writing to", error))?;
+            }
+            if self.try_flush()? {
+                self.had_turn = false;
+                return Poll::Ready(Ok(()));
+            }
+        }
+    }
+
+    /// Writes all, for whoever alone has the connection.
+    pub(crate) async fn flush(&mut self) -> Result<(), Error> {
+        std::future::poll_fn(|cx| self.poll_flush(cx)).await
+    }
+
+    /// Has the task woken by the next [`send`](Self::send).
+    pub(crate) fn await_more(&mut self, cx: &Context<'_>) {
+        match &self.task {
+            Some(task) if task.will_wake(cx.waker()) => {}
+            _ => self.task = Some(cx.waker().clone()),
+        }
+    }
+
+    /// Drops what waits, and the connection.
+    pub(crate) fn close(&mut self) {
+        let task = self.task.take();
+        *self = Self {
+            task,
+            ..Self::default()
+        };
+    }
+
+    fn write(&self) -> io::Result<usize> {
+        let Some(stream) = &self.stream else {
+            return Err(io::ErrorKind::NotConnected.into());
+        };
+        let mut slices = [IoSlice::new(&[]); PIECES];
+        let collected = self.collected.get(self.taken..).unwrap_or_default();
+        let waiting = self.pieces.iter().map(|piece| &piece[..]);
+        let mut count = 0;
+        for (slice, piece) in slices.iter_mut().zip(waiting.chain([collected])) {
+            *slice = IoSlice::new(piece);
+            count += 1;
+        }
+        stream.try_write(&slices[..count])
+    }
+
+    fn advance(&mut self, mut octets: usize) {
+        self.waiting -= octets;
+        self.written += octets as u64;
+        while let Some(piece) = self.pieces.front_mut() {
+            if octets < piece.len() {
+                return piece.advance(octets);
+            }
+            octets -= piece.len();
+            self.pieces.pop_front();
+        }
+        self.taken += octets;
+        if self.waiting == 0 {
+            self.taken = 0;
+            self.collected.clear();
+            self.collected.shrink_to(KEPT);
+            self.pieces.shrink_to(PIECES);
+            if let Some(stream) = &mut self.stream {
+                stream.rest();
+            }
+        }
+    }
+}
+
+/// A connection that was reset is closed.
+fn failed(doing: &str, error: io::Error) -> Error {
+    use io::ErrorKind::{BrokenPipe, ConnectionReset};
+    match error.kind() {
+        BrokenPipe | ConnectionReset => Error::Closed,
+        _ => Error::io(format!("{doing} the local link"))(error),
+    }
 }

@@ -1,4 +1,4 @@
-//! What can go wrong on a local link, said so that a person can put it right.
+//! Errors of a local link, with their remedies.
 
 use std::io;
 use std::net::SocketAddr;
@@ -10,7 +10,7 @@ use super::record::RecordError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Nobody listens there.
+    /// No node listens there.
     #[error(
         "no node serves components at {place}: start one with `jaus node --local` (or `local = …` \
          in its settings), or give the component a node of its own"
@@ -52,10 +52,10 @@ pub enum Error {
         /// What to do.
         remedy: String,
     },
-    /// Whoever listens there belongs to another user, and could be anybody.
+    /// The process at the other end belongs to another user.
     #[error(
-        "what serves components at {place} belongs to user {uid} and not to us (user {own}) or \
-         root: attach as that user, or choose another address"
+        "the process at the other end of {place} belongs to user {uid}, not to our user {own} or \
+         root: run components and node as one user, or choose another address"
     )]
     Foreign {
         /// Where.
@@ -65,7 +65,7 @@ pub enum Error {
         /// Who we are.
         own: u32,
     },
-    /// The other side said something that is not in the protocol.
+    /// The other side wrote what is not in the protocol.
     #[error("the other side of the local link cannot be understood: {0}")]
     Record(#[from] RecordError),
     /// The other side is gone.

@@ -1,18 +1,17 @@
-//! The two kinds of stream that carry a local link, and who is at the other end.
+//! The two kinds of stream that carry a local link, and the process at the other end.
 
 use std::fmt;
-use std::io::{self, IoSlice};
-use std::pin::{Pin, pin};
-use std::task::{Context, Poll, ready};
+use std::io;
+use std::net::SocketAddr;
 
-use bytes::BufMut;
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, ReadBuf};
-use tokio::net::{TcpStream, tcp};
+use tokio::net::TcpStream;
 #[cfg(unix)]
 use tokio::net::{UnixStream, unix::UCred};
 
+#[cfg(not(unix))]
+pub(crate) use self::elsewhere::{ReadHalf, WriteHalf};
 #[cfg(unix)]
-use super::unix_stream::{UnixReadHalf, UnixWriteHalf, halves};
+pub(crate) use self::on_unix::{ReadHalf, WriteHalf};
 use super::{Address, Error, usual_place};
 
 /// The process at the other end.
@@ -36,106 +35,182 @@ impl fmt::Display for Process {
     }
 }
 
-/// Somebody at a node's door.
+/// Both halves of a stream, and the process at the other end where the operating system tells.
 #[derive(Debug)]
-pub(crate) struct Guest {
+pub(crate) struct Stream {
     pub(crate) read: ReadHalf,
     pub(crate) write: WriteHalf,
-    /// The number of its process, where the system tells.
     pub(crate) pid: Option<u32>,
 }
 
-/// The half of a stream that is read.
-#[derive(Debug)]
-pub(crate) enum ReadHalf {
-    #[cfg(unix)]
-    Unix(UnixReadHalf),
-    Tcp(tcp::OwnedReadHalf),
-}
+#[cfg(unix)]
+mod on_unix {
+    //! Sockets of either kind, watched [only for what is waited for](crate::link::watch).
 
-/// The half of a stream that is written. When it is dropped the other side sees the end.
-#[derive(Debug)]
-pub(crate) enum WriteHalf {
-    #[cfg(unix)]
-    Unix(UnixWriteHalf),
-    Tcp(tcp::OwnedWriteHalf),
-}
+    use std::io::{self, ErrorKind, IoSlice, Read, Write};
+    use std::net::Shutdown;
+    use std::sync::Arc;
+    use std::task::{Context, Poll, ready};
 
-impl ReadHalf {
-    /// Reads once; 0 octets mean the end.
-    pub(super) fn poll_read(
-        &mut self,
-        cx: &mut Context<'_>,
-        buffer: &mut [u8],
-    ) -> Poll<io::Result<usize>> {
-        match self {
-            #[cfg(unix)]
-            Self::Unix(stream) => stream.poll_read(cx, buffer),
-            Self::Tcp(stream) => {
-                let mut buffer = ReadBuf::new(buffer);
-                ready!(Pin::new(stream).poll_read(cx, &mut buffer))?;
-                Poll::Ready(Ok(buffer.filled().len()))
+    use socket2::Socket;
+    use tokio::io::Interest;
+    use tokio::io::unix::AsyncFd;
+
+    use super::Stream;
+    use crate::link::watch::watch;
+
+    /// The half of a stream that is read.
+    #[derive(Debug)]
+    pub(crate) struct ReadHalf(AsyncFd<Arc<Socket>>);
+
+    /// The half of a stream that is written.
+    #[derive(Debug)]
+    pub(crate) struct WriteHalf {
+        socket: Arc<Socket>,
+        /// What is waited for while the socket is full.
+        full: Option<AsyncFd<Socket>>,
+    }
+
+    impl Stream {
+        pub(super) fn new(socket: impl Into<Socket>, pid: Option<u32>) -> io::Result<Self> {
+            let socket = Arc::new(socket.into());
+            Ok(Self {
+                read: ReadHalf(watch(socket.clone(), Interest::READABLE)?),
+                write: WriteHalf { socket, full: None },
+                pid,
+            })
+        }
+    }
+
+    impl ReadHalf {
+        /// Reads once; 0 octets mean the end.
+        pub(in super::super) fn poll_read(
+            &mut self,
+            cx: &mut Context<'_>,
+            room: &mut [u8],
+        ) -> Poll<io::Result<usize>> {
+            loop {
+                let mut ready = ready!(self.0.poll_read_ready(cx))?;
+                let Ok(read) = ready.try_io(|socket| (&**socket.get_ref()).read(room)) else {
+                    continue;
+                };
+                match read {
+                    Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                    // It is empty now; the kernel tells of whatever comes, also of the end.
+                    Ok(octets) if octets < room.len() => ready.clear_ready(),
+                    _ => {}
+                }
+                return Poll::Ready(read);
             }
         }
     }
 
-    /// Appends up to `most` octets to a buffer, which should have room for them; 0 mean the end.
-    pub(super) fn poll_append(
-        &mut self,
-        cx: &mut Context<'_>,
-        buffer: &mut Vec<u8>,
-        most: usize,
-    ) -> Poll<io::Result<usize>> {
-        match self {
-            #[cfg(unix)]
-            Self::Unix(stream) => stream.poll_append(cx, buffer, most),
-            Self::Tcp(stream) => pin!(stream.read_buf(&mut buffer.limit(most))).poll(cx),
+    impl WriteHalf {
+        /// Writes as much as can be written without waiting.
+        pub(in super::super) fn try_write(&self, pieces: &[IoSlice<'_>]) -> io::Result<usize> {
+            let mut socket = &*self.socket;
+            match pieces {
+                [piece] => socket.write(piece),
+                pieces => socket.write_vectored(pieces),
+            }
+        }
+
+        /// Waits until a socket that was full may have room again.
+        pub(in super::super) fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+            let full = match &mut self.full {
+                Some(full) => full,
+                none => none.insert(watch(self.socket.try_clone()?, Interest::WRITABLE)?),
+            };
+            full.poll_write_ready(cx)
+                .map_ok(|mut ready| ready.clear_ready())
+        }
+
+        /// Nothing waits to be written any more.
+        pub(in super::super) fn rest(&mut self) {
+            self.full = None;
+        }
+    }
+
+    impl Drop for WriteHalf {
+        /// The other side shall see the end, even while the half that is read is still held.
+        fn drop(&mut self) {
+            // An error means that it is closed already.
+            let _ = self.socket.shutdown(Shutdown::Both);
         }
     }
 }
 
-impl WriteHalf {
-    /// Writes as much as can be written without waiting.
-    pub(super) fn try_write(&self, pieces: &[IoSlice<'_>]) -> io::Result<usize> {
-        match self {
-            #[cfg(unix)]
-            Self::Unix(stream) => stream.try_write(pieces),
-            Self::Tcp(stream) => stream.try_write_vectored(pieces),
+#[cfg(not(unix))]
+mod elsewhere {
+    //! TCP sockets, as the runtime has them.
+
+    use std::io::{self, IoSlice};
+    use std::pin::Pin;
+    use std::task::{Context, Poll, ready};
+
+    use tokio::io::{AsyncRead, ReadBuf};
+    use tokio::net::{TcpStream, tcp};
+
+    use super::Stream;
+
+    /// The half of a stream that is read.
+    #[derive(Debug)]
+    pub(crate) struct ReadHalf(tcp::OwnedReadHalf);
+
+    /// The half of a stream that is written.
+    #[derive(Debug)]
+    pub(crate) struct WriteHalf(tcp::OwnedWriteHalf);
+
+    impl Stream {
+        pub(super) fn new(stream: std::net::TcpStream, pid: Option<u32>) -> io::Result<Self> {
+            let (read, write) = TcpStream::from_std(stream)?.into_split();
+            let (read, write) = (ReadHalf(read), WriteHalf(write));
+            Ok(Self { read, write, pid })
         }
     }
 
-    pub(super) fn poll_write(
-        &mut self,
-        cx: &mut Context<'_>,
-        pieces: &[IoSlice<'_>],
-    ) -> Poll<io::Result<usize>> {
-        match self {
-            #[cfg(unix)]
-            Self::Unix(stream) => stream.poll_write(cx, pieces),
-            Self::Tcp(stream) => Pin::new(stream).poll_write_vectored(cx, pieces),
+    impl ReadHalf {
+        /// Reads once; 0 octets mean the end.
+        pub(in super::super) fn poll_read(
+            &mut self,
+            cx: &mut Context<'_>,
+            room: &mut [u8],
+        ) -> Poll<io::Result<usize>> {
+            let mut room = ReadBuf::new(room);
+            ready!(Pin::new(&mut self.0).poll_read(cx, &mut room))?;
+            Poll::Ready(Ok(room.filled().len()))
         }
     }
 
-    /// Nothing waits to be written any more.
-    pub(super) fn rest(&mut self) {
-        #[cfg(unix)]
-        if let Self::Unix(stream) = self {
-            stream.rest();
+    impl WriteHalf {
+        /// Writes as much as can be written without waiting.
+        pub(in super::super) fn try_write(&self, pieces: &[IoSlice<'_>]) -> io::Result<usize> {
+            self.0.try_write_vectored(pieces)
         }
+
+        /// Waits until a socket that was full may have room again.
+        pub(in super::super) fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+            self.0.as_ref().poll_write_ready(cx)
+        }
+
+        /// Nothing waits to be written any more.
+        pub(in super::super) fn rest(&mut self) {}
     }
 }
 
-#[cfg(unix)]
-pub(super) fn unix_halves(stream: UnixStream) -> Result<(ReadHalf, WriteHalf), Error> {
-    let (read, write) = halves(stream).map_err(Error::io("taking up a local connection"))?;
-    Ok((ReadHalf::Unix(read), WriteHalf::Unix(write)))
-}
-
-pub(super) fn tcp_halves(stream: TcpStream) -> (ReadHalf, WriteHalf) {
+/// Both halves of a TCP stream.
+pub(super) fn tcp_stream(stream: TcpStream) -> io::Result<Stream> {
     // Records are collected before they are written; waiting for more would only delay them.
     let _ = stream.set_nodelay(true);
-    let (read, write) = stream.into_split();
-    (ReadHalf::Tcp(read), WriteHalf::Tcp(write))
+    Stream::new(stream.into_std()?, None)
+}
+
+/// Both halves of a Unix stream, and the user at the other end.
+#[cfg(unix)]
+pub(super) fn unix_stream(stream: UnixStream) -> io::Result<(Stream, u32)> {
+    let peer = stream.peer_cred()?;
+    let stream = Stream::new(stream.into_std()?, pid_of(&peer))?;
+    Ok((stream, peer.uid()))
 }
 
 /// The number of the process at the other end, as credentials tell it.
@@ -147,7 +222,7 @@ pub(super) fn pid_of(credentials: &UCred) -> Option<u32> {
 }
 
 /// Reaches the node that serves components at an address.
-pub(crate) async fn connect(address: &Address) -> Result<(ReadHalf, WriteHalf), Error> {
+pub(crate) async fn connect(address: &Address) -> Result<Stream, Error> {
     match address {
         #[cfg(unix)]
         Address::Default => connect_unix(&usual_place::path()?).await,
@@ -162,36 +237,29 @@ pub(crate) async fn connect(address: &Address) -> Result<(ReadHalf, WriteHalf), 
 }
 
 #[cfg(unix)]
-async fn connect_unix(path: &std::path::Path) -> Result<(ReadHalf, WriteHalf), Error> {
-    use io::ErrorKind::{ConnectionRefused, NotFound};
-    let place = || path.display().to_string();
-    let stream = UnixStream::connect(path).await;
-    let stream = stream.map_err(|source| match source.kind() {
-        ConnectionRefused | NotFound => Error::NoNode { place: place() },
-        _ => Error::io(format!("connecting to {}", path.display()))(source),
-    })?;
-    let credentials = stream
-        .peer_cred()
-        .map_err(Error::io("asking the system whose node that is"))?;
-    let (uid, own) = (credentials.uid(), usual_place::own_uid()?);
-    // Root may do everything, also trust whom it likes.
+async fn connect_unix(path: &std::path::Path) -> Result<Stream, Error> {
+    let place = path.display().to_string();
+    let stream = UnixStream::connect(path).await.and_then(unix_stream);
+    let (stream, uid) = stream.map_err(|error| unreachable(&place, error))?;
+    let own = usual_place::own_uid()?;
+    // Root may do everything, also trust any user.
     if uid != own && uid != 0 && own != 0 {
-        return Err(Error::Foreign {
-            place: place(),
-            uid,
-            own,
-        });
+        return Err(Error::Foreign { place, uid, own });
     }
-    unix_halves(stream)
+    Ok(stream)
 }
 
-async fn connect_tcp(port: std::net::SocketAddr) -> Result<(ReadHalf, WriteHalf), Error> {
-    let stream = TcpStream::connect(port).await;
-    let stream = stream.map_err(|source| match source.kind() {
-        io::ErrorKind::ConnectionRefused => Error::NoNode {
-            place: port.to_string(),
+async fn connect_tcp(port: SocketAddr) -> Result<Stream, Error> {
+    let stream = TcpStream::connect(port).await.and_then(tcp_stream);
+    stream.map_err(|error| unreachable(&port.to_string(), error))
+}
+
+fn unreachable(place: &str, error: io::Error) -> Error {
+    use io::ErrorKind::{ConnectionRefused, NotFound};
+    match error.kind() {
+        ConnectionRefused | NotFound => Error::NoNode {
+            place: place.to_owned(),
         },
-        _ => Error::io(format!("connecting to {port}"))(source),
-    })?;
-    Ok(tcp_halves(stream))
+        _ => Error::io(format!("connecting to {place}"))(error),
+    }
 }

@@ -1,5 +1,5 @@
-//! The component's side of the [local link](crate::link::local): a component that lives on the node
-//! of this host, which another process runs.
+//! The component's side of the [local link](crate::link::local): a component on the node of this
+//! host, which another process runs.
 //!
 //! ```no_run
 //! use jaus::component::{Component, Kind};
@@ -13,30 +13,29 @@
 //! # }
 //! ```
 //!
-//! A port to a host's node is used like one to a node of one's own. It outlives the node: when that
-//! ends or crashes, the component goes on, with all that it knows; what it sends meanwhile is an
-//! error, and as soon as a node is back it has its id there again.
+//! A port to a host's node is used like one to a node of the same process. It outlives the node: when
+//! that ends or crashes, the component goes on, with all that it knows; sending is an error
+//! meanwhile, and as soon as a node is back it has its id there again.
 #![expect(
     clippy::disallowed_methods,
-    reason = "here the line to the node gets its task and its patience"
+    reason = "the connection to the node has a task and timeouts"
 )]
 
-mod line;
-mod task;
+mod client;
 
 use std::time::Duration;
 
-pub(super) use self::line::Line;
-pub use self::line::{HostEvent, HostEvents};
-use self::task::Task;
+pub(super) use self::client::Client;
+use super::events::EventStream;
 use super::mailbox::MailboxLimits;
 use super::{HostError, Port};
 use crate::address::JausId;
-use crate::link::local::record::{Hello, LONGEST, Refusal, Reply, Request, VERSION, Want, Welcome};
-use crate::link::local::{Address, Connection, Error, Outbox, WriteHalf, connect};
+use crate::endpoint::MessageHandle;
+use crate::link::local::record::{Head, LONGEST_HEAD, LONGEST_MESSAGE, Record, RecordError};
+use crate::link::local::{Address, Error, Reader, Writer, connect};
 
-/// How long a node may take to answer a greeting.
-const GREETING: Duration = Duration::from_secs(5);
+/// How long a node may take to answer a component's first record.
+const HANDSHAKE: Duration = Duration::from_secs(5);
 
 /// The node of this host, as a component of another process reaches it.
 #[derive(Clone, Debug, Default)]
@@ -46,14 +45,42 @@ pub struct Host {
     limits: MailboxLimits,
 }
 
-/// A connection on which the node has taken the component in.
+/// An event of a component's connection to its host's node.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum HostEvent {
+    /// The node is gone. The component tries to reach it again, or its successor.
+    Lost {
+        /// As far as is known.
+        why: String,
+    },
+    /// A node is there and refuses the component, for instance because another one has taken its
+    /// id. The component goes on trying.
+    Refused {
+        /// In the node's words.
+        why: String,
+    },
+    /// The component is attached again.
+    Back,
+    /// The node did not send a message that the component had sent without waiting for delivery.
+    Rejected {
+        /// The message.
+        message: MessageHandle,
+        /// In the node's words.
+        why: String,
+    },
+}
+
+/// A listener to [`HostEvent`]s, until the component is detached.
+pub type HostEvents = EventStream<HostEvent>;
+
+/// A connection on which the node has attached the component.
 #[derive(Debug)]
 struct Attached {
-    welcome: Welcome,
-    connection: Connection,
-    write: WriteHalf,
-    /// What the node said with its welcome.
-    early: Vec<Reply>,
+    id: JausId,
+    max_message: usize,
+    reader: Reader,
+    writer: Writer,
 }
 
 impl Host {
@@ -66,7 +93,7 @@ impl Host {
         }
     }
 
-    /// What the component's process calls itself; without this, by its program's name.
+    /// The name of the component's process, for people; the default is the program's.
     #[must_use]
     pub fn name(mut self, name: impl Into<String>) -> Self {
         self.name = Some(name.into());
@@ -84,9 +111,9 @@ impl Host {
     /// [port's](Port::id).
     ///
     /// # Errors
-    /// [`HostError`] says why the node cannot be reached, or does not want the component.
+    /// [`HostError`] says why the node cannot be reached, or refuses the component.
     pub async fn attach(&self, component: u8) -> Result<Port, HostError> {
-        self.attach_wanted(Want::Component(component)).await
+        self.attach_as(JausId::new(0, 0, component)).await
     }
 
     /// Attaches a component by its full id, which must be one of the node's.
@@ -94,62 +121,38 @@ impl Host {
     /// # Errors
     /// Those of [`attach`](Self::attach).
     pub async fn attach_as(&self, id: JausId) -> Result<Port, HostError> {
-        self.attach_wanted(Want::Id(id)).await
+        Ok(Port::to_host(Client::start(
+            self.clone(),
+            self.shake_hands(id).await?,
+        )))
     }
 
-    async fn attach_wanted(&self, want: Want) -> Result<Port, HostError> {
-        let attached = self.greet(want).await?;
-        let task = Task::new(self.clone(), attached);
-        let line = task.line();
-        tokio::spawn(task.run());
-        Ok(Port::to_host(line))
-    }
-
-    async fn greet(&self, want: Want) -> Result<Attached, HostError> {
-        let (read, mut write) = connect(&self.address).await?;
-        let mut connection = Connection::new(read, LONGEST);
-        let mut outbox = Outbox::default();
-        outbox.request(&Request::Hello(Hello {
-            version: VERSION,
-            want,
-            name: self.own_name(),
-        }));
-        let mut early = Vec::new();
-        let greeting = async {
-            let said = std::future::poll_fn(|cx| outbox.poll_flush(&mut write, cx));
-            said.await.map_err(Error::io("greeting the node"))?;
-            while early.is_empty() {
-                let read = std::future::poll_fn(|cx| {
-                    connection.poll_read(cx, |body| {
-                        early.push(Reply::decode(&body)?);
-                        Ok(())
-                    })
-                });
-                read.await?;
-            }
-            Ok::<_, Error>(())
+    async fn shake_hands(&self, id: JausId) -> Result<Attached, HostError> {
+        let stream = connect(&self.address).await?;
+        let mut reader = Reader::new(stream.read, LONGEST_MESSAGE + LONGEST_HEAD);
+        let mut writer = Writer::new(stream.write);
+        writer.queue(&Record::hello(id, &self.own_name()));
+        let answer = async {
+            writer.flush().await?;
+            reader.read().await
         };
-        match tokio::time::timeout(GREETING, greeting).await {
-            Ok(result) => result?,
-            Err(_) => {
-                let place = self.address.to_string();
-                return Err(Error::Mute { place }.into());
-            }
-        }
-        match early.remove(0) {
-            Reply::Welcome(welcome) => Ok(Attached {
-                welcome,
-                connection,
-                write,
-                early,
+        let answer = tokio::time::timeout(HANDSHAKE, answer).await;
+        let answer = answer.map_err(|_| Error::Mute {
+            place: self.address.to_string(),
+        })??;
+        match answer.head {
+            Head::Welcome { id, max_message } => Ok(Attached {
+                id,
+                max_message: max_message as usize,
+                reader,
+                writer,
             }),
-            Reply::Refused(Refusal { reason, words }) => Err(HostError::Refused { reason, words }),
-            _ => Err(Error::from(crate::link::local::record::RecordError::Stranger).into()),
+            Head::Refused(reason) => Err(HostError::Refused {
+                reason,
+                words: answer.text(),
+            }),
+            _ => Err(Error::Record(RecordError::Unexpected).into()),
         }
-    }
-
-    async fn greet_again(&self, id: JausId) -> Result<Attached, HostError> {
-        self.greet(Want::Id(id)).await
     }
 
     fn own_name(&self) -> String {

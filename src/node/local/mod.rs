@@ -1,11 +1,11 @@
-//! The node's side of the [local link](crate::link::local): who comes in, and as whom.
+//! The node's side of the [local link](crate::link::local): which components attach, and as whom.
 //!
-//! One task waits at the door; each component has a [session](session) in a task of its own, so
-//! that a stuck one holds up nobody. To the endpoint they are components like those of the node's
-//! own process.
+//! One task accepts connections; each component has a [session] in a task of its own, so that a
+//! stuck one holds up no other. To the endpoint they are components like those of the node's own
+//! process.
 #![expect(
     clippy::disallowed_methods,
-    reason = "the node gives guests a task and little time to greet"
+    reason = "sessions get tasks, and components little time for their first record"
 )]
 
 mod session;
@@ -14,7 +14,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::Semaphore;
+use tokio::time::timeout;
 
+pub(super) use self::session::Answers;
 use self::session::Session;
 use super::attendance::{ComponentEvent, Departure};
 use super::core::Shared;
@@ -22,114 +24,135 @@ use super::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::AttachError;
 use crate::link::local::record::{
-    self, Hello, LONGEST_HELLO, Reason, Refusal, Reply, Request, VERSION, Want, Welcome,
+    Head, LONGEST_HEAD, LONGEST_HELLO, Reason, Record, RecordError, VERSION,
 };
-use crate::link::local::{Connection, Door, Error, Guest, Outbox, Process, WriteHalf};
+use crate::link::local::{Error, Listener, Process, Reader, Stream, Writer};
 
-/// Guests that may stand in the door without having said who they are.
-const UNGREETED: usize = 32;
-/// How long they may stand there.
-const GREETING: Duration = Duration::from_secs(5);
+/// Connections whose component has not been attached yet.
+const UNATTACHED: usize = 32;
+/// How long a component may take to write its first record, and to read why it is refused.
+const HANDSHAKE: Duration = Duration::from_secs(5);
 /// How long the id of a component that has just died may still seem taken: its end and its
-/// successor's greeting can be noticed in either order.
+/// successor's first record can be noticed in either order.
 const OVERLAP: Duration = Duration::from_millis(200);
 
-/// What sessions need to know about the node.
+/// Accepts components until the node has stopped.
 #[derive(Debug)]
-pub(super) struct Reception {
-    shared: Arc<Shared>,
-    /// The id of component 0, so to speak.
-    node: (u16, u8),
-    max_message: usize,
+pub(super) struct Server {
+    listener: Listener,
+    registrar: Registrar,
+    _closed: SignalClosed,
 }
 
-impl Reception {
-    pub(super) const fn new(shared: Arc<Shared>, node: (u16, u8), max_message: usize) -> Self {
+/// What is to be known of the node to attach a component.
+#[derive(Clone, Debug)]
+struct Registrar {
+    shared: Arc<Shared>,
+    subsystem: u16,
+    node: u8,
+    max_message: u32,
+}
+
+/// Signals that the listener is closed, after which it is dropped: the next node of this host may
+/// want its place.
+#[derive(Debug)]
+struct SignalClosed(Arc<Shared>);
+
+impl Drop for SignalClosed {
+    fn drop(&mut self) {
+        self.0.closed.send_replace(true);
+    }
+}
+
+/// Why a component is not attached.
+type Refusal = (Reason, String);
+
+impl Server {
+    pub(super) fn new(listener: Listener, shared: Arc<Shared>, config: &super::Config) -> Self {
+        shared.closed.send_replace(false);
         Self {
-            shared,
-            node,
-            max_message,
+            listener,
+            registrar: Registrar {
+                shared: shared.clone(),
+                subsystem: config.subsystem,
+                node: config.node,
+                max_message: u32::try_from(config.max_message).unwrap_or(u32::MAX),
+            },
+            _closed: SignalClosed(shared),
         }
     }
 
-    /// Opens the door; who serves guests at it until the node has stopped.
-    pub(super) fn open(self, door: Door) -> impl Future<Output = ()> + use<> {
-        let open = OpenDoor::new(door, self.shared.clone());
-        self.serve(open)
-    }
-
-    async fn serve(self, open: OpenDoor) {
-        let mut stopped = self.shared.stopped.subscribe();
-        let this = Arc::new(self);
-        let ungreeted = Arc::new(Semaphore::new(UNGREETED));
-        loop {
-            let Ok(permit) = ungreeted.clone().acquire_owned().await else {
-                return;
-            };
-            let guest = tokio::select! {
-                guest = open.door.accept() => guest,
+    pub(super) async fn run(self) {
+        let mut stopped = self.registrar.shared.stopped.subscribe();
+        let unattached = Arc::new(Semaphore::new(UNATTACHED));
+        while let Ok(permit) = unattached.clone().acquire_owned().await {
+            let accepted = tokio::select! {
+                accepted = self.listener.accept() => accepted,
                 _ = stopped.wait_for(|stopped| *stopped) => return,
             };
-            match guest {
-                Ok(guest) => {
-                    let this = this.clone();
+            match accepted {
+                Ok(stream) => {
+                    let registrar = self.registrar.clone();
                     tokio::spawn(async move {
-                        let session = this.greet(guest).await;
+                        let attached = registrar.attach(stream).await;
                         drop(permit);
-                        if let Some(session) = session {
-                            session.run().await;
+                        if let Some((session, reader)) = attached {
+                            session.run(reader).await;
                         }
                     });
                 }
                 Err(error) => {
-                    tracing::warn!(%error, "somebody did not get in");
-                    // Out of file descriptors, perhaps; it must not be tried without pause.
+                    tracing::warn!(%error, "a component could not be accepted");
+                    // Such as too many open files: not at once again.
                     if matches!(error, Error::Io { .. }) {
-                        tokio::time::sleep(Duration::from_millis(100)).await;
+                        tokio::time::sleep(OVERLAP).await;
                     }
                 }
             }
         }
     }
+}
 
-    /// Asks a guest who it is, and takes it in or sends it away.
-    async fn greet(&self, guest: Guest) -> Option<Session> {
-        let Guest { read, write, pid } = guest;
-        let mut connection = Connection::new(read, LONGEST_HELLO);
-        let hello = tokio::time::timeout(GREETING, hear(&mut connection)).await;
-        let hello = match hello {
+impl Registrar {
+    /// Attaches the component at the other end of a connection, or tells it why not.
+    async fn attach(&self, stream: Stream) -> Option<(Session, Reader)> {
+        let Stream { read, write, pid } = stream;
+        let (mut reader, mut writer) = (Reader::new(read, LONGEST_HELLO), Writer::new(write));
+        let hello = async {
+            let record = reader.read().await?;
+            match record.head {
+                Head::Hello { version, id } => Ok((version, id, record.text())),
+                _ => Err(Error::Record(RecordError::Unexpected)),
+            }
+        };
+        let (version, id, name) = match timeout(HANDSHAKE, hello).await {
             Ok(Ok(hello)) => hello,
             Ok(Err(error)) => {
-                tracing::warn!(?pid, %error, "somebody at the local link is no component");
+                tracing::warn!(?pid, %error, "a connection to the local link is no component's");
                 return None;
             }
             Err(_) => {
-                tracing::warn!(?pid, "somebody at the local link says nothing");
+                tracing::warn!(?pid, "a connection to the local link is silent");
                 return None;
             }
         };
-        let process = Process {
-            pid,
-            name: hello.name.clone(),
-        };
-        let mut write = write;
-        match self.admit(&hello, &process).await {
+        let process = Process { pid, name };
+        match self.admit(version, id, &process).await {
             Ok((id, mailbox)) => {
-                connection.set_limit(self.max_message + record::LONGEST - record::LONGEST_MESSAGE);
-                let welcome = Welcome {
-                    id,
-                    max_message: u32::try_from(self.max_message).unwrap_or(u32::MAX),
-                };
-                let session =
-                    Session::new(self.shared.clone(), connection, write, id, process, mailbox);
-                Some(session.with(&Reply::Welcome(welcome)))
+                let max_message = self.max_message;
+                reader.set_limit(max_message as usize + LONGEST_HEAD);
+                writer.queue(&Head::Welcome { id, max_message }.into());
+                let shared = self.shared.clone();
+                let session = Session::new(shared, writer, id, process, mailbox);
+                Some((session, reader))
             }
-            Err(refusal) => {
-                tracing::warn!(%process, why = refusal.words, "component refused");
-                let why = refusal.words.clone();
+            Err((reason, why)) => {
+                tracing::warn!(%process, why, "component refused");
+                writer.queue(&Record::refused(reason, &why));
                 let event = ComponentEvent::Refused { process, why };
-                self.shared.lock().attendance.announce(event);
-                say(&mut write, Reply::Refused(refusal)).await;
+                self.shared.lock().attendance.events.send(event);
+                // A component that does not read it cannot be told.
+                let _ = timeout(HANDSHAKE, writer.flush()).await;
                 None
             }
         }
@@ -137,16 +160,17 @@ impl Reception {
 
     async fn admit(
         &self,
-        hello: &Hello,
+        version: u8,
+        wanted: JausId,
         process: &Process,
     ) -> Result<(JausId, Arc<Mailbox>), Refusal> {
-        let id = self.wanted_id(hello)?;
+        let id = self.full_id(version, wanted)?;
         let deadline = tokio::time::Instant::now() + OVERLAP;
         loop {
             let (error, holder) = {
                 let mut core = self.shared.lock();
                 if core.is_stopping() {
-                    return Err(refusal(Reason::Stopping, "the node is about to stop"));
+                    return Err((Reason::Stopping, "the node is about to stop".to_owned()));
                 }
                 match core.attach(id, Some(process.clone())) {
                     Ok(mailbox) => return Ok((id, mailbox)),
@@ -155,119 +179,57 @@ impl Reception {
             };
             let may_be_dead = matches!(error, AttachError::AlreadyAttached(_)) && holder.is_some();
             if !may_be_dead || tokio::time::Instant::now() >= deadline {
-                return Err(refused(error, holder));
+                return Err(refusal(&error, holder));
             }
             tokio::time::sleep(OVERLAP / 10).await;
         }
     }
 
-    fn wanted_id(&self, hello: &Hello) -> Result<JausId, Refusal> {
-        if hello.version != VERSION {
-            let words = format!(
-                "the component speaks version {} of the local link's protocol, the node version \
-                 {VERSION}: build both with the same release",
-                hello.version
+    /// The id that a component is to have.
+    fn full_id(&self, version: u8, wanted: JausId) -> Result<JausId, Refusal> {
+        if version != VERSION {
+            let why = format!(
+                "the component speaks version {version} of the local link's protocol, the node \
+                 version {VERSION}: build both with the same release"
             );
-            return Err(refusal(Reason::Version, words));
+            return Err((Reason::Version, why));
         }
-        let (subsystem, node) = self.node;
-        match hello.want {
-            Want::Component(number) => Ok(JausId::new(subsystem, node, number)),
-            Want::Id(id) if (id.subsystem(), id.node()) == self.node => Ok(id),
-            Want::Id(id) => {
-                let words = format!(
-                    "{id} does not belong to this node, whose components are \
+        let (subsystem, node) = (self.subsystem, self.node);
+        let of_node = JausId::new(subsystem, node, wanted.component());
+        match (wanted.subsystem(), wanted.node()) {
+            (0, 0) => Ok(of_node),
+            _ if wanted == of_node => Ok(of_node),
+            _ => {
+                let why = format!(
+                    "{wanted} does not belong to this node, whose components are \
                      {subsystem}.{node}.1 to {subsystem}.{node}.254"
                 );
-                Err(refusal(Reason::WrongId, words))
+                Err((Reason::WrongId, why))
             }
         }
     }
 }
 
-/// A door, and who waits until it is closed: the next node of this host may want its place.
-#[derive(Debug)]
-struct OpenDoor {
-    door: Door,
-    _last: ClosedLast,
-}
-
-/// Says that the door is closed; as its last field it is dropped after it.
-#[derive(Debug)]
-struct ClosedLast(Arc<Shared>);
-
-impl OpenDoor {
-    fn new(door: Door, shared: Arc<Shared>) -> Self {
-        shared.closed.send_replace(false);
-        let _last = ClosedLast(shared);
-        Self { door, _last }
-    }
-}
-
-impl Drop for ClosedLast {
-    fn drop(&mut self) {
-        self.0.closed.send_replace(true);
-    }
-}
-
-fn refusal(reason: Reason, words: impl Into<String>) -> Refusal {
-    let words = words.into();
-    Refusal { reason, words }
-}
-
-fn refused(error: AttachError, holder: Option<Process>) -> Refusal {
+fn refusal(error: &AttachError, holder: Option<Process>) -> Refusal {
     let reason = match error {
         AttachError::AlreadyAttached(id) => {
             let holder = match holder {
                 Some(process) => process.to_string(),
                 None => format!("the node itself (process {})", std::process::id()),
             };
-            let words = format!("{id} is held by {holder}: choose another component number");
-            return refusal(Reason::Taken, words);
+            let why = format!("{id} is held by {holder}: choose another component number");
+            return (Reason::Taken, why);
         }
         AttachError::TooMany { .. } => Reason::TooMany,
         _ => Reason::WrongId,
     };
-    refusal(reason, error.to_string())
+    (reason, error.to_string())
 }
 
-/// Waits for a guest's first word, which must be its greeting and its only one for now.
-async fn hear(connection: &mut Connection) -> Result<Hello, Error> {
-    let mut hello = None;
-    while hello.is_none() {
-        let read = std::future::poll_fn(|cx| {
-            connection.poll_read(cx, |body| match Request::decode(&body)? {
-                Request::Hello(said) if hello.is_none() => {
-                    hello = Some(said);
-                    Ok(())
-                }
-                _ => Err(record::RecordError::Stranger),
-            })
-        });
-        read.await?;
-    }
-    hello.ok_or(Error::Closed)
-}
-
-/// Says a last word, as far as the guest listens.
-async fn say(write: &mut WriteHalf, word: Reply) {
-    let mut outbox = Outbox::default();
-    outbox.reply(&word);
-    let said = std::future::poll_fn(|cx| outbox.poll_flush(write, cx));
-    // Who does not listen is not told.
-    let _ = tokio::time::timeout(GREETING, said).await;
-}
-
-impl From<&Error> for Departure {
-    fn from(error: &Error) -> Self {
+impl From<Error> for Departure {
+    fn from(error: Error) -> Self {
         match error {
             Error::Closed => Self::Vanished,
-            Error::Io { source, .. } if source.kind() == std::io::ErrorKind::ConnectionReset => {
-                Self::Vanished
-            }
-            Error::Io { source, .. } if source.kind() == std::io::ErrorKind::BrokenPipe => {
-                Self::Vanished
-            }
             error => Self::Failed(error.to_string()),
         }
     }

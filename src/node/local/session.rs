@@ -1,99 +1,108 @@
-//! One component of another process: what it says goes to the endpoint, what is in its mailbox goes
-//! to it.
+//! One component of another process: its messages go to the endpoint, its mailbox goes to it.
 //!
-//! Both happen in one poll, without a queue in between: the socket is read where the endpoint is
+//! Both happen in one task, without a queue in between: the socket is read where the endpoint is
 //! called, and written where the mailbox is read. A component that does not read fills the socket;
-//! then its mailbox fills, and drops by [its rule](crate::node::MailboxLimits). Its requests are
-//! not read either while the answers to them do not fit, so that nothing here grows with what it
-//! does.
+//! then its mailbox fills, and drops by [its rule](crate::node::MailboxLimits). Its messages are
+//! not read either while too many answers to them wait, so that nothing here grows without bound.
 
-use std::pin::Pin;
-use std::sync::Arc;
+use std::future::{pending, poll_fn};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll};
 use std::time::Duration;
-
-use tokio::time::Sleep;
 
 use super::super::attendance::{ComponentEvent, Departure};
 use super::super::awaiting::Waiter;
 use super::super::core::{Core, LAST_WORDS, Shared};
+use super::super::error::Undelivered;
 use super::super::mailbox::Mailbox;
-use super::super::replies::Replies;
 use crate::address::JausId;
 use crate::endpoint::{Outgoing, Received};
-use crate::link::local::record::{Delivery, RecordError, Reply, Request, Send};
-use crate::link::local::{Body, Connection, Error, Outbox, Process, WriteHalf};
+use crate::link::local::record::{Head, Outcome, Record, RecordError};
+use crate::link::local::{Error, Process, Reader, Writer};
+use crate::wire::{Acknowledgement, Flags};
 
 /// Octets collected for one write.
 const FULL: usize = 64 << 10;
+/// Octets that may wait before nothing more is read: answers, besides what is collected.
+const MAX_WAITING: usize = 1 << 20;
 /// Reads in one turn, before other tasks have theirs.
 const TURN: usize = 4;
-/// How long a component may read nothing before that is news.
+/// How long a component may read nothing before that is an event.
 const STUCK: Duration = Duration::from_secs(2);
 
 /// An attached component.
 #[derive(Debug)]
 pub(super) struct Session {
     shared: Arc<Shared>,
-    connection: Connection,
-    write: WriteHalf,
-    outbox: Outbox,
+    answers: Arc<Answers>,
     id: JausId,
     process: Process,
     mailbox: Arc<Mailbox>,
-    replies: Arc<Replies>,
-    stuck: Stuck,
 }
 
-/// Whether the component reads.
-#[derive(Debug, Default)]
-struct Stuck {
-    timer: Option<Pin<Box<Sleep>>>,
-    /// What waited when the timer was started.
-    waiting: usize,
-    said: bool,
+/// The way to a component of another process, also for the outcomes of its messages.
+#[derive(Debug)]
+pub(in super::super) struct Answers(Mutex<Writer>);
+
+impl Answers {
+    /// What has become of a message.
+    pub(in super::super) fn send(&self, handle: u64, outcome: Result<(), Undelivered>) {
+        let octets = |octets: usize| u32::try_from(octets).unwrap_or(u32::MAX);
+        let outcome = match outcome {
+            Ok(()) => Outcome::Acknowledged,
+            Err(Undelivered::NotAcknowledged {
+                destination,
+                reason,
+                acknowledged,
+                length,
+            }) => Outcome::NotAcknowledged {
+                destination,
+                reason,
+                acknowledged: octets(acknowledged),
+                length: octets(length),
+            },
+            Err(error) => {
+                let rejected = Record::rejected(handle, &error.to_string());
+                return self.lock().send(&rejected);
+            }
+        };
+        self.lock().send(&Head::Outcome { handle, outcome }.into());
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Writer> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl Session {
     pub(super) fn new(
         shared: Arc<Shared>,
-        connection: Connection,
-        write: WriteHalf,
+        writer: Writer,
         id: JausId,
         process: Process,
         mailbox: Arc<Mailbox>,
     ) -> Self {
         Self {
             shared,
-            connection,
-            write,
-            outbox: Outbox::default(),
+            answers: Arc::new(Answers(Mutex::new(writer))),
             id,
             process,
             mailbox,
-            replies: Arc::default(),
-            stuck: Stuck::default(),
         }
     }
 
-    /// Says something first.
-    pub(super) fn with(mut self, reply: &Reply) -> Self {
-        self.outbox.reply(reply);
-        self
-    }
-
     /// Serves the component until it is gone or the node has stopped.
-    pub(super) async fn run(mut self) {
-        let shared = self.shared.clone();
+    pub(super) async fn run(self, mut reader: Reader) {
         let end = async {
-            let mut stopped = shared.stopped.subscribe();
+            let mut stopped = self.shared.stopped.subscribe();
             // An error would mean that the node is gone, and that is what is waited for.
             let _ = stopped.wait_for(|stopped| *stopped).await;
             tokio::time::sleep(LAST_WORDS).await;
         };
         let why = tokio::select! {
             biased;
-            why = std::future::poll_fn(|cx| self.poll(cx)) => why,
+            () = self.write() => Departure::Stopped,
+            why = self.read(&mut reader) => why.unwrap_or_else(Departure::from),
             () = end => Departure::Stopped,
         };
         self.depart(why);
@@ -103,108 +112,127 @@ impl Session {
         self.shared.lock().detach(self.id, &self.mailbox, why);
     }
 
-    fn poll(&mut self, cx: &mut Context<'_>) -> Poll<Departure> {
-        for _ in 0..TURN {
-            match self.poll_write(cx) {
-                Poll::Ready(Err(error)) => return Poll::Ready(Departure::from(&error)),
-                Poll::Ready(Ok(())) => return Poll::Ready(Departure::Stopped),
-                Poll::Pending => {}
-            }
-            match self.poll_read(cx) {
-                Poll::Ready(Ok(false)) => {}
-                Poll::Ready(Ok(true)) => return Poll::Ready(Departure::Left),
-                Poll::Ready(Err(error)) => return Poll::Ready(Departure::from(&error)),
-                Poll::Pending => return Poll::Pending,
+    /// Writes what waits until the node has stopped and all is written.
+    async fn write(&self) {
+        while poll_fn(|cx| self.poll_collect(cx)).await {
+            if let Err(error) = self.flush().await {
+                // The component takes nothing more. What it has written before is still read, and
+                // reading finds the end.
+                tracing::debug!(id = %self.id, %error, "nothing more can be written");
+                self.answers.lock().close();
+                return pending().await;
             }
         }
-        cx.waker().wake_by_ref();
-        Poll::Pending
     }
 
-    /// Writes what waits. Ready when the node has stopped and all is written.
-    fn poll_write(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Error>> {
+    /// Collects messages. Ready with `true` when something waits to be written, with `false` when
+    /// nothing ever will.
+    fn poll_collect(&self, cx: &mut Context<'_>) -> Poll<bool> {
+        let mut writer = self.answers.lock();
+        let drained = self.mailbox.poll_drain(cx, |message| {
+            writer.queue(&delivery(message));
+            writer.len() < FULL
+        });
+        if !writer.is_empty() {
+            return Poll::Ready(true);
+        }
+        writer.await_more(cx);
+        drained.map(|()| false)
+    }
+
+    /// Writes what is collected, and announces it if the component does not read for long.
+    async fn flush(&self) -> Result<(), Error> {
+        let mut is_stuck = false;
         loop {
-            let mut closed = false;
-            if self.outbox.len() < FULL {
-                self.replies.drain(cx, &mut self.outbox);
-                let outbox = &mut self.outbox;
-                let each = |message| {
-                    outbox.reply(&Reply::Deliver(delivery(message)));
-                    outbox.len() < FULL
-                };
-                closed = self.mailbox.poll_drain(cx, each).is_ready();
-            }
-            if self.outbox.is_empty() {
-                self.handle_progress();
-                return if closed {
-                    Poll::Ready(Ok(()))
-                } else {
-                    Poll::Pending
-                };
-            }
-            match self.outbox.poll_flush(&mut self.write, cx) {
-                Poll::Ready(Ok(())) => {}
-                Poll::Ready(Err(error)) => {
-                    return Poll::Ready(Err(Error::io("writing to a component")(error)));
+            let written = {
+                let mut writer = self.answers.lock();
+                if writer.try_flush()? {
+                    break;
                 }
-                Poll::Pending => {
-                    self.watch(cx);
-                    return Poll::Pending;
+                writer.written()
+            };
+            let flushed = poll_fn(|cx| self.answers.lock().poll_flush(cx));
+            match tokio::time::timeout(STUCK, flushed).await {
+                Ok(flushed) => break flushed?,
+                Err(_) if is_stuck || self.answers.lock().written() > written => {}
+                Err(_) => {
+                    is_stuck = true;
+                    let (id, process) = (self.id, self.process.clone());
+                    tracing::warn!(%id, %process, "component reads nothing; its messages will be dropped");
+                    self.announce(ComponentEvent::Stuck { id, process });
                 }
             }
         }
-    }
-
-    /// Reads once. Ready with `true` when the component leaves.
-    fn poll_read(&mut self, cx: &mut Context<'_>) -> Poll<Result<bool, Error>> {
-        if self.replies.is_full() {
-            // Then the outbox is full too, and when that has room there is another turn.
-            return Poll::Pending;
-        }
-        let (mut left, mut core) = (false, None);
-        let (shared, id, replies) = (&self.shared, self.id, &self.replies);
-        let each = |body: Body<'_>| {
-            match Request::decode(&body)? {
-                Request::Send(send) => {
-                    let core = core.get_or_insert_with(|| shared.lock());
-                    transmit(core, id, send, replies);
-                }
-                Request::Leave => left = true,
-                Request::Hello(_) => return Err(RecordError::Stranger),
-            }
-            Ok(())
-        };
-        self.connection.poll_read(cx, each).map_ok(|()| left)
-    }
-
-    /// The component takes nothing just now: it is watched.
-    fn watch(&mut self, cx: &mut Context<'_>) {
-        let waiting = self.outbox.len();
-        if self.stuck.timer.is_none() || self.stuck.waiting != waiting {
-            self.handle_progress();
-            self.stuck.waiting = waiting;
-            self.stuck.timer = Some(Box::pin(tokio::time::sleep(STUCK)));
-        }
-        let Some(timer) = &mut self.stuck.timer else {
-            return;
-        };
-        if !self.stuck.said && timer.as_mut().poll(cx).is_ready() {
-            self.stuck.said = true;
-            let (id, process) = (self.id, self.process.clone());
-            tracing::warn!(%id, %process, "component reads nothing; its messages will be dropped");
-            let event = ComponentEvent::Stuck { id, process };
-            self.shared.lock().attendance.announce(event);
-        }
-    }
-
-    /// The component reads, or there is nothing for it to read.
-    fn handle_progress(&mut self) {
-        self.stuck.timer = None;
-        if std::mem::take(&mut self.stuck.said) {
+        if is_stuck {
             let (id, dropped) = (self.id, self.mailbox.counters().dropped);
             tracing::info!(%id, dropped, "component reads again");
-            let event = ComponentEvent::Resumed { id, dropped };
-            self.shared.lock().attendance.announce(event);
+            self.announce(ComponentEvent::Resumed { id, dropped });
+        }
+        Ok(())
+    }
+
+    fn announce(&self, event: ComponentEvent) {
+        self.shared.lock().attendance.events.send(event);
+    }
+
+    /// Reads what the component sends until it is gone.
+    async fn read(&self, reader: &mut Reader) -> Result<Departure, Error> {
+        let mut reads = 0;
+        while !self.handle_records(reader)? {
+            if reads == TURN {
+                reads = 0;
+                tokio::task::yield_now().await;
+            }
+            poll_fn(|cx| {
+                // Writing has its turn before each look, and goes on when the component reads.
+                if self.answers.lock().len() >= MAX_WAITING {
+                    return Poll::Pending;
+                }
+                let read = reader.poll_read(cx);
+                reads = if read.is_ready() { reads + 1 } else { 0 };
+                read
+            })
+            .await?;
+        }
+        Ok(Departure::Left)
+    }
+
+    /// Handles what was read; whether the component leaves.
+    fn handle_records(&self, reader: &mut Reader) -> Result<bool, RecordError> {
+        let mut core = None;
+        while let Some(Record { head, payload }) = reader.next_record()? {
+            match head {
+                Head::Send {
+                    flags,
+                    handle,
+                    destination,
+                } => {
+                    let message = Outgoing {
+                        source: self.id,
+                        destination,
+                        priority: flags.priority(),
+                        broadcast: flags.broadcast().unwrap_or_default(),
+                        acknowledge: flags.acknowledgement() == Acknowledgement::Request,
+                        payload,
+                    };
+                    let core = core.get_or_insert_with(|| self.shared.lock());
+                    self.transmit(core, message, handle);
+                }
+                Head::Leave => return Ok(true),
+                _ => return Err(RecordError::Unexpected),
+            }
+        }
+        Ok(false)
+    }
+
+    /// Sends a message; what is wrong with it is the component's to know.
+    fn transmit(&self, core: &mut Core, message: Outgoing, handle: u64) {
+        let waiter = message.acknowledge.then(|| Waiter::There {
+            answers: self.answers.clone(),
+            handle,
+        });
+        if let Err(error) = core.send(message, waiter) {
+            self.answers.send(handle, Err(error.into()));
         }
     }
 }
@@ -216,34 +244,14 @@ impl Drop for Session {
     }
 }
 
-/// Sends a component's message; what is wrong with it is told to the component.
-fn transmit(core: &mut Core, source: JausId, send: Send, replies: &Arc<Replies>) {
-    let handle = send.handle;
-    let waiter = send.acknowledge.then(|| Waiter::There {
-        replies: replies.clone(),
-        handle,
-    });
-    let message = Outgoing {
-        source,
-        destination: send.destination,
-        priority: send.priority,
-        broadcast: send.broadcast,
-        acknowledge: send.acknowledge,
-        payload: send.payload,
-    };
-    if let Err(error) = core.send(message, waiter) {
-        let words = error.to_string();
-        replies.push(Reply::Rejected { handle, words });
-    }
-}
-
-fn delivery(message: Received) -> Delivery {
-    Delivery {
-        source: message.source,
-        destination: message.destination,
-        priority: message.priority,
-        broadcast: message.broadcast,
-        path: message.path,
+fn delivery(message: Received) -> Record {
+    Record {
+        head: Head::Deliver {
+            flags: Flags::new(message.priority).with_broadcast(message.broadcast),
+            source: message.source,
+            destination: message.destination,
+            path: message.path,
+        },
         payload: message.payload,
     }
 }

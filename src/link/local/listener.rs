@@ -1,38 +1,32 @@
-//! The node's side: where it listens, and who may come in.
-//!
-//! A Unix socket lies in a directory in which only its owner can put anything, and is for the
-//! owner alone; whoever connects is asked for credentials all the same, so that nothing hangs on
-//! the rights of files alone. What a crashed node has left behind is told from a living node by
-//! trying to connect.
+//! Where a node listens for component processes.
 
 use std::io;
 use std::net::SocketAddr;
 
 use tokio::net::TcpListener;
 
-use super::stream::{Guest, tcp_halves};
+use super::stream::{Stream, tcp_stream};
 #[cfg(unix)]
-use super::unix_door::{self, UnixDoor};
+use super::unix_socket::{self, UnixSocket};
 #[cfg(not(unix))]
 use super::usual_place::PORT;
 use super::{Address, Error};
 
-/// Where component processes come in.
+/// The node's side of a local link.
 #[derive(Debug)]
-pub(crate) enum Door {
+pub(crate) enum Listener {
     #[cfg(unix)]
-    Unix(UnixDoor),
+    Unix(UnixSocket),
     Tcp(TcpListener),
 }
 
-impl Door {
-    /// Opens it.
+impl Listener {
     pub(crate) fn open(address: &Address) -> Result<Self, Error> {
         match address {
             #[cfg(unix)]
-            Address::Default => UnixDoor::open(&unix_door::make_default()?).map(Self::Unix),
+            Address::Default => UnixSocket::open(&unix_socket::make_default()?).map(Self::Unix),
             #[cfg(unix)]
-            Address::Path(path) => UnixDoor::open(path).map(Self::Unix),
+            Address::Path(path) => UnixSocket::open(path).map(Self::Unix),
             #[cfg(not(unix))]
             Address::Default => Self::open_tcp(PORT),
             #[cfg(not(unix))]
@@ -52,21 +46,19 @@ impl Door {
             listener.set_nonblocking(true)?;
             TcpListener::from_std(listener)
         };
-        tracing::warn!(%port, "everybody on this host may attach components through a TCP port");
+        tracing::warn!(%port, "every program on this host may attach components through a TCP port");
         listen().map(Self::Tcp).map_err(failed)
     }
 
-    /// Waits for the next guest. An error concerns one guest and not the door.
-    pub(crate) async fn accept(&self) -> Result<Guest, Error> {
+    /// Waits for the next component. An error concerns that one alone.
+    pub(crate) async fn accept(&self) -> Result<Stream, Error> {
         match self {
             #[cfg(unix)]
-            Self::Unix(door) => door.accept().await,
+            Self::Unix(socket) => socket.accept().await,
             Self::Tcp(listener) => {
                 let accepted = listener.accept().await;
-                let (stream, _) = accepted.map_err(Error::io("accepting a component"))?;
-                let (read, write) = tcp_halves(stream);
-                let pid = None;
-                Ok(Guest { read, write, pid })
+                let stream = accepted.and_then(|(stream, _)| tcp_stream(stream));
+                stream.map_err(Error::io("accepting a component"))
             }
         }
     }
@@ -75,7 +67,7 @@ impl Door {
     pub(crate) fn place(&self) -> String {
         match self {
             #[cfg(unix)]
-            Self::Unix(door) => door.path().display().to_string(),
+            Self::Unix(socket) => socket.path().display().to_string(),
             Self::Tcp(listener) => listener
                 .local_addr()
                 .map_or_else(|_| "a TCP port".to_owned(), |port| port.to_string()),

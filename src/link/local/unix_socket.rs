@@ -1,4 +1,8 @@
-//! The door in the file system: directory and socket with their rights, and stale sockets.
+//! A node's socket in the file system: directory and socket with their rights, and stale sockets.
+//!
+//! The socket lies in a directory in which only its owner can put anything, and is for the owner
+//! alone; besides, the operating system says whose process connects. Trying to connect tells the
+//! socket of a living node from one that a crashed node has left behind.
 
 use std::fs::{self, DirBuilder, Metadata, Permissions};
 use std::io::{self, ErrorKind};
@@ -8,12 +12,12 @@ use std::path::{Path, PathBuf};
 use tokio::net::{UnixListener, UnixStream};
 
 use super::Error;
-use super::stream::{Guest, pid_of, unix_halves};
+use super::stream::{Stream, pid_of, unix_stream};
 use super::usual_place::{SOCKET, directory, own_uid};
 
 /// A Unix socket that is removed when the node ends.
 #[derive(Debug)]
-pub(crate) struct UnixDoor {
+pub(crate) struct UnixSocket {
     listener: UnixListener,
     path: PathBuf,
     /// Device and number of the socket's file: another may have taken its place.
@@ -21,7 +25,7 @@ pub(crate) struct UnixDoor {
     owner: u32,
 }
 
-impl UnixDoor {
+impl UnixSocket {
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let owner = own_uid()?;
         check_directory(parent(path), owner, 0o022)?;
@@ -42,26 +46,22 @@ impl UnixDoor {
         &self.path
     }
 
-    pub(super) async fn accept(&self) -> Result<Guest, Error> {
+    pub(super) async fn accept(&self) -> Result<Stream, Error> {
         let accepted = self.listener.accept().await;
-        let (stream, _) = accepted.map_err(Error::io("accepting a component"))?;
-        let credentials = stream
-            .peer_cred()
-            .map_err(Error::io("asking the system whose component that is"))?;
-        if !may_enter(credentials.uid(), self.owner) {
+        let stream = accepted.and_then(|(stream, _)| unix_stream(stream));
+        let (stream, uid) = stream.map_err(Error::io("accepting a component"))?;
+        if !may_attach(uid, self.owner) {
             return Err(Error::Foreign {
                 place: self.path.display().to_string(),
-                uid: credentials.uid(),
+                uid,
                 own: self.owner,
             });
         }
-        let pid = pid_of(&credentials);
-        let (read, write) = unix_halves(stream)?;
-        Ok(Guest { read, write, pid })
+        Ok(stream)
     }
 }
 
-impl Drop for UnixDoor {
+impl Drop for UnixSocket {
     fn drop(&mut self) {
         let is_ours = |file: Metadata| (file.dev(), file.ino()) == self.file;
         if fs::symlink_metadata(&self.path).is_ok_and(is_ours) {
@@ -72,7 +72,7 @@ impl Drop for UnixDoor {
 }
 
 /// The owner's components and root's.
-pub(super) const fn may_enter(uid: u32, owner: u32) -> bool {
+const fn may_attach(uid: u32, owner: u32) -> bool {
     uid == owner || uid == 0
 }
 
@@ -218,8 +218,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_owner_and_root_may_enter() {
-        assert!(may_enter(1000, 1000) && may_enter(0, 1000));
-        assert!(!may_enter(1001, 1000) && !may_enter(1000, 0));
+    fn only_the_owner_and_root_may_attach() {
+        assert!(may_attach(1000, 1000) && may_attach(0, 1000));
+        assert!(!may_attach(1001, 1000) && !may_attach(1000, 0));
     }
 }

@@ -1,4 +1,4 @@
-//! Who may come in, and where the door may be.
+//! Where a node may listen, and who may attach.
 
 use std::fs::{self, Permissions};
 use std::os::unix::fs::PermissionsExt;

@@ -1,0 +1,460 @@
+//! What a component process and its host's node write to each other.
+//!
+//! A record is a length (four octets, of what follows), a kind (one octet), the fields of that kind,
+//! and a payload up to the record's end: a message, a name, or an explanation for people. Numbers are
+//! little-endian, as everywhere in JAUS; the flags octet is that of AS5669A.
+//!
+//! | kind | | fields | payload |
+//! |---|---|---|---|
+//! | 1 | Hello | `JAUS`, version u8, 01h, id u32 | the component's name |
+//! | 2 | Send | flags u8, handle u64, destination u32 | the message |
+//! | 3 | Leave | | |
+//! | 17 | Welcome | id u32, longest message u32 | |
+//! | 18 | Refused | reason u8 | why |
+//! | 19 | Deliver | flags u8, source u32, destination u32, path | the message |
+//! | 20 | Outcome | handle u64, outcome u8, destination u32, acknowledged u32, length u32 | why it was rejected |
+//!
+//! A path is 00h for a message from the same node; 01h and the link u16 for a serial line; 02h, link
+//! u16, IPv6 address (IPv4 mapped), port u16 and scope u32 for a socket.
+//!
+//! The component begins with Hello, and the node answers with Welcome or Refused. Either side then
+//! writes when it has something. **Hello up to its version, and Refused, are the same in all
+//! versions**: components and nodes of different releases refuse each other with the reason.
+
+use std::net::{IpAddr, Ipv6Addr, SocketAddr, SocketAddrV6};
+
+use bytes::{Buf, BufMut, Bytes};
+
+use crate::address::JausId;
+use crate::endpoint::{LinkId, Path, Remote, Unacknowledged};
+use crate::wire::Flags;
+
+/// The version of the format.
+pub const VERSION: u8 = 2;
+/// Octets of the length in front of each record.
+pub const LENGTH: usize = 4;
+/// The longest message that a record carries, in octets.
+pub const LONGEST_MESSAGE: usize = 16 << 20;
+/// The longest kind and fields, in octets.
+pub const LONGEST_HEAD: usize = 64;
+/// The longest record that a node reads before it knows the component, without the length.
+pub const LONGEST_HELLO: usize = 512;
+/// Octets of a name or an explanation that are kept.
+const LONGEST_TEXT: usize = 255;
+
+const MAGIC: [u8; 4] = *b"JAUS";
+
+/// One record.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// Its kind and fields.
+    pub head: Head,
+    /// All that follows them.
+    pub payload: Bytes,
+}
+
+/// The kind of a record and its fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Head {
+    /// A component's first record. The payload is its name.
+    Hello {
+        /// The version of the format that it writes. Of other versions nothing more is read.
+        version: u8,
+        /// The id that it wants; with subsystem and node 0, that component of whichever node it is.
+        id: JausId,
+    },
+    /// A message from the component, whose id is that of the connection.
+    Send {
+        /// Priority, scope, and whether the receiver is to acknowledge it.
+        flags: Flags,
+        /// The component's number for it.
+        handle: u64,
+        /// For whom; may hold wildcards.
+        destination: JausId,
+    },
+    /// The component leaves on purpose.
+    Leave,
+    /// The node has attached the component.
+    Welcome {
+        /// Its id.
+        id: JausId,
+        /// The longest message that the node sends or receives, in octets.
+        max_message: u32,
+    },
+    /// The node has not attached the component. The payload says why.
+    Refused(Reason),
+    /// A message for the component.
+    Deliver {
+        /// Priority and scope.
+        flags: Flags,
+        /// Who sent it.
+        source: JausId,
+        /// For whom, as the sender wrote it.
+        destination: JausId,
+        /// How it came to the node; `None` from a component of the same node.
+        path: Option<Path>,
+    },
+    /// What has become of a message from the component.
+    Outcome {
+        /// The component's number for it.
+        handle: u64,
+        /// What has become of it.
+        outcome: Outcome,
+    },
+}
+
+/// What has become of a message from a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Its receiver has acknowledged it.
+    Acknowledged,
+    /// It was not acknowledged, and will not be sent again.
+    NotAcknowledged {
+        /// Why not.
+        reason: Unacknowledged,
+        /// For whom it was.
+        destination: JausId,
+        /// Octets of it that were acknowledged.
+        acknowledged: u32,
+        /// Octets of it in all.
+        length: u32,
+    },
+    /// The node did not send it. The payload says why.
+    Rejected,
+}
+
+/// Why a node does not attach a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The node uses another version of the format.
+    Version,
+    /// Another component has the id.
+    Taken,
+    /// The id belongs to another subsystem or node, or names no single component.
+    WrongId,
+    /// The node has as many components as it may have.
+    TooMany,
+    /// The node is about to stop.
+    Stopping,
+    /// A reason of a later version.
+    Other(u8),
+}
+
+/// Why a stream cannot be read any further: the connection ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// A record announces more octets than are allowed.
+    #[error("a record of {length} octets, where at most {limit} are allowed")]
+    TooLong {
+        /// Octets that it announces.
+        length: usize,
+        /// The most that are allowed.
+        limit: usize,
+    },
+    /// Kind or fields cannot be read.
+    #[error("a record of kind {kind} and {length} octets that cannot be read")]
+    Malformed {
+        /// Its kind, 0 if it has none.
+        kind: u8,
+        /// Octets of it.
+        length: usize,
+    },
+    /// A record that this side does not expect now.
+    #[error("a record that is not expected here")]
+    Unexpected,
+}
+
+impl Record {
+    /// A component's first record.
+    #[must_use]
+    pub fn hello(id: JausId, name: &str) -> Self {
+        let version = VERSION;
+        Self {
+            head: Head::Hello { version, id },
+            payload: text(name),
+        }
+    }
+
+    /// Why the node does not attach a component.
+    #[must_use]
+    pub fn refused(reason: Reason, why: &str) -> Self {
+        Self {
+            head: Head::Refused(reason),
+            payload: text(why),
+        }
+    }
+
+    /// That the node did not send a message, and why.
+    #[must_use]
+    pub fn rejected(handle: u64, why: &str) -> Self {
+        let outcome = Outcome::Rejected;
+        Self {
+            head: Head::Outcome { handle, outcome },
+            payload: text(why),
+        }
+    }
+
+    /// The payload as text that any terminal can show, at most 255 octets of it.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let octets = &self.payload[..self.payload.len().min(LONGEST_TEXT)];
+        let shown = |c: char| match c {
+            c if c.is_control() => char::REPLACEMENT_CHARACTER,
+            c => c,
+        };
+        String::from_utf8_lossy(octets).chars().map(shown).collect()
+    }
+
+    /// Appends the record without its payload, which is to follow as it is.
+    pub fn encode_head(&self, out: &mut Vec<u8>) {
+        let start = out.len();
+        out.put_u32_le(0);
+        self.head.encode(out);
+        let length = out.len() - start - LENGTH + self.payload.len();
+        // Longer payloads are refused where they are sent.
+        let length = u32::try_from(length).unwrap_or(u32::MAX);
+        out[start..start + LENGTH].copy_from_slice(&length.to_le_bytes());
+    }
+
+    /// Reads a record, given without its length.
+    ///
+    /// # Errors
+    /// [`RecordError::Malformed`] if its kind is unknown or its fields cannot be read.
+    pub fn decode(mut octets: Bytes) -> Result<Self, RecordError> {
+        let mut rest = &octets[..];
+        let Some(head) = Head::decode(&mut rest) else {
+            let (kind, length) = (octets.first().copied().unwrap_or(0), octets.len());
+            return Err(RecordError::Malformed { kind, length });
+        };
+        octets.advance(octets.len() - rest.len());
+        Ok(Self {
+            head,
+            payload: octets,
+        })
+    }
+}
+
+impl From<Head> for Record {
+    /// A record without payload.
+    fn from(head: Head) -> Self {
+        let payload = Bytes::new();
+        Self { head, payload }
+    }
+}
+
+impl Head {
+    fn encode(&self, out: &mut Vec<u8>) {
+        match *self {
+            Self::Hello { version, id } => {
+                out.put_u8(1);
+                out.put_slice(&MAGIC);
+                out.put_u8(version);
+                if version == VERSION {
+                    out.put_u8(1);
+                    out.put_u32_le(id.to_u32());
+                }
+            }
+            Self::Send {
+                flags,
+                handle,
+                destination,
+            } => {
+                out.put_slice(&[2, flags.0]);
+                out.put_u64_le(handle);
+                out.put_u32_le(destination.to_u32());
+            }
+            Self::Leave => out.put_u8(3),
+            Self::Welcome { id, max_message } => {
+                out.put_u8(17);
+                out.put_u32_le(id.to_u32());
+                out.put_u32_le(max_message);
+            }
+            Self::Refused(reason) => out.put_slice(&[18, reason.code()]),
+            Self::Deliver {
+                flags,
+                source,
+                destination,
+                path,
+            } => {
+                out.put_slice(&[19, flags.0]);
+                out.put_u32_le(source.to_u32());
+                out.put_u32_le(destination.to_u32());
+                encode_path(path, out);
+            }
+            Self::Outcome { handle, outcome } => {
+                out.put_u8(20);
+                out.put_u64_le(handle);
+                outcome.encode(out);
+            }
+        }
+    }
+
+    fn decode(octets: &mut &[u8]) -> Option<Self> {
+        Some(match octets.try_get_u8().ok()? {
+            1 => {
+                let magic = octets.try_get_u32().ok()?;
+                let version = octets.try_get_u8().ok()?;
+                let is_ours = version == VERSION;
+                if magic != u32::from_be_bytes(MAGIC) || is_ours && octets.try_get_u8() != Ok(1) {
+                    return None;
+                }
+                let id = if is_ours {
+                    id(octets)?
+                } else {
+                    JausId::from_u32(0)
+                };
+                Self::Hello { version, id }
+            }
+            2 => Self::Send {
+                flags: flags(octets)?,
+                handle: octets.try_get_u64_le().ok()?,
+                destination: id(octets)?,
+            },
+            3 => Self::Leave,
+            17 => Self::Welcome {
+                id: id(octets)?,
+                max_message: octets.try_get_u32_le().ok()?,
+            },
+            18 => Self::Refused(Reason::from_code(octets.try_get_u8().ok()?)),
+            19 => Self::Deliver {
+                flags: flags(octets)?,
+                source: id(octets)?,
+                destination: id(octets)?,
+                path: decode_path(octets)?,
+            },
+            20 => Self::Outcome {
+                handle: octets.try_get_u64_le().ok()?,
+                outcome: Outcome::decode(octets)?,
+            },
+            _ => return None,
+        })
+    }
+}
+
+impl Outcome {
+    /// The reasons by their codes, from 1 on.
+    const REASONS: [Unacknowledged; 3] = [
+        Unacknowledged::TimedOut,
+        Unacknowledged::Refused,
+        Unacknowledged::NotSent,
+    ];
+
+    fn encode(self, out: &mut Vec<u8>) {
+        let (code, destination, acknowledged, length) = match self {
+            Self::Acknowledged => (0, 0, 0, 0),
+            Self::NotAcknowledged {
+                reason,
+                destination,
+                acknowledged,
+                length,
+            } => {
+                let code = 1 + Self::REASONS.iter().take_while(|&&r| r != reason).count() as u8;
+                (code, destination.to_u32(), acknowledged, length)
+            }
+            Self::Rejected => (4, 0, 0, 0),
+        };
+        out.put_u8(code);
+        for field in [destination, acknowledged, length] {
+            out.put_u32_le(field);
+        }
+    }
+
+    fn decode(octets: &mut &[u8]) -> Option<Self> {
+        let code = octets.try_get_u8().ok()?;
+        let destination = id(octets)?;
+        let acknowledged = octets.try_get_u32_le().ok()?;
+        let length = octets.try_get_u32_le().ok()?;
+        Some(match code {
+            0 => Self::Acknowledged,
+            4 => Self::Rejected,
+            code => Self::NotAcknowledged {
+                reason: *Self::REASONS.get(usize::from(code) - 1)?,
+                destination,
+                acknowledged,
+                length,
+            },
+        })
+    }
+}
+
+impl Reason {
+    const KNOWN: [Self; 5] = [
+        Self::Version,
+        Self::Taken,
+        Self::WrongId,
+        Self::TooMany,
+        Self::Stopping,
+    ];
+
+    fn code(self) -> u8 {
+        match self {
+            Self::Other(code) => code,
+            known => 1 + Self::KNOWN.iter().take_while(|&&r| r != known).count() as u8,
+        }
+    }
+
+    fn from_code(code: u8) -> Self {
+        let known = usize::from(code).checked_sub(1);
+        let known = known.and_then(|at| Self::KNOWN.get(at));
+        known.copied().unwrap_or(Self::Other(code))
+    }
+}
+
+fn encode_path(path: Option<Path>, out: &mut Vec<u8>) {
+    let Some(Path { link, peer }) = path else {
+        return out.put_u8(0);
+    };
+    out.put_u8(1 + u8::from(peer != Remote::Line));
+    out.put_u16_le(link.0);
+    if let Remote::Socket(address) = peer {
+        let (ip, scope) = match address {
+            SocketAddr::V4(address) => (address.ip().to_ipv6_mapped(), 0),
+            SocketAddr::V6(address) => (*address.ip(), address.scope_id()),
+        };
+        out.put_slice(&ip.octets());
+        out.put_u16_le(address.port());
+        out.put_u32_le(scope);
+    }
+}
+
+fn decode_path(octets: &mut &[u8]) -> Option<Option<Path>> {
+    let place = octets.try_get_u8().ok()?;
+    if place == 0 {
+        return Some(None);
+    }
+    let link = LinkId(octets.try_get_u16_le().ok()?);
+    let peer = match place {
+        1 => Remote::Line,
+        2 => {
+            let ip = Ipv6Addr::from(octets.try_get_u128().ok()?);
+            let (port, scope) = (octets.try_get_u16_le().ok()?, octets.try_get_u32_le().ok()?);
+            match IpAddr::V6(ip).to_canonical() {
+                IpAddr::V4(ip) => SocketAddr::from((ip, port)).into(),
+                IpAddr::V6(ip) => SocketAddr::V6(SocketAddrV6::new(ip, port, 0, scope)).into(),
+            }
+        }
+        _ => return None,
+    };
+    Some(Some(Path { link, peer }))
+}
+
+fn id(octets: &mut &[u8]) -> Option<JausId> {
+    octets.try_get_u32_le().ok().map(JausId::from_u32)
+}
+
+/// Flags with a known scope, of a whole message.
+fn flags(octets: &mut &[u8]) -> Option<Flags> {
+    let flags = Flags(octets.try_get_u8().ok()?);
+    flags.broadcast().map(|_| flags)
+}
+
+/// A name or an explanation, up to a whole character.
+fn text(text: &str) -> Bytes {
+    let mut end = text.len().min(LONGEST_TEXT);
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    Bytes::copy_from_slice(&text.as_bytes()[..end])
+}

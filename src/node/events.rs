@@ -1,0 +1,65 @@
+//! Events of a node, its components, and their connections: any number of listeners, none of which
+//! holds up the sender.
+
+use tokio::sync::broadcast;
+use tokio::sync::broadcast::error::RecvError;
+
+/// Events kept for a slow listener.
+const KEPT: usize = 256;
+
+/// A listener to events from now on. One that falls behind by more than 256 misses the oldest.
+#[derive(Debug)]
+pub struct EventStream<T> {
+    receiver: broadcast::Receiver<T>,
+    missed: u64,
+}
+
+impl<T: Clone> EventStream<T> {
+    /// Waits for the next event; `None` when no more will come.
+    pub async fn recv(&mut self) -> Option<T> {
+        loop {
+            match self.receiver.recv().await {
+                Ok(event) => return Some(event),
+                Err(RecvError::Lagged(missed)) => self.missed += missed,
+                Err(RecvError::Closed) => return None,
+            }
+        }
+    }
+
+    /// How many events this listener has missed.
+    #[must_use]
+    pub const fn missed(&self) -> u64 {
+        self.missed
+    }
+}
+
+/// Where events come from, until it is [ended](Self::end) or dropped.
+#[derive(Debug)]
+pub(super) struct EventSender<T>(Option<broadcast::Sender<T>>);
+
+impl<T: Clone> EventSender<T> {
+    pub(super) fn new() -> Self {
+        Self(Some(broadcast::Sender::new(KEPT)))
+    }
+
+    pub(super) fn send(&self, event: T) {
+        if let Some(sender) = &self.0 {
+            // No listener is no error.
+            let _ = sender.send(event);
+        }
+    }
+
+    pub(super) fn subscribe(&self) -> EventStream<T> {
+        let ended = || broadcast::channel(1).1;
+        let subscribe = broadcast::Sender::subscribe;
+        EventStream {
+            receiver: self.0.as_ref().map_or_else(ended, subscribe),
+            missed: 0,
+        }
+    }
+
+    /// No more events will come, which ends the listeners' streams.
+    pub(super) fn end(&mut self) {
+        self.0 = None;
+    }
+}
