@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 use std::convert::Infallible;
-use std::future::{pending, poll_fn};
+use std::future::poll_fn;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
@@ -205,7 +205,7 @@ impl Client {
             };
             let end = tokio::select! {
                 biased;
-                () = self.write() => None,
+                end = poll_fn(|cx| self.poll_write(cx)) => end.err(),
                 end = self.read(&mut reader) => end.err(),
                 () = late => None,
             };
@@ -270,16 +270,7 @@ impl Client {
         }
     }
 
-    /// Writes what senders leave, until the component has left.
-    async fn write(&self) {
-        if poll_fn(|cx| self.poll_write(cx)).await.is_err() {
-            // What the node has written before is still read, and reading finds the end.
-            self.lock().writer.close();
-            self.emptied.notify_waiters();
-            pending::<()>().await;
-        }
-    }
-
+    /// Writes what senders leave. Ready when the component has left and all is written.
     fn poll_write(&self, cx: &mut Context<'_>) -> Poll<Result<(), Error>> {
         let mut inner = self.lock();
         ready!(inner.writer.poll_flush(cx))?;
