@@ -4,7 +4,7 @@
 #![no_main]
 
 use jaus::link::local::Assembler;
-use jaus::link::local::record::{LENGTH, Record, RecordError};
+use jaus::link::local::record::{Record, RecordError};
 use libfuzzer_sys::fuzz_target;
 
 /// Longer than the inputs, so that records may well announce more than ever comes.
@@ -22,11 +22,10 @@ fn read(mut stream: &[u8], piece: usize) -> Result<(), RecordError> {
     let mut assembler = Assembler::new(LIMIT);
     while !stream.is_empty() {
         let mut now = stream.len().min(piece);
-        if let Some(room) = assembler.room() {
-            assert!(room.len() < LENGTH + LIMIT);
-            now = now.min(room.len());
-            room[..now].copy_from_slice(&stream[..now]);
-            assembler.advance(now);
+        if let Some((long, missing)) = assembler.room() {
+            assert!(long.len() + missing <= LIMIT);
+            now = now.min(missing);
+            long.extend_from_slice(&stream[..now]);
         } else {
             assembler.append(&stream[..now]);
         }

@@ -98,10 +98,9 @@ fn read(mut octets: &[u8], pieces: &[usize]) -> Result<Vec<Record>, RecordError>
     let mut pieces = pieces.iter().cycle();
     while !octets.is_empty() {
         let mut piece = octets.len().min(*pieces.next().unwrap());
-        if let Some(room) = assembler.room() {
-            piece = piece.min(room.len());
-            room[..piece].copy_from_slice(&octets[..piece]);
-            assembler.advance(piece);
+        if let Some((long, missing)) = assembler.room() {
+            piece = piece.min(missing);
+            long.extend_from_slice(&octets[..piece]);
         } else {
             assembler.append(&octets[..piece]);
         }

@@ -4,8 +4,8 @@ use bytes::{Buf, Bytes, BytesMut};
 
 use super::record::{LENGTH, Record, RecordError};
 
-/// Up to this length a record is copied out of what was read, so that a small payload that is kept
-/// does not hold on to a large buffer. A longer one gets a buffer of its own.
+/// Up to this length a record is copied out of what was read; a longer one gets a buffer of its own,
+/// into which the rest of it is read.
 const COPIED: usize = 4096;
 
 /// Octets in, in any pieces; records out.
@@ -13,10 +13,12 @@ const COPIED: usize = 4096;
 pub struct Assembler {
     /// The longest record, in octets without its length.
     limit: usize,
-    /// The octets that were not taken out yet, and behind them room for the rest of a long record.
+    /// The octets that were not taken out yet.
     buffer: BytesMut,
-    /// How many octets have arrived.
-    filled: usize,
+    /// A long record that has begun, without its length.
+    long: Vec<u8>,
+    /// Octets that it will have; 0 if there is none.
+    length: usize,
 }
 
 impl Assembler {
@@ -26,7 +28,8 @@ impl Assembler {
         Self {
             limit,
             buffer: BytesMut::new(),
-            filled: 0,
+            long: Vec::new(),
+            length: 0,
         }
     }
 
@@ -35,23 +38,16 @@ impl Assembler {
         self.limit = limit;
     }
 
-    /// Takes in what has arrived.
+    /// If a long record has begun, where the rest of it is to be appended, and how many octets that
+    /// is.
+    pub fn room(&mut self) -> Option<(&mut Vec<u8>, usize)> {
+        let missing = self.length.saturating_sub(self.long.len());
+        (missing > 0).then_some((&mut self.long, missing))
+    }
+
+    /// Takes in what has arrived, where no long record has begun.
     pub fn append(&mut self, octets: &[u8]) {
-        self.buffer.truncate(self.filled);
         self.buffer.extend_from_slice(octets);
-        self.filled = self.buffer.len();
-    }
-
-    /// If a long record has begun, where the rest of it is best read to. Then call
-    /// [`advance`](Self::advance).
-    pub fn room(&mut self) -> Option<&mut [u8]> {
-        let room = self.buffer.get_mut(self.filled..);
-        room.filter(|room| !room.is_empty())
-    }
-
-    /// So many octets of the room were filled.
-    pub fn advance(&mut self, octets: usize) {
-        self.filled = self.buffer.len().min(self.filled + octets);
     }
 
     /// The next record, or `None` if it has not arrived in full. An assembler that waits for a new
@@ -60,8 +56,15 @@ impl Assembler {
     /// # Errors
     /// A record that is too long or cannot be read: nothing behind it can be trusted.
     pub fn next_record(&mut self) -> Result<Option<Record>, RecordError> {
-        let Some(length) = self.buffer[..self.filled].first_chunk() else {
-            if self.filled == 0 {
+        if self.length > 0 {
+            if self.long.len() < self.length {
+                return Ok(None);
+            }
+            self.length = 0;
+            return Record::decode(std::mem::take(&mut self.long).into()).map(Some);
+        }
+        let Some(length) = self.buffer.first_chunk() else {
+            if self.buffer.is_empty() {
                 self.buffer = BytesMut::new();
             }
             return Ok(None);
@@ -70,24 +73,21 @@ impl Assembler {
         if length > limit {
             return Err(RecordError::TooLong { length, limit });
         }
-        let end = LENGTH + length;
-        if self.filled < end {
-            if length > COPIED && self.buffer.len() < end {
-                // Zeros from the operating system, which takes memory only for what is written.
-                let mut whole = BytesMut::zeroed(end);
-                whole[..self.filled].copy_from_slice(&self.buffer[..self.filled]);
-                self.buffer = whole;
+        match self.buffer.get(LENGTH..LENGTH + length) {
+            Some(octets) => {
+                let octets = Bytes::copy_from_slice(octets);
+                self.buffer.advance(LENGTH + length);
+                Record::decode(octets).map(Some)
             }
-            return Ok(None);
+            None if length > COPIED => {
+                // The operating system gives memory only for what is written.
+                self.long = Vec::with_capacity(length);
+                self.long.extend_from_slice(&self.buffer[LENGTH..]);
+                self.length = length;
+                self.buffer = BytesMut::new();
+                Ok(None)
+            }
+            None => Ok(None),
         }
-        self.filled -= end;
-        let octets = if length > COPIED {
-            self.buffer.split_to(end).freeze().slice(LENGTH..)
-        } else {
-            let octets = Bytes::copy_from_slice(&self.buffer[LENGTH..end]);
-            self.buffer.advance(end);
-            octets
-        };
-        Record::decode(octets).map(Some)
     }
 }

@@ -54,11 +54,7 @@ impl Reader {
     /// Reads once. Pending if nothing has arrived.
     pub(crate) fn poll_read(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Error>> {
         let read = match self.assembler.room() {
-            Some(room) => {
-                let read = ready!(self.stream.poll_read(cx, room));
-                self.assembler.advance(*read.as_ref().unwrap_or(&0));
-                read
-            }
+            Some((room, missing)) => ready!(self.stream.poll_append(cx, room, missing)),
             None => {
                 let mut chunk = SHARED.take();
                 chunk.resize(CHUNK, 0);

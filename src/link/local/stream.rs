@@ -89,15 +89,42 @@ mod on_unix {
             cx: &mut Context<'_>,
             room: &mut [u8],
         ) -> Poll<io::Result<usize>> {
+            let most = room.len();
+            self.poll_once(cx, most, |mut socket| socket.read(room))
+        }
+
+        /// Appends up to `most` octets to a buffer; 0 mean the end.
+        pub(in super::super) fn poll_append(
+            &mut self,
+            cx: &mut Context<'_>,
+            buffer: &mut Vec<u8>,
+            most: usize,
+        ) -> Poll<io::Result<usize>> {
+            let before = buffer.len();
+            self.poll_once(cx, most, |socket| {
+                match socket.take(most as u64).read_to_end(buffer) {
+                    Err(error) if buffer.len() == before => Err(error),
+                    // The error comes again with the next look.
+                    _ => Ok(buffer.len() - before),
+                }
+            })
+        }
+
+        fn poll_once(
+            &mut self,
+            cx: &mut Context<'_>,
+            most: usize,
+            mut read: impl FnMut(&Socket) -> io::Result<usize>,
+        ) -> Poll<io::Result<usize>> {
             loop {
                 let mut ready = ready!(self.0.poll_read_ready(cx))?;
-                let Ok(read) = ready.try_io(|socket| (&**socket.get_ref()).read(room)) else {
+                let Ok(read) = ready.try_io(|socket| read(socket.get_ref())) else {
                     continue;
                 };
                 match read {
                     Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                     // It is empty now; the kernel tells of whatever comes, also of the end.
-                    Ok(octets) if octets < room.len() => ready.clear_ready(),
+                    Ok(octets) if octets < most => ready.clear_ready(),
                     _ => {}
                 }
                 return Poll::Ready(read);
@@ -145,10 +172,11 @@ mod elsewhere {
     //! TCP sockets, as the runtime has them.
 
     use std::io::{self, IoSlice};
-    use std::pin::Pin;
+    use std::pin::{Pin, pin};
     use std::task::{Context, Poll, ready};
 
-    use tokio::io::{AsyncRead, ReadBuf};
+    use bytes::BufMut;
+    use tokio::io::{AsyncRead, AsyncReadExt, ReadBuf};
     use tokio::net::{TcpStream, tcp};
 
     use super::Stream;
@@ -179,6 +207,16 @@ mod elsewhere {
             let mut room = ReadBuf::new(room);
             ready!(Pin::new(&mut self.0).poll_read(cx, &mut room))?;
             Poll::Ready(Ok(room.filled().len()))
+        }
+
+        /// Appends up to `most` octets to a buffer; 0 mean the end.
+        pub(in super::super) fn poll_append(
+            &mut self,
+            cx: &mut Context<'_>,
+            buffer: &mut Vec<u8>,
+            most: usize,
+        ) -> Poll<io::Result<usize>> {
+            pin!(self.0.read_buf(&mut buffer.limit(most))).poll(cx)
         }
     }
 
