@@ -168,6 +168,15 @@ fn a_record_that_is_too_long_ends_the_stream_before_anything_is_kept_for_it() {
 }
 
 #[test]
+fn a_long_record_that_does_not_come_takes_no_more_room_than_what_has_come() {
+    let mut assembler = Assembler::new(usize::MAX);
+    assembler.append(&[&u32::MAX.to_le_bytes()[..], &[2; 1000]].concat());
+    assert_eq!(assembler.next_record(), Ok(None));
+    let (long, _) = assembler.room().unwrap();
+    assert!(long.capacity() <= 256 << 10, "{}", long.capacity());
+}
+
+#[test]
 fn a_first_record_of_another_protocol_cannot_be_read() {
     let malformed = |octets: &'static [u8]| {
         let (kind, length) = (octets[0], octets.len());

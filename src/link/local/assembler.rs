@@ -7,6 +7,9 @@ use super::record::{LENGTH, Record, RecordError};
 /// Up to this length a record is copied out of what was read; a longer one gets a buffer of its own,
 /// into which the rest of it is read.
 const COPIED: usize = 4096;
+/// That buffer grows with what arrives, whatever the record announces: to at most twice that, and by
+/// so many octets at least.
+const GROWTH: usize = 256 << 10;
 
 /// Octets in, in any pieces; records out.
 #[derive(Debug)]
@@ -38,11 +41,19 @@ impl Assembler {
         self.limit = limit;
     }
 
-    /// If a long record has begun, where the rest of it is to be appended, and how many octets that
-    /// is.
+    /// If a long record has begun, where the rest of it is to be appended, and how many octets may
+    /// be at once.
     pub fn room(&mut self) -> Option<(&mut Vec<u8>, usize)> {
         let missing = self.length.saturating_sub(self.long.len());
-        (missing > 0).then_some((&mut self.long, missing))
+        if missing == 0 {
+            return None;
+        }
+        if self.long.capacity() == self.long.len() {
+            let growth = missing.min(self.long.len().max(GROWTH));
+            self.long.reserve_exact(growth);
+        }
+        let room = self.long.capacity() - self.long.len();
+        Some((&mut self.long, missing.min(room)))
     }
 
     /// Takes in what has arrived, where no long record has begun.
@@ -80,9 +91,9 @@ impl Assembler {
                 Record::decode(octets).map(Some)
             }
             None if length > COPIED => {
-                // The operating system gives memory only for what is written.
-                self.long = Vec::with_capacity(length);
-                self.long.extend_from_slice(&self.buffer[LENGTH..]);
+                let begun = &self.buffer[LENGTH..];
+                self.long = Vec::with_capacity(length.min(GROWTH.max(2 * begun.len())));
+                self.long.extend_from_slice(begun);
                 self.length = length;
                 self.buffer = BytesMut::new();
                 Ok(None)
