@@ -21,18 +21,14 @@ fuzz_target!(|octets: &[u8]| {
 fn read(mut stream: &[u8], piece: usize) -> Result<(), RecordError> {
     let mut assembler = Assembler::new(LIMIT);
     while !stream.is_empty() {
-        let mut now = stream.len().min(piece);
-        if let Some((long, missing)) = assembler.room() {
-            assert!(long.len() + missing <= LIMIT);
-            now = now.min(missing);
-            long.extend_from_slice(&stream[..now]);
-        } else {
-            assembler.append(&stream[..now]);
-        }
+        let (now, rest) = stream.split_at(stream.len().min(piece));
+        let room = assembler.room();
+        assert!(room.capacity() > room.len() && room.len() < LIMIT);
+        room.extend_from_slice(now);
         while let Some(record) = assembler.next_record()? {
             comes_back(&record);
         }
-        stream = &stream[now..];
+        stream = rest;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! A connection of the local link: records in, records out. Both sides use the same two halves.
 
-use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::future::poll_fn;
 use std::io::{self, IoSlice};
 use std::task::{Context, Poll, Waker, ready};
 
@@ -11,8 +11,8 @@ use super::record::{Record, RecordError};
 use super::stream::{ReadHalf, WriteHalf};
 use super::{Assembler, Error};
 
-/// Octets read at once, unless a long record is on its way.
-const CHUNK: usize = 16 << 10;
+/// Reads in a row before other tasks have their turn.
+const TURN: usize = 4;
 /// Payloads from so many octets on are written from where they are.
 const LARGE: usize = 8192;
 /// The most pieces given to the kernel at once.
@@ -22,23 +22,23 @@ const COLLECTED: usize = 16 << 10;
 /// Octets of memory that an idle connection keeps.
 const KEPT: usize = 1024;
 
-thread_local! {
-    /// What is read into. All connections of a thread share it, so that an idle one has no buffer.
-    static SHARED: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
-}
-
 /// The half that is read.
 #[derive(Debug)]
 pub(crate) struct Reader {
     stream: ReadHalf,
     assembler: Assembler,
+    /// Reads since other tasks had their turn.
+    reads: usize,
 }
 
 impl Reader {
     /// For records of at most `limit` octets.
     pub(crate) fn new(stream: ReadHalf, limit: usize) -> Self {
-        let assembler = Assembler::new(limit);
-        Self { stream, assembler }
+        Self {
+            stream,
+            assembler: Assembler::new(limit),
+            reads: 0,
+        }
     }
 
     /// From now on records may have that many octets.
@@ -51,36 +51,42 @@ impl Reader {
         self.assembler.next_record()
     }
 
-    /// Reads once. Pending if nothing has arrived.
-    pub(crate) fn poll_read(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Error>> {
-        let read = match self.assembler.room() {
-            Some((room, missing)) => ready!(self.stream.poll_append(cx, room, missing)),
-            None => {
-                let mut chunk = SHARED.take();
-                chunk.resize(CHUNK, 0);
-                let read = self.stream.poll_read(cx, &mut chunk);
-                if let Poll::Ready(Ok(octets)) = read {
-                    self.assembler.append(&chunk[..octets]);
-                }
-                SHARED.set(chunk);
-                ready!(read)
-            }
-        };
-        Poll::Ready(match read {
-            Ok(0) => Err(Error::Closed),
-            Ok(_) => Ok(()),
-            Err(error) => Err(failed("reading from", error)),
-        })
-    }
-
     /// Waits for the next record.
     pub(crate) async fn read(&mut self) -> Result<Record, Error> {
         loop {
             if let Some(record) = self.next_record()? {
                 return Ok(record);
             }
-            std::future::poll_fn(|cx| self.poll_read(cx)).await?;
+            self.fill(|| true).await?;
         }
+    }
+
+    /// Waits until something has arrived, and reads it. `may_read` is asked whenever the task is
+    /// woken.
+    pub(crate) async fn fill(&mut self, may_read: impl Fn() -> bool) -> Result<(), Error> {
+        if self.reads == TURN {
+            self.reads = 0;
+            tokio::task::yield_now().await;
+        }
+        poll_fn(|cx| {
+            let read = if may_read() {
+                self.stream.poll_read(cx, &mut self.assembler)
+            } else {
+                Poll::Pending
+            };
+            let Poll::Ready(read) = read else {
+                self.reads = 0;
+                self.assembler.rest();
+                return Poll::Pending;
+            };
+            self.reads += 1;
+            Poll::Ready(match read {
+                Ok(0) => Err(Error::Closed),
+                Ok(_) => Ok(()),
+                Err(error) => Err(failed("reading from", error)),
+            })
+        })
+        .await
     }
 }
 
@@ -176,19 +182,19 @@ impl Writer {
 
     /// Writes as much as the socket takes; whether nothing waits any more.
     pub(crate) fn try_flush(&mut self) -> Result<bool, Error> {
-        while !self.is_empty() {
+        self.is_full = false;
+        while !self.is_empty() && !self.is_full {
             match self.write() {
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
-                    self.is_full = true;
-                    return Ok(false);
-                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => self.is_full = true,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(failed("writing to", error)),
-                Ok(octets) => self.advance(octets),
+                Ok((octets, is_all)) => {
+                    self.advance(octets);
+                    self.is_full = !is_all;
+                }
             }
         }
-        self.is_full = false;
-        Ok(true)
+        Ok(self.is_empty())
     }
 
     /// Writes all, for the task that is woken by [`send`](Self::send) as well.
@@ -207,7 +213,7 @@ impl Writer {
 
     /// Writes all, for whoever alone has the connection.
     pub(crate) async fn flush(&mut self) -> Result<(), Error> {
-        std::future::poll_fn(|cx| self.poll_flush(cx)).await
+        poll_fn(|cx| self.poll_flush(cx)).await
     }
 
     /// Has the task woken by the next [`send`](Self::send).
@@ -227,19 +233,22 @@ impl Writer {
         };
     }
 
-    fn write(&self) -> io::Result<usize> {
+    /// Writes once: how many octets, and whether the socket took all that it was given.
+    fn write(&self) -> io::Result<(usize, bool)> {
         let Some(stream) = &self.stream else {
             return Err(io::ErrorKind::NotConnected.into());
         };
         let mut slices = [IoSlice::new(&[]); PIECES];
         let collected = self.collected.get(self.taken..).unwrap_or_default();
         let waiting = self.pieces.iter().map(|piece| &piece[..]);
-        let mut count = 0;
+        let (mut count, mut given) = (0, 0);
         for (slice, piece) in slices.iter_mut().zip(waiting.chain([collected])) {
             *slice = IoSlice::new(piece);
             count += 1;
+            given += piece.len();
         }
-        stream.try_write(&slices[..count])
+        let written = stream.try_write(&slices[..count])?;
+        Ok((written, written == given))
     }
 
     fn advance(&mut self, mut octets: usize) {

@@ -12,7 +12,7 @@ use tokio::net::{UnixStream, unix::UCred};
 pub(crate) use self::elsewhere::{ReadHalf, WriteHalf};
 #[cfg(unix)]
 pub(crate) use self::on_unix::{ReadHalf, WriteHalf};
-use super::{Address, Error, usual_place};
+use super::{Address, Assembler, Error, usual_place};
 
 /// The process at the other end.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
@@ -47,16 +47,18 @@ pub(crate) struct Stream {
 mod on_unix {
     //! Sockets of either kind, watched [only for what is waited for](crate::link::watch).
 
-    use std::io::{self, ErrorKind, IoSlice, Read, Write};
+    use std::io::{self, ErrorKind, IoSlice, Write};
     use std::net::Shutdown;
     use std::sync::Arc;
     use std::task::{Context, Poll, ready};
 
+    use rustix::buffer::spare_capacity;
+    use rustix::io::read;
     use socket2::Socket;
     use tokio::io::Interest;
     use tokio::io::unix::AsyncFd;
 
-    use super::Stream;
+    use super::{Assembler, Stream};
     use crate::link::watch::watch;
 
     /// The half of a stream that is read.
@@ -83,48 +85,22 @@ mod on_unix {
     }
 
     impl ReadHalf {
-        /// Reads once; 0 octets mean the end.
+        /// Reads once, as much as there is room for; 0 octets mean the end.
         pub(in super::super) fn poll_read(
             &mut self,
             cx: &mut Context<'_>,
-            room: &mut [u8],
-        ) -> Poll<io::Result<usize>> {
-            let most = room.len();
-            self.poll_once(cx, most, |mut socket| socket.read(room))
-        }
-
-        /// Appends up to `most` octets to a buffer; 0 mean the end.
-        pub(in super::super) fn poll_append(
-            &mut self,
-            cx: &mut Context<'_>,
-            buffer: &mut Vec<u8>,
-            most: usize,
-        ) -> Poll<io::Result<usize>> {
-            let before = buffer.len();
-            self.poll_once(cx, most, |socket| {
-                match socket.take(most as u64).read_to_end(buffer) {
-                    Err(error) if buffer.len() == before => Err(error),
-                    // The error comes again with the next look.
-                    _ => Ok(buffer.len() - before),
-                }
-            })
-        }
-
-        fn poll_once(
-            &mut self,
-            cx: &mut Context<'_>,
-            most: usize,
-            mut read: impl FnMut(&Socket) -> io::Result<usize>,
+            assembler: &mut Assembler,
         ) -> Poll<io::Result<usize>> {
             loop {
                 let mut ready = ready!(self.0.poll_read_ready(cx))?;
-                let Ok(read) = ready.try_io(|socket| read(socket.get_ref())) else {
-                    continue;
-                };
+                let room = assembler.room();
+                let octets = room.capacity() - room.len();
+                let read = ready.try_io(|socket| Ok(read(socket.get_ref(), spare_capacity(room))?));
+                let Ok(read) = read else { continue };
                 match read {
                     Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                     // It is empty now; the kernel tells of whatever comes, also of the end.
-                    Ok(octets) if octets < most => ready.clear_ready(),
+                    Ok(read) if read < octets => ready.clear_ready(),
                     _ => {}
                 }
                 return Poll::Ready(read);
@@ -135,11 +111,7 @@ mod on_unix {
     impl WriteHalf {
         /// Writes as much as can be written without waiting.
         pub(in super::super) fn try_write(&self, pieces: &[IoSlice<'_>]) -> io::Result<usize> {
-            let mut socket = &*self.socket;
-            match pieces {
-                [piece] => socket.write(piece),
-                pieces => socket.write_vectored(pieces),
-            }
+            (&*self.socket).write_vectored(pieces)
         }
 
         /// Waits until a socket that was full may have room again.
@@ -172,14 +144,14 @@ mod elsewhere {
     //! TCP sockets, as the runtime has them.
 
     use std::io::{self, IoSlice};
-    use std::pin::{Pin, pin};
-    use std::task::{Context, Poll, ready};
+    use std::pin::pin;
+    use std::task::{Context, Poll};
 
     use bytes::BufMut;
-    use tokio::io::{AsyncRead, AsyncReadExt, ReadBuf};
+    use tokio::io::AsyncReadExt;
     use tokio::net::{TcpStream, tcp};
 
-    use super::Stream;
+    use super::{Assembler, Stream};
 
     /// The half of a stream that is read.
     #[derive(Debug)]
@@ -198,25 +170,15 @@ mod elsewhere {
     }
 
     impl ReadHalf {
-        /// Reads once; 0 octets mean the end.
+        /// Reads once, as much as there is room for; 0 octets mean the end.
         pub(in super::super) fn poll_read(
             &mut self,
             cx: &mut Context<'_>,
-            room: &mut [u8],
+            assembler: &mut Assembler,
         ) -> Poll<io::Result<usize>> {
-            let mut room = ReadBuf::new(room);
-            ready!(Pin::new(&mut self.0).poll_read(cx, &mut room))?;
-            Poll::Ready(Ok(room.filled().len()))
-        }
-
-        /// Appends up to `most` octets to a buffer; 0 mean the end.
-        pub(in super::super) fn poll_append(
-            &mut self,
-            cx: &mut Context<'_>,
-            buffer: &mut Vec<u8>,
-            most: usize,
-        ) -> Poll<io::Result<usize>> {
-            pin!(self.0.read_buf(&mut buffer.limit(most))).poll(cx)
+            let room = assembler.room();
+            let octets = room.capacity() - room.len();
+            pin!(self.0.read_buf(&mut room.limit(octets))).poll(cx)
         }
     }
 
@@ -263,7 +225,7 @@ pub(super) fn pid_of(credentials: &UCred) -> Option<u32> {
 pub(crate) async fn connect(address: &Address) -> Result<Stream, Error> {
     match address {
         #[cfg(unix)]
-        Address::Default => connect_unix(&usual_place::path()?).await,
+        Address::Default => connect_unix(&usual_place::path()).await,
         #[cfg(unix)]
         Address::Path(path) => connect_unix(path).await,
         #[cfg(not(unix))]
@@ -279,7 +241,7 @@ async fn connect_unix(path: &std::path::Path) -> Result<Stream, Error> {
     let place = path.display().to_string();
     let stream = UnixStream::connect(path).await.and_then(unix_stream);
     let (stream, uid) = stream.map_err(|error| unreachable(&place, error))?;
-    let own = usual_place::own_uid()?;
+    let own = usual_place::own_uid();
     // Root may do everything, also trust any user.
     if uid != own && uid != 0 && own != 0 {
         return Err(Error::Foreign { place, uid, own });

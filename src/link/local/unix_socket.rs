@@ -13,7 +13,7 @@ use tokio::net::{UnixListener, UnixStream};
 
 use super::Error;
 use super::stream::{Stream, pid_of, unix_stream};
-use super::usual_place::{SOCKET, directory, own_uid};
+use super::usual_place::{directory, own_uid, path};
 
 /// A Unix socket that is removed when the node ends.
 #[derive(Debug)]
@@ -27,7 +27,7 @@ pub(crate) struct UnixSocket {
 
 impl UnixSocket {
     pub(super) fn open(path: &Path) -> Result<Self, Error> {
-        let owner = own_uid()?;
+        let owner = own_uid();
         check_directory(parent(path), owner, 0o022)?;
         let listener = bind(path)?;
         let doing = || format!("setting the rights of {}", path.display());
@@ -78,14 +78,14 @@ const fn may_attach(uid: u32, owner: u32) -> bool {
 
 /// The usual path, in a directory that exists and is the owner's alone.
 pub(super) fn make_default() -> Result<PathBuf, Error> {
-    let directory = directory()?;
+    let directory = directory();
     match DirBuilder::new().mode(0o700).create(&directory) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => {
             return Err(Error::io(format!("making {}", directory.display()))(error));
         }
-        _ => check_directory(&directory, own_uid()?, 0o077)?,
+        _ => check_directory(&directory, own_uid(), 0o077)?,
     }
-    Ok(directory.join(SOCKET))
+    Ok(path())
 }
 
 fn parent(path: &Path) -> &Path {

@@ -25,8 +25,6 @@ use crate::wire::{Acknowledgement, Flags};
 const MAX_WAITING: usize = 4 << 20;
 /// Messages that may wait for an acknowledgement.
 const MAX_AWAITED: usize = 4096;
-/// Reads in one turn, before other tasks have theirs.
-const TURN: usize = 4;
 /// Messages that one read may bring at most, nearly: before it, so many must fit.
 const ROOM: usize = 1024;
 /// How long a component that reads nothing holds up what comes behind, such as the outcomes of the
@@ -283,22 +281,13 @@ impl Client {
 
     /// Reads what the node writes, until it is gone.
     async fn read(&self, reader: &mut Reader) -> Result<Infallible, Error> {
-        let (mut reads, mut stalled_at) = (0, None);
+        let mut stalled_at = None;
         loop {
             while let Some(record) = reader.next_record()? {
                 self.handle_record(record)?;
             }
-            if reads == TURN {
-                reads = 0;
-                tokio::task::yield_now().await;
-            }
             stalled_at = self.catch_up(stalled_at).await;
-            poll_fn(|cx| {
-                let read = reader.poll_read(cx);
-                reads = if read.is_ready() { reads + 1 } else { 0 };
-                read
-            })
-            .await?;
+            reader.fill(|| true).await?;
         }
     }
 

@@ -25,8 +25,6 @@ use crate::wire::{Acknowledgement, Flags};
 const FULL: usize = 64 << 10;
 /// Octets that may wait before nothing more is read: answers, besides what is collected.
 const MAX_WAITING: usize = 1 << 20;
-/// Reads in one turn, before other tasks have theirs.
-const TURN: usize = 4;
 /// How long a component may read nothing before that is an event.
 const STUCK: Duration = Duration::from_secs(2);
 
@@ -177,22 +175,10 @@ impl Session {
 
     /// Reads what the component sends until it is gone.
     async fn read(&self, reader: &mut Reader) -> Result<Departure, Error> {
-        let mut reads = 0;
         while !self.handle_records(reader)? {
-            if reads == TURN {
-                reads = 0;
-                tokio::task::yield_now().await;
-            }
-            poll_fn(|cx| {
-                // Writing has its turn before each look, and goes on when the component reads.
-                if self.answers.lock().len() >= MAX_WAITING {
-                    return Poll::Pending;
-                }
-                let read = reader.poll_read(cx);
-                reads = if read.is_ready() { reads + 1 } else { 0 };
-                read
-            })
-            .await?;
+            // Writing has its turn before each look, and goes on when the component reads.
+            let may_read = || self.answers.lock().len() < MAX_WAITING;
+            reader.fill(may_read).await?;
         }
         Ok(Departure::Left)
     }
