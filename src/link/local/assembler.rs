@@ -16,12 +16,21 @@ const COPIED: usize = 4096;
 /// so many octets at least. Until octets arrive it takes addresses and no memory.
 const GROWTH: usize = 2 << 20;
 
+/// The least capacity of a buffer in the pool. Smaller ones the allocator reuses by itself; for larger
+/// ones it asks the kernel, which takes as long to provide their pages as to copy a message.
+const POOLED: usize = 128 << 10;
+/// Octets of the buffers in the pool of a thread, at most.
+const POOL_OCTETS: usize = 8 << 20;
+
 thread_local! {
     /// A buffer for the assembler that reads next.
     static SPARE: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+    /// Buffers of long records, with their capacities. Those to which nothing else refers are free.
+    static POOL: RefCell<Vec<(usize, Bytes)>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Octets in, in any pieces; records out. One that waits for a new record has no buffer.
+/// Octets in, in any pieces; records out. One that waits for a new record has no buffer; each thread
+/// keeps a pool of those of long records, at most 8 MiB.
 #[derive(Debug)]
 pub struct Assembler {
     /// The longest record, in octets without its length.
@@ -94,12 +103,12 @@ impl Assembler {
             return Err(RecordError::TooLong { length, limit });
         }
         if let Some(octets) = octets.get(..length) {
-            let octets = Bytes::copy_from_slice(octets);
             self.taken += LENGTH + length;
-            return Record::decode(octets).map(Some);
+            return Record::copy(octets).map(Some);
         }
         if length > COPIED {
-            let mut long = Vec::with_capacity(length.min(GROWTH.max(2 * octets.len())));
+            let new = || Vec::with_capacity(length.min(GROWTH.max(2 * octets.len())));
+            let mut long = reuse(length).unwrap_or_else(new);
             long.extend_from_slice(octets);
             SPARE.set(std::mem::replace(&mut self.buffer, long));
             (self.long, self.taken) = (length, 0);
@@ -115,6 +124,89 @@ impl Assembler {
         // The buffer may have had room for more than its record.
         self.buffer.extend_from_slice(&octets[self.long..]);
         octets.truncate(take(&mut self.long));
-        Record::decode(octets.into()).map(Some)
+        Record::decode(freeze(octets)).map(Some)
+    }
+}
+
+/// A free buffer of the pool with at least that capacity, and at most twice as much.
+fn reuse(length: usize) -> Option<Vec<u8>> {
+    POOL.with_borrow_mut(|pool| {
+        let fits = |capacity| (length..=length.saturating_mul(2)).contains(&capacity);
+        let is_free = |(capacity, octets): &(usize, Bytes)| fits(*capacity) && octets.is_unique();
+        let (_, octets) = pool.remove(pool.iter().position(is_free)?);
+        let mut octets = octets.try_into_mut().ok()?;
+        octets.clear();
+        Some(octets.into())
+    })
+}
+
+/// The octets of a buffer, which joins the pool in place of the oldest ones.
+fn freeze(buffer: Vec<u8>) -> Bytes {
+    let capacity = buffer.capacity();
+    let octets = Bytes::from(buffer);
+    if (POOLED..=POOL_OCTETS).contains(&capacity) {
+        POOL.with_borrow_mut(|pool| {
+            while pool.iter().map(|(kept, _)| kept).sum::<usize>() + capacity > POOL_OCTETS {
+                pool.remove(0);
+            }
+            pool.push((capacity, octets.clone()));
+        });
+    }
+    octets
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::record::Head;
+    use super::*;
+    use crate::address::JausId;
+    use crate::wire::Flags;
+
+    #[test]
+    fn one_that_waits_for_a_new_record_has_no_buffer() {
+        let leave = Record::from(Head::Leave);
+        let mut assembler = Assembler::new(100);
+        leave.encode_head(assembler.room());
+        assert_eq!(assembler.next_record(), Ok(Some(leave)));
+        assert_eq!(assembler.next_record(), Ok(None));
+        assert_eq!(assembler.buffer.capacity(), 0, "after a record");
+        assembler.room();
+        assembler.rest();
+        assert_eq!(assembler.buffer.capacity(), 0, "after nothing has come");
+    }
+
+    #[test]
+    fn the_buffer_of_a_long_record_is_used_again_once_nothing_refers_to_it() {
+        let head = Head::Deliver {
+            flags: Flags::default(),
+            source: JausId::new(1, 1, 1),
+            destination: JausId::new(1, 1, 2),
+            path: None,
+        };
+        let payload = Bytes::from(vec![7; 1 << 20]);
+        let record = Record { head, payload };
+        let mut assembler = Assembler::new(usize::MAX);
+        let mut read = || {
+            record.encode_head(assembler.room());
+            assert_eq!(assembler.next_record(), Ok(None));
+            assembler.room().extend_from_slice(&record.payload);
+            assembler.next_record().unwrap().unwrap()
+        };
+        let (first, second) = (read(), read());
+        assert_ne!(first.payload.as_ptr(), second.payload.as_ptr());
+        assert_eq!((&first, &second), (&record, &record));
+        let places = [first, second].map(|record| record.payload.as_ptr());
+        let again = [read(), read()].map(|record| record.payload.as_ptr());
+        assert_eq!(places, again);
+    }
+
+    #[test]
+    fn the_pool_is_bounded() {
+        let held: Vec<_> = (0..100).map(|_| freeze(vec![0; 1 << 20])).collect();
+        assert_eq!(POOL.with_borrow(Vec::len), 8);
+        drop(held);
+        assert_eq!(reuse(400_000), None, "far too large");
+        let large = freeze(vec![0; POOL_OCTETS + 1]);
+        assert!(large.is_unique(), "not kept");
     }
 }

@@ -223,16 +223,19 @@ impl Record {
     /// # Errors
     /// [`RecordError::Malformed`] if its kind is unknown or its fields cannot be read.
     pub fn decode(mut octets: Bytes) -> Result<Self, RecordError> {
-        let mut rest = &octets[..];
-        let Some(head) = Head::decode(&mut rest) else {
-            let (kind, length) = (octets.first().copied().unwrap_or(0), octets.len());
-            return Err(RecordError::Malformed { kind, length });
-        };
-        octets.advance(octets.len() - rest.len());
+        let (head, payload) = Head::split_off(&octets)?;
+        octets.advance(octets.len() - payload.len());
         Ok(Self {
             head,
             payload: octets,
         })
+    }
+
+    /// The same, with a copy of the payload.
+    pub(super) fn copy(octets: &[u8]) -> Result<Self, RecordError> {
+        let (head, payload) = Head::split_off(octets)?;
+        let payload = Bytes::copy_from_slice(payload);
+        Ok(Self { head, payload })
     }
 }
 
@@ -289,6 +292,16 @@ impl Head {
                 outcome.encode(out);
             }
         }
+    }
+
+    /// The head of a record, and what follows it.
+    fn split_off(octets: &[u8]) -> Result<(Self, &[u8]), RecordError> {
+        let mut rest = octets;
+        let head = Self::decode(&mut rest).ok_or_else(|| RecordError::Malformed {
+            kind: octets.first().copied().unwrap_or(0),
+            length: octets.len(),
+        })?;
+        Ok((head, rest))
     }
 
     fn decode(octets: &mut &[u8]) -> Option<Self> {
