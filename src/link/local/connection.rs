@@ -166,12 +166,19 @@ impl Writer {
     /// when enough has been collected: a burst costs a few calls and not one for each record.
     pub(crate) fn send_now(&mut self, record: &Record) {
         self.queue(record);
-        if !self.is_full && (!self.had_turn || self.waiting >= COLLECTED) {
+        if !self.had_turn || self.waiting >= COLLECTED {
             self.had_turn = true;
+            self.flush_now();
+        }
+        self.wake_task();
+    }
+
+    /// Writes what waits, as far as the socket takes it.
+    pub(crate) fn flush_now(&mut self) {
+        if !self.is_full {
             // The task finds the error too, and knows what to do.
             let _ = self.try_flush();
         }
-        self.wake_task();
     }
 
     fn wake_task(&mut self) {

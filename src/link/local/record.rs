@@ -12,7 +12,7 @@
 //! | 17 | Welcome | id u32, longest message u32 | |
 //! | 18 | Refused | reason u8 | why |
 //! | 19 | Deliver | flags u8, source u32, destination u32, path | the message |
-//! | 20 | Outcome | handle u64, outcome u8, destination u32, acknowledged u32, length u32 | why it was rejected |
+//! | 20 | Outcome | handle u64, outcome u8; if that is 1 to 3, destination u32, acknowledged u32, length u32 | why it was rejected |
 //!
 //! A path is 00h for a message from the same node; 01h and the link u16 for a serial line; 02h, link
 //! u16, IPv6 address (IPv4 mapped), port u16 and scope u32 for a socket.
@@ -355,38 +355,33 @@ impl Outcome {
     ];
 
     fn encode(self, out: &mut Vec<u8>) {
-        let (code, destination, acknowledged, length) = match self {
-            Self::Acknowledged => (0, 0, 0, 0),
+        match self {
+            Self::Acknowledged => out.put_u8(0),
             Self::NotAcknowledged {
                 reason,
                 destination,
                 acknowledged,
                 length,
             } => {
-                let code = 1 + Self::REASONS.iter().take_while(|&&r| r != reason).count() as u8;
-                (code, destination.to_u32(), acknowledged, length)
+                let before = Self::REASONS.iter().take_while(|&&r| r != reason);
+                out.put_u8(1 + before.count() as u8);
+                for field in [destination.to_u32(), acknowledged, length] {
+                    out.put_u32_le(field);
+                }
             }
-            Self::Rejected => (4, 0, 0, 0),
-        };
-        out.put_u8(code);
-        for field in [destination, acknowledged, length] {
-            out.put_u32_le(field);
+            Self::Rejected => out.put_u8(4),
         }
     }
 
     fn decode(octets: &mut &[u8]) -> Option<Self> {
-        let code = octets.try_get_u8().ok()?;
-        let destination = id(octets)?;
-        let acknowledged = octets.try_get_u32_le().ok()?;
-        let length = octets.try_get_u32_le().ok()?;
-        Some(match code {
+        Some(match octets.try_get_u8().ok()? {
             0 => Self::Acknowledged,
             4 => Self::Rejected,
             code => Self::NotAcknowledged {
                 reason: *Self::REASONS.get(usize::from(code) - 1)?,
-                destination,
-                acknowledged,
-                length,
+                destination: id(octets)?,
+                acknowledged: octets.try_get_u32_le().ok()?,
+                length: octets.try_get_u32_le().ok()?,
             },
         })
     }

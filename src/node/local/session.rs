@@ -176,6 +176,8 @@ impl Session {
     /// Reads what the component sends until it is gone.
     async fn read(&self, reader: &mut Reader) -> Result<Departure, Error> {
         while !self.handle_records(reader)? {
+            // Outcomes of what was read leave before more is read.
+            self.answers.lock().flush_now();
             // Writing has its turn before each look, and goes on when the component reads.
             let may_read = || self.answers.lock().len() < MAX_WAITING;
             reader.fill(may_read).await?;
