@@ -24,6 +24,8 @@ pub struct LinkProfile {
     pub own: BTreeSet<SocketAddr>,
     /// The most datagrams that it takes in one [`Transmit`]; 0 and 1 mean one.
     pub max_segments: usize,
+    /// Whether the other end reads only the first message of a datagram.
+    pub reads_one: bool,
 }
 
 impl LinkProfile {
@@ -34,7 +36,13 @@ impl LinkProfile {
             framing: Framing::Judp,
             own: own.into_iter().collect(),
             max_segments: 1,
+            reads_one: false,
         }
+    }
+
+    /// Whether several messages may share a datagram.
+    pub(super) const fn packs(&self) -> bool {
+        matches!(self.framing, Framing::Judp) && !self.reads_one
     }
 }
 

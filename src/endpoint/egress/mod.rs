@@ -178,7 +178,8 @@ impl Egress {
         let is_awaited = flags.acknowledgement() == Acknowledgement::Request;
         let may_wait = !is_awaited && may_pack(&octets, self.longest_packed);
         let patience = self.patience.filter(|_| may_wait);
-        let is_packed = patience.filter(|_| self.framing(hop.0) == Framing::Judp);
+        let packs = self.links.get(&hop.0).is_some_and(LinkProfile::packs);
+        let is_packed = patience.filter(|_| packs);
         let held_until = is_packed.map(|patience| now + patience);
         let queue = self.queues.get(now, hop);
         queue.push(priority, octets, held_until);
@@ -268,10 +269,7 @@ impl Egress {
                 queue.join_fragments(level, segments(link), &mut leaving, &mut self.buffer)
             } else {
                 let before = queue.waiting();
-                let longest = match link.framing {
-                    Framing::Judp => self.longest_packed,
-                    Framing::Jtcp | Framing::Jserial => 0,
-                };
+                let longest = if link.packs() { self.longest_packed } else { 0 };
                 let joined = queue.join_messages(level, segments(link), longest, &mut self.buffer);
                 let taken = before.into_iter().zip(queue.waiting());
                 for (waiting, (before, after)) in self.waiting.iter_mut().zip(taken) {

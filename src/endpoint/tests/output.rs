@@ -392,6 +392,19 @@ fn messages_on_a_connection_are_not_joined() {
 }
 
 #[test]
+fn messages_to_one_who_reads_the_first_of_a_datagram_are_not_joined() {
+    let mut rig = with_packing(Packing::Within(Duration::from_millis(5)));
+    let profile = LinkProfile {
+        reads_one: true,
+        ..LinkProfile::judp([])
+    };
+    rig.endpoint.add_link(WIRE, profile);
+    rig.meet_peer();
+    (0..3).for_each(|_| drop(rig.send(to_peer())));
+    assert_eq!(rig.transmits().len(), 3, "each alone, and at once");
+}
+
+#[test]
 fn a_message_that_is_to_be_acknowledged_does_not_wait_for_others() {
     let [alone, packed] =
         [Packing::Off, Packing::Within(Duration::from_millis(2))].map(|packing| {
