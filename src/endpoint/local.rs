@@ -6,7 +6,7 @@ use crate::address::JausId;
 use crate::wire::Broadcast;
 
 /// Why a component cannot be attached.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AttachError {
     /// The id has a zero or a wildcard.
@@ -23,6 +23,9 @@ pub enum AttachError {
         /// [`Config::max_components`](super::Config::max_components).
         limit: usize,
     },
+    /// A link cannot serve the id, and says why.
+    #[error("{0}")]
+    Link(String),
 }
 
 /// The attached components.

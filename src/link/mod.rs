@@ -3,7 +3,8 @@
 //! A link knows no JAUS: what the bytes mean is the endpoint's business. There is one
 //! [`UdpLink`](udp::UdpLink) per network interface, and one [`TcpLink`](tcp::TcpLink) for all
 //! connections, which reads the frames itself, because only they tell where one ends;
-//! there may be a `SerialLink` (feature `serial`) for each serial line.
+//! there may be a `SerialLink` (feature `serial`) for each serial line. In the place of UDP there may
+//! be a `JuniorLink` (on Unix), by which the node is a client of a Junior on the same host.
 //!
 //! # Several nodes on one host
 //!
@@ -23,7 +24,7 @@
 //! that they hear a node from.
 //!
 //! A program that binds port 3794 of *all* addresses without sharing, as Junior does, leaves no
-//! room for either socket: one of the two has to move.
+//! room for either socket: one of the two has to move, or the node becomes its client (`junior`).
 #![expect(clippy::disallowed_types, reason = "this is where sockets live")]
 
 pub(crate) mod backlog;
@@ -31,6 +32,8 @@ mod error;
 mod group;
 mod holder;
 pub mod interface;
+#[cfg(unix)]
+pub mod junior;
 pub mod local;
 #[cfg(feature = "serial")]
 pub mod serial;

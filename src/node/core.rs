@@ -7,6 +7,8 @@
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
+#[cfg(unix)]
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::{Duration, Instant, SystemTime};
@@ -26,6 +28,8 @@ use crate::address::JausId;
 use crate::endpoint::{
     self, AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, Sink, first_sequence_at,
 };
+#[cfg(unix)]
+use crate::link::junior::Claim;
 use crate::link::local::Process;
 use crate::link::udp::UdpLink;
 use crate::link::{Interface, Slab};
@@ -49,6 +53,9 @@ pub(super) fn now() -> Instant {
 #[derive(Debug)]
 pub(super) struct Shared {
     core: Mutex<Core>,
+    /// Where components are clients of Junior's node manager, if they are.
+    #[cfg(unix)]
+    junior: Option<PathBuf>,
     pub(super) stopped: watch::Sender<bool>,
     /// Whether no component process can come in (any more).
     pub(super) closed: watch::Sender<bool>,
@@ -66,6 +73,8 @@ impl Shared {
         let core = Core::new(endpoint, links, config.mailbox);
         Self {
             core: Mutex::new(core),
+            #[cfg(unix)]
+            junior: config.junior.clone(),
             stopped: watch::Sender::new(false),
             closed: watch::Sender::new(true),
             residents: Residents::default(),
@@ -82,6 +91,30 @@ impl Shared {
             commons.push(common.clone());
             common
         })
+    }
+
+    /// Takes in a component; `process` is where it lives, if not here. What the file system is
+    /// asked for happens without the lock.
+    pub(super) fn attach(
+        &self,
+        id: JausId,
+        process: Option<Process>,
+    ) -> Result<Arc<Mailbox>, AttachError> {
+        let mailbox = self.lock().attach(id, process)?;
+        #[cfg(unix)]
+        if let Some(folder) = &self.junior {
+            let claim = Claim::new(folder, id);
+            let mut core = self.lock();
+            match claim {
+                Ok(claim) => core.links.admit(claim),
+                Err(error) => {
+                    core.detach(id, &mailbox, Departure::Left);
+                    return Err(AttachError::Link(error.to_string()));
+                }
+            }
+            core.wake_driver();
+        }
+        Ok(mailbox)
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Core> {
@@ -191,8 +224,8 @@ impl Core {
         }
     }
 
-    /// Takes in a component; `process` is where it lives, if not here.
-    pub(super) fn attach(
+    /// Takes in a component, but for what [`Shared::attach`] does besides.
+    fn attach(
         &mut self,
         id: JausId,
         process: Option<Process>,
@@ -214,6 +247,7 @@ impl Core {
             self.endpoint.detach(id);
             self.mailboxes.remove(&id);
             self.awaiting.forget_source(id);
+            self.links.release(id);
             self.attendance.depart(id, why);
         }
     }

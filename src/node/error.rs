@@ -18,6 +18,10 @@ pub enum StartError {
     /// A link cannot be opened.
     #[error(transparent)]
     Link(#[from] link::Error),
+    /// The folder of Junior's sockets cannot be used.
+    #[cfg(unix)]
+    #[error(transparent)]
+    Junior(#[from] link::junior::Error),
     /// The component processes of this host cannot be served.
     #[error(transparent)]
     Local(#[from] link::local::Error),

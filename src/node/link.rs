@@ -5,8 +5,11 @@ use std::task::{Context, Poll};
 use std::time::Instant;
 
 use super::core::Receivers;
+use crate::address::JausId;
 use crate::endpoint::{Endpoint, Ingress, LinkId, LinkProfile, Path, Remote, Transmit};
 use crate::link::Slab;
+#[cfg(unix)]
+use crate::link::junior::JuniorLink;
 #[cfg(feature = "serial")]
 use crate::link::serial::{self, SerialLink};
 use crate::link::tcp::{Arrival, TcpLink};
@@ -19,6 +22,8 @@ const BATCH: usize = 64;
 #[derive(Debug)]
 pub(super) enum Link {
     Udp(UdpLink),
+    #[cfg(unix)]
+    Junior(JuniorLink),
     Tcp(TcpLink),
     #[cfg(feature = "serial")]
     Serial(SerialLink),
@@ -39,6 +44,14 @@ impl Link {
         }
     }
 
+    #[cfg(unix)]
+    pub(super) const fn junior(&self) -> Option<&JuniorLink> {
+        match self {
+            Self::Junior(link) => Some(link),
+            _ => None,
+        }
+    }
+
     #[cfg(feature = "serial")]
     pub(super) const fn serial(&self) -> Option<&SerialLink> {
         match self {
@@ -53,6 +66,11 @@ impl Link {
             Self::Udp(link) => LinkProfile {
                 max_segments: link.max_segments(),
                 ..LinkProfile::judp(own)
+            },
+            #[cfg(unix)]
+            Self::Junior(_) => LinkProfile {
+                reads_one: true,
+                ..LinkProfile::judp([])
             },
             Self::Tcp(_) => LinkProfile {
                 framing: self.framing(),
@@ -70,6 +88,8 @@ impl Link {
     pub(super) const fn framing(&self) -> Framing {
         match self {
             Self::Udp(_) => Framing::Judp,
+            #[cfg(unix)]
+            Self::Junior(_) => Framing::Judp,
             Self::Tcp(_) => Framing::Jtcp,
             #[cfg(feature = "serial")]
             Self::Serial(_) => Framing::Jserial,
@@ -80,6 +100,8 @@ impl Link {
     pub(super) fn name(&self) -> String {
         match self {
             Self::Udp(link) => link.interface().name.clone(),
+            #[cfg(unix)]
+            Self::Junior(_) => "junior".to_owned(),
             Self::Tcp(_) => "tcp".to_owned(),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.settings().device.clone(),
@@ -90,6 +112,8 @@ impl Link {
     pub(super) fn transmit(&mut self, transmit: &Transmit) {
         match self {
             Self::Udp(link) => link.transmit(transmit),
+            #[cfg(unix)]
+            Self::Junior(link) => link.transmit(transmit),
             Self::Tcp(link) => link.transmit(transmit),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.transmit(transmit),
@@ -107,6 +131,8 @@ impl Link {
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>, now: Instant) -> Poll<()> {
         match self {
             Self::Udp(link) => link.poll_flush(cx),
+            #[cfg(unix)]
+            Self::Junior(link) => link.poll_flush(cx),
             Self::Tcp(link) => link.poll_flush(cx, now),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.poll_flush(cx),
@@ -116,8 +142,19 @@ impl Link {
     /// Takes leave of those who are at the other end, where that means anything to them.
     pub(super) fn hang_up(&mut self) -> Poll<()> {
         match self {
+            #[cfg(unix)]
+            Self::Junior(link) => link.hang_up(),
             Self::Tcp(link) => link.hang_up(),
             _ => Poll::Ready(()),
+        }
+    }
+
+    /// A component has gone.
+    pub(super) fn release(&mut self, id: JausId) {
+        match self {
+            #[cfg(unix)]
+            Self::Junior(link) => link.release(id),
+            _ => {}
         }
     }
 
@@ -125,6 +162,8 @@ impl Link {
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         match self {
             Self::Udp(_) => None,
+            #[cfg(unix)]
+            Self::Junior(link) => link.poll_timeout(),
             Self::Tcp(link) => link.poll_timeout(),
             #[cfg(feature = "serial")]
             Self::Serial(link) => link.poll_timeout(),
@@ -154,6 +193,16 @@ impl Link {
                 }
                 true
             }
+            #[cfg(unix)]
+            Self::Junior(link) => link.receive(cx, now, slab, |datagram| {
+                let path = from(Remote::Line);
+                receivers.taps.datagram(path, &datagram);
+                let ingress = Ingress {
+                    path,
+                    to_all: false,
+                };
+                endpoint.handle_datagram(now, ingress, datagram, receivers);
+            }),
             Self::Tcp(link) => link.receive(cx, now, |arrival| match arrival {
                 Arrival::Frame {
                     remote,

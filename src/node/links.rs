@@ -11,7 +11,10 @@ use std::time::Instant;
 
 use super::link::Link;
 use super::{Config, Peer, StartError};
+use crate::address::JausId;
 use crate::endpoint::{LinkId, Path, StaticPeer};
+#[cfg(unix)]
+use crate::link::junior::{Claim, JuniorLink};
 #[cfg(feature = "serial")]
 use crate::link::serial::SerialLink;
 use crate::link::tcp::TcpLink;
@@ -65,6 +68,10 @@ impl Links {
         if config.uses_udp() {
             links.open_udp()?;
         }
+        #[cfg(unix)]
+        if let Some(folder) = &config.junior {
+            links.insert(Link::Junior(JuniorLink::open(folder)?));
+        }
         if config.tcp.is_used() {
             let link = TcpLink::open(&config.tcp.settings(&config.access))?;
             links.insert(Link::Tcp(link));
@@ -113,6 +120,29 @@ impl Links {
 
     pub(super) fn tcp(&self) -> Option<(LinkId, &TcpLink)> {
         self.iter().find_map(|(id, link)| Some((id, link.tcp()?)))
+    }
+
+    #[cfg(unix)]
+    pub(super) fn junior(&self) -> Option<(LinkId, &JuniorLink)> {
+        self.iter()
+            .find_map(|(id, link)| Some((id, link.junior()?)))
+    }
+
+    /// Registers a component with Junior's node manager.
+    #[cfg(unix)]
+    pub(super) fn admit(&mut self, claim: Claim) {
+        for link in self.open.values_mut() {
+            if let Link::Junior(link) = link {
+                return link.admit(claim);
+            }
+        }
+    }
+
+    /// A component has gone.
+    pub(super) fn release(&mut self, id: JausId) {
+        for link in self.open.values_mut() {
+            link.release(id);
+        }
     }
 
     #[cfg(feature = "serial")]

@@ -51,6 +51,8 @@ mod resident;
 mod tap;
 
 use std::net::SocketAddr;
+#[cfg(unix)]
+use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use self::attendance::{ComponentEvent, Departure};
@@ -76,6 +78,8 @@ use self::local::Server;
 use self::mailbox::Mailbox;
 use crate::address::JausId;
 use crate::endpoint::{self, Event, LinkId};
+#[cfg(unix)]
+use crate::link::junior;
 use crate::link::local::Listener;
 #[cfg(feature = "serial")]
 use crate::link::serial;
@@ -161,9 +165,10 @@ impl Node {
     /// stand in for components that are elsewhere.
     ///
     /// # Errors
-    /// An id that names no single component, or is attached already.
+    /// An id that names no single component, or is attached already, here or (with
+    /// [`Config::junior`]) as another client of Junior.
     pub fn attach_as(&self, id: JausId) -> Result<Port, AttachError> {
-        let mailbox = self.shared().lock().attach(id, None)?;
+        let mailbox = self.shared().attach(id, None)?;
         Ok(Port::new(id, mailbox, self.guard.clone()))
     }
 
@@ -204,6 +209,20 @@ impl Node {
             listening: tcp.local(),
             connections: tcp.connections().collect(),
             counters: tcp.counters(),
+        })
+    }
+
+    /// The link through Junior's node manager, if it is configured and the node has not stopped.
+    #[cfg(unix)]
+    #[must_use]
+    pub fn junior(&self) -> Option<JuniorReport> {
+        let core = self.shared().lock();
+        let (link, junior) = core.links.junior()?;
+        Some(JuniorReport {
+            link,
+            folder: junior.folder().to_owned(),
+            is_registered: junior.is_registered(),
+            counters: junior.counters(),
         })
     }
 
@@ -317,6 +336,20 @@ pub struct TcpReport {
     pub connections: Vec<tcp::ConnectionReport>,
     /// What has become of connections and messages.
     pub counters: tcp::Counters,
+}
+
+/// The link of a node through Junior's node manager, as it is now.
+#[cfg(unix)]
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JuniorReport {
+    /// Its number in [`Path`](endpoint::Path).
+    pub link: LinkId,
+    /// Where Junior's sockets are.
+    pub folder: PathBuf,
+    /// Whether the node manager is there and has accepted all components.
+    pub is_registered: bool,
+    /// What has come and gone.
+    pub counters: junior::Counters,
 }
 
 /// One serial line of a node, as it is now.

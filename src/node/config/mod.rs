@@ -14,6 +14,7 @@
 //! ttl = 16
 //! peers = ["192.168.7.2", "192.168.7.3:3795", "[fe80::2%eth0]:3794"]
 //! local = "default"                    # or a path, or "off" (the default)
+//! junior = "/tmp"                      # through Junior's node manager in the place of UDP (Unix)
 //! max_message = "4MiB"                 # sizes: octets, or with a unit (see `units`)
 //!
 //! [mailbox]
@@ -36,6 +37,7 @@
 //! Each section has a file of its own here.
 
 mod delivery;
+mod error;
 mod limits;
 mod peer;
 #[cfg(feature = "serial")]
@@ -43,18 +45,22 @@ mod serial;
 mod tcp;
 pub mod units;
 
+#[cfg(unix)]
+use std::path::PathBuf;
+
 pub use self::delivery::{Delivery, InvalidDelivery};
+pub use self::error::ConfigError;
 pub use self::limits::{Limits, Routing};
 pub use self::peer::Peer;
 pub use self::tcp::{InvalidListen, Listen, Tcp};
 use super::mailbox::MailboxLimits;
-use crate::address::{JausId, ParseIdError};
+use crate::address::JausId;
 use crate::endpoint::{self, Access, PAYLOAD_LIMITS};
 use crate::link::local::{Address, Local};
 #[cfg(feature = "serial")]
 use crate::link::serial::Settings as SerialLine;
 use crate::link::udp::{self, Broadcasts, PortTaken};
-use crate::link::{Group, Group6, Interfaces, InvalidGroup, Ip};
+use crate::link::{Group, Group6, Interfaces, Ip};
 use crate::peer::Assignment;
 
 const LONGEST_MESSAGE: usize = 16 << 20;
@@ -113,6 +119,11 @@ pub struct Config {
     pub mailbox: MailboxLimits,
     /// Where component processes of this host may attach, if at all.
     pub local: Local,
+    /// The folder of Junior's sockets, `/tmp` as it comes. With it the components are clients of
+    /// the node manager of a Junior on this host, and there is no UDP of our own: interfaces,
+    /// port, group and peers are Junior's business.
+    #[cfg(unix)]
+    pub junior: Option<PathBuf>,
     /// TCP connections, to and from other nodes.
     pub tcp: Tcp,
     /// Serial lines.
@@ -159,6 +170,8 @@ impl Config {
             max_message: endpoint.max_message,
             mailbox: MailboxLimits::default(),
             local: Local::Off,
+            #[cfg(unix)]
+            junior: None,
             tcp: Tcp::default(),
             #[cfg(feature = "serial")]
             serial: Vec::new(),
@@ -220,6 +233,14 @@ impl Config {
     #[must_use]
     pub fn local(mut self, address: Address) -> Self {
         self.local = Local::At(address);
+        self
+    }
+
+    /// Makes the components clients of the Junior on this host whose sockets are in this folder.
+    #[cfg(unix)]
+    #[must_use]
+    pub fn junior(mut self, folder: impl Into<PathBuf>) -> Self {
+        self.junior = Some(folder.into());
         self
     }
 
@@ -285,6 +306,10 @@ impl Config {
         if self.tcp.listen.is_some() && most == 0 {
             return Err(ConfigError::MaxAccepted);
         }
+        #[cfg(unix)]
+        if self.junior.is_some() && self.routing.forward {
+            return Err(ConfigError::JuniorForward);
+        }
         #[cfg(feature = "serial")]
         serial::validate(&self.serial)?;
         limits::validate(&self.routing, &self.limits)?;
@@ -322,8 +347,13 @@ impl Config {
         self.tcp.is_used()
     }
 
-    /// Whether UDP is wanted: an empty list of interfaces turns it off, if there is another way.
+    /// Whether UDP is wanted: Junior takes its place, and an empty list of interfaces turns it off,
+    /// if there is another way.
     pub(super) fn uses_udp(&self) -> bool {
+        #[cfg(unix)]
+        if self.junior.is_some() {
+            return false;
+        }
         let another_way = self.has_streams() || matches!(self.local, Local::At(_));
         self.interfaces != Interfaces::Only(Vec::new()) || !another_way
     }
@@ -340,92 +370,6 @@ impl Config {
             ..udp::Settings::default()
         }
     }
-}
-
-/// A setting that no node can have.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ConfigError {
-    /// 0 names nobody, 65535 everybody.
-    #[error("subsystem {0} cannot be: choose a number from 1 to 65534")]
-    Subsystem(u16),
-    /// 0 names nobody, 255 everybody.
-    #[error("node {0} cannot be: choose a number from 1 to 254")]
-    Node(u8),
-    /// Too little for a packet, or more than one holds.
-    #[error("payload_limit {0} cannot be: choose from 64 to 4079 octets of payload in a packet")]
-    PayloadLimit(usize),
-    /// Less than a packet, more than there are fragments for, or more than a small board should be asked to keep.
-    #[error("max_message {message} cannot be: choose from {payload} (payload_limit) to {longest}")]
-    MaxMessage {
-        /// The length that was chosen, in octets.
-        message: usize,
-        /// [`Config::payload_limit`].
-        payload: usize,
-        /// The most, in octets: 16 MiB, and no more fragments than there are sequence numbers.
-        longest: usize,
-    },
-    /// A table without room, or too large.
-    #[error("max_peers {0} cannot be: choose from 1 to 65536")]
-    MaxPeers(usize),
-    /// A rate of nothing.
-    #[error(
-        "{key} = {{ per_second = {per_second}, burst = {burst} }} cannot be: choose at least 1 for each"
-    )]
-    Rate {
-        /// Section and key.
-        key: &'static str,
-        /// How many in a second.
-        per_second: u32,
-        /// How many at once.
-        burst: u32,
-    },
-    /// A listener that lets nobody in.
-    #[error(
-        "tcp.max_accepted or tcp.max_per_address 0 lets nobody connect: choose 1 or more, or leave \
-             tcp.listen out"
-    )]
-    MaxAccepted,
-    /// Nothing is on a serial line at 0 bits per second.
-    #[error(
-        "baud {baud} of the serial line {device} cannot be: choose what both ends have, such as 19200 or 115200"
-    )]
-    Baud {
-        /// The port.
-        device: String,
-        /// The rate that was chosen.
-        baud: u32,
-    },
-    /// Neither one nor two stop bits.
-    #[error("stop_bits {stop_bits} of the serial line {device} cannot be: choose 1 or 2")]
-    StopBits {
-        /// The port.
-        device: String,
-        /// The number that was chosen.
-        stop_bits: u8,
-    },
-    /// Two lines on one port.
-    #[error("the serial port {0} is named twice: leave one out")]
-    SerialTwice(String),
-    /// A mailbox without room.
-    #[error("a mailbox must hold at least 1 message")]
-    Mailbox,
-    /// A setting of the section `delivery`.
-    #[error(transparent)]
-    Delivery(InvalidDelivery),
-    /// Not a multicast group.
-    #[error(transparent)]
-    Group(InvalidGroup),
-    /// The id of a peer is none.
-    #[error("the id of a peer: {0}")]
-    PeerId(ParseIdError),
-    /// Not the address of a peer.
-    #[error(
-        "`{0}` is no peer's address: write an address of one host, with a port if it is not 3794, \
-         such as 192.168.7.2, 192.168.7.2:3795, [fd00::2]:3795 or (IPv6's link-local addresses \
-         need the interface) [fe80::2%eth0]:3794"
-    )]
-    Peer(String),
 }
 
 #[cfg(test)]

@@ -167,16 +167,14 @@ impl Registrar {
         let id = self.full_id(version, wanted)?;
         let deadline = tokio::time::Instant::now() + OVERLAP;
         loop {
-            let (error, holder) = {
-                let mut core = self.shared.lock();
-                if core.is_stopping() {
-                    return Err((Reason::Stopping, "the node is about to stop".to_owned()));
-                }
-                match core.attach(id, Some(process.clone())) {
-                    Ok(mailbox) => return Ok((id, mailbox)),
-                    Err(error) => (error, core.attendance.process(id).cloned()),
-                }
+            if self.shared.lock().is_stopping() {
+                return Err((Reason::Stopping, "the node is about to stop".to_owned()));
+            }
+            let error = match self.shared.attach(id, Some(process.clone())) {
+                Ok(mailbox) => return Ok((id, mailbox)),
+                Err(error) => error,
             };
+            let holder = self.shared.lock().attendance.process(id).cloned();
             let may_be_dead = matches!(error, AttachError::AlreadyAttached(_)) && holder.is_some();
             if !may_be_dead || tokio::time::Instant::now() >= deadline {
                 return Err(refusal(&error, holder));
@@ -221,6 +219,7 @@ fn refusal(error: &AttachError, holder: Option<Process>) -> Refusal {
             return (Reason::Taken, why);
         }
         AttachError::TooMany { .. } => Reason::TooMany,
+        AttachError::Link(_) => Reason::Taken,
         _ => Reason::WrongId,
     };
     (reason, error.to_string())

@@ -1,0 +1,294 @@
+//! The sockets in the folder of Junior's node manager: its own, and one for each client.
+
+use std::fs::{self, Permissions};
+use std::io::{self, ErrorKind};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
+use std::os::unix::net::{SocketAddr, UnixDatagram};
+use std::path::{Path, PathBuf};
+use std::task::{Context, Poll};
+
+use tokio::io::ReadBuf;
+use tokio::net;
+
+use crate::address::JausId;
+
+/// The folder that Junior uses unless fkie's `SockPath` names another.
+pub const DEFAULT_FOLDER: &str = "/tmp";
+
+/// Why a component cannot be a client of Junior's node manager.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// There can be no sockets.
+    #[error(
+        "`{}` cannot be the folder of Junior's sockets: it must be a folder whose path has at most \
+         90 octets. Junior uses /tmp, fkie's what its `SockPath` says", .0.display()
+    )]
+    Folder(PathBuf),
+    /// The node manager cannot be reached.
+    #[error(
+        "Junior's node manager cannot be reached at {} ({source}): {}", .path.display(),
+        remedy(source, path, "start it (JuniorRTE, or NodeManager of the JAUS Tool Set)")
+    )]
+    Manager {
+        /// Its socket.
+        path: PathBuf,
+        /// The operating system's words.
+        source: io::Error,
+    },
+    /// Another client has the id.
+    #[error(
+        "{id} is held by another client of Junior's node manager, which reads {}: choose another \
+         id, or end that program", .path.display()
+    )]
+    Taken {
+        /// The id.
+        id: JausId,
+        /// The other client's socket.
+        path: PathBuf,
+    },
+    /// The socket for an id cannot be made.
+    #[error(
+        "{id} cannot be a client of Junior's node manager: its socket {} cannot be made ({source}): \
+         {}", .path.display(), remedy(source, path, "see to that path")
+    )]
+    Socket {
+        /// The id.
+        id: JausId,
+        /// Its socket.
+        path: PathBuf,
+        /// The operating system's words.
+        source: io::Error,
+    },
+}
+
+fn remedy(error: &io::Error, path: &Path, otherwise: &str) -> String {
+    match error.kind() {
+        ErrorKind::PermissionDenied => format!(
+            "start the node manager and this program as the same user, or, if {0} is another \
+             user's, `sudo chmod o+w {0}`",
+            path.display()
+        ),
+        _ => otherwise.to_owned(),
+    }
+}
+
+/// Whether a node manager reads its socket in this folder.
+///
+/// # Errors
+/// Why not, and what to do.
+pub fn check(folder: &Path) -> Result<(), Error> {
+    check_folder(folder)?;
+    let path = manager_in(folder);
+    connect(folder)
+        .map(drop)
+        .map_err(|source| Error::Manager { path, source })
+}
+
+pub(super) fn check_folder(folder: &Path) -> Result<(), Error> {
+    let longest = client_in(folder, JausId::EVERYONE);
+    let is_fit = folder.is_dir() && SocketAddr::from_pathname(longest).is_ok();
+    is_fit
+        .then_some(())
+        .ok_or_else(|| Error::Folder(folder.to_owned()))
+}
+
+pub(super) fn manager_in(folder: &Path) -> PathBuf {
+    folder.join("JuniorRTE")
+}
+
+fn client_in(folder: &Path, id: JausId) -> PathBuf {
+    folder.join(id.to_u32().to_string())
+}
+
+/// A socket that sends to the node manager, and does not block.
+pub(super) fn connect(folder: &Path) -> io::Result<UnixDatagram> {
+    let socket = UnixDatagram::unbound()?;
+    socket.connect(manager_in(folder))?;
+    socket.set_nonblocking(true)?;
+    Ok(socket)
+}
+
+/// The socket at which the node manager reaches one component. Its file goes with it.
+#[derive(Debug)]
+pub(crate) struct Claim {
+    id: JausId,
+    path: PathBuf,
+    /// Device and number of the file: another client may have taken its place.
+    file: (u64, u64),
+    /// The socket, until the runtime watches it: components are attached outside it too.
+    idle: Option<UnixDatagram>,
+    watched: Option<net::UnixDatagram>,
+}
+
+impl Claim {
+    /// Takes the place of an id. A dead client's socket is replaced, a living one's is not.
+    pub(crate) fn new(folder: &Path, id: JausId) -> Result<Self, Error> {
+        let path = client_in(folder, id);
+        let failed = |source| {
+            let path = client_in(folder, id);
+            Error::Socket { id, path, source }
+        };
+        let socket = match UnixDatagram::bind(&path) {
+            Err(error) if error.kind() == ErrorKind::AddrInUse => {
+                if !is_dead(&path) {
+                    return Err(Error::Taken { id, path });
+                }
+                fs::remove_file(&path).map_err(failed)?;
+                tracing::info!(%id, "replaced the socket of a client of Junior that is gone");
+                UnixDatagram::bind(&path)
+            }
+            bound => bound,
+        };
+        let socket = socket.map_err(failed)?;
+        socket.set_nonblocking(true).map_err(failed)?;
+        let claim = Self {
+            id,
+            file: file_at(&path).map_err(failed)?,
+            path,
+            idle: Some(socket),
+            watched: None,
+        };
+        // The node manager may be another user's, and must be able to write here.
+        let rights = Permissions::from_mode(0o666);
+        fs::set_permissions(&claim.path, rights).map_err(failed)?;
+        Ok(claim)
+    }
+
+    pub(super) const fn id(&self) -> JausId {
+        self.id
+    }
+
+    /// Receives a datagram, within a runtime.
+    pub(super) fn poll_recv(
+        &mut self,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        if let Some(socket) = self.idle.take() {
+            self.watched = Some(net::UnixDatagram::from_std(socket)?);
+        }
+        match &self.watched {
+            Some(socket) => socket.poll_recv(cx, buffer),
+            None => Poll::Pending,
+        }
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        if file_at(&self.path).is_ok_and(|file| file == self.file) {
+            // A file that stays is recognised as stale by the next client.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+fn file_at(path: &Path) -> io::Result<(u64, u64)> {
+    let file = fs::symlink_metadata(path)?;
+    Ok((file.dev(), file.ino()))
+}
+
+/// Whether a path leads to a socket that nobody reads.
+fn is_dead(path: &Path) -> bool {
+    let is_socket = fs::symlink_metadata(path).is_ok_and(|file| file.file_type().is_socket());
+    let answer = UnixDatagram::unbound().and_then(|socket| socket.connect(path));
+    is_socket && answer.is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ID: JausId = JausId::new(101, 1, 33);
+
+    fn folder(name: &str) -> PathBuf {
+        let name = format!("jaus-claim-{name}-{}", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+
+    #[test]
+    fn the_socket_of_an_id_is_named_as_junior_names_it_and_goes_with_its_claim() {
+        let folder = folder("name");
+        let claim = Claim::new(&folder, ID).unwrap();
+        let path = folder.join("6619425");
+        assert!(
+            UnixDatagram::unbound()
+                .unwrap()
+                .send_to(b"x", &path)
+                .is_ok()
+        );
+        drop(claim);
+        assert!(!path.exists());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_living_client_keeps_its_id_and_a_dead_one_is_replaced() {
+        let folder = folder("taken");
+        let path = client_in(&folder, ID);
+        let other = UnixDatagram::bind(&path).unwrap();
+        let error = Claim::new(&folder, ID).unwrap_err().to_string();
+        assert!(
+            error.contains("101.1.33 is held by another client"),
+            "{error}"
+        );
+        assert!(error.contains(path.to_str().unwrap()), "{error}");
+        other.set_nonblocking(true).unwrap();
+        assert!(other.recv(&mut [0; 8]).is_err(), "it must not notice");
+        drop(other);
+        drop(Claim::new(&folder, ID).unwrap());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn what_is_no_socket_is_not_removed() {
+        let folder = folder("file");
+        let path = client_in(&folder, ID);
+        fs::write(&path, "precious").unwrap();
+        let error = Claim::new(&folder, ID).unwrap_err();
+        assert!(matches!(error, Error::Taken { .. }), "{error}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "precious");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn the_socket_of_a_client_that_took_our_place_stays_when_we_go() {
+        let folder = folder("stolen");
+        let claim = Claim::new(&folder, ID).unwrap();
+        let path = client_in(&folder, ID);
+        // As Junior's library does without asking.
+        fs::remove_file(&path).unwrap();
+        let _thief = UnixDatagram::bind(&path).unwrap();
+        drop(claim);
+        assert!(path.exists());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_folder_that_is_none_or_has_too_long_a_path_is_refused_with_its_name() {
+        let missing = check_folder(Path::new("/nowhere/at/all")).unwrap_err();
+        assert!(missing.to_string().contains("/nowhere/at/all"));
+        let long = folder("long").join("x".repeat(100));
+        fs::create_dir_all(&long).unwrap();
+        assert!(matches!(check_folder(&long), Err(Error::Folder(_))));
+        fs::remove_dir_all(long.parent().unwrap()).unwrap();
+    }
+
+    #[test]
+    fn a_node_manager_that_does_not_run_is_named_with_its_path_and_a_remedy() {
+        let folder = folder("none");
+        let error = check(&folder).unwrap_err().to_string();
+        assert!(
+            error.contains("JuniorRTE") && error.contains("start it"),
+            "{error}"
+        );
+        let source = ErrorKind::PermissionDenied.into();
+        let path = manager_in(Path::new("/tmp"));
+        let error = Error::Manager { path, source }.to_string();
+        assert!(error.contains("`sudo chmod o+w /tmp/JuniorRTE`"), "{error}");
+        fs::remove_dir_all(folder).unwrap();
+    }
+}

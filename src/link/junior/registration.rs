@@ -1,0 +1,167 @@
+//! When a client of Junior's node manager has to do what. Without sockets and clock.
+//!
+//! Nothing tells a client that its node manager was restarted and knows it no more. So a probe goes
+//! there on the connected socket, which fails if the process that bound it has gone, however
+//! quickly another took its place.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use crate::address::JausId;
+
+/// The time between two attempts to find the node manager or to register, and between two probes.
+pub(super) const INTERVAL: Duration = Duration::from_millis(500);
+
+/// What to do now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Step {
+    /// Find the node manager.
+    Connect,
+    /// Ask it to take this id.
+    Register(JausId),
+    /// See whether it is still there.
+    Probe,
+}
+
+/// The ids to register, and what the node manager knows of them.
+#[derive(Debug, Default)]
+pub(super) struct Registration {
+    ids: BTreeSet<JausId>,
+    is_connected: bool,
+    /// When to connect or to probe; `None`: at the next opportunity.
+    next: Option<Instant>,
+    /// The ids that it has not accepted, and when each is due.
+    pending: BTreeMap<JausId, Option<Instant>>,
+}
+
+impl Registration {
+    pub(super) fn is_complete(&self) -> bool {
+        self.is_connected && self.pending.is_empty()
+    }
+
+    pub(super) fn add(&mut self, id: JausId) {
+        self.ids.insert(id);
+        self.pending.insert(id, None);
+    }
+
+    pub(super) fn remove(&mut self, id: JausId) {
+        self.ids.remove(&id);
+        self.pending.remove(&id);
+    }
+
+    /// The node manager is there, and knows nobody.
+    pub(super) fn handle_connected(&mut self) {
+        self.is_connected = true;
+        self.pending = self.ids.iter().map(|&id| (id, None)).collect();
+    }
+
+    /// The node manager has gone.
+    pub(super) fn handle_lost(&mut self) {
+        self.is_connected = false;
+        self.next = None;
+    }
+
+    /// The node manager has accepted an id; whether that is news.
+    pub(super) fn handle_accept(&mut self, id: JausId) -> bool {
+        self.pending.remove(&id).is_some()
+    }
+
+    /// What to do now, until there is nothing more.
+    pub(super) fn poll(&mut self, now: Instant) -> Option<Step> {
+        if is_due(self.next, now) {
+            self.next = Some(now + INTERVAL);
+            return Some(if self.is_connected {
+                Step::Probe
+            } else {
+                Step::Connect
+            });
+        }
+        let mut pending = self.pending.iter_mut().filter(|_| self.is_connected);
+        let (&id, next) = pending.find(|(_, next)| is_due(**next, now))?;
+        *next = Some(now + INTERVAL);
+        Some(Step::Register(id))
+    }
+
+    /// When to call [`poll`](Self::poll) even if nothing happens.
+    pub(super) fn poll_timeout(&self) -> Option<Instant> {
+        let pending = self.pending.values().filter(|_| self.is_connected);
+        pending.chain([&self.next]).copied().flatten().min()
+    }
+}
+
+fn is_due(at: Option<Instant>, now: Instant) -> bool {
+    at.is_none_or(|at| at <= now)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ONE: JausId = JausId::new(101, 1, 1);
+    const TWO: JausId = JausId::new(101, 1, 2);
+
+    fn steps(registration: &mut Registration, now: Instant) -> Vec<Step> {
+        std::iter::from_fn(|| registration.poll(now)).collect()
+    }
+
+    /// Two ids, of which the first is accepted.
+    fn half_registered(now: Instant) -> Registration {
+        let mut registration = Registration::default();
+        registration.add(ONE);
+        registration.add(TWO);
+        assert_eq!(steps(&mut registration, now), [Step::Connect]);
+        registration.handle_connected();
+        let both = [Step::Register(ONE), Step::Register(TWO)];
+        assert_eq!(steps(&mut registration, now), both);
+        assert!(registration.handle_accept(ONE));
+        registration
+    }
+
+    #[test]
+    fn the_node_manager_is_looked_for_until_it_is_there() {
+        let (mut registration, now) = (Registration::default(), Instant::now());
+        registration.add(ONE);
+        for attempt in 0..3 {
+            let now = now + attempt * INTERVAL;
+            assert_eq!(steps(&mut registration, now), [Step::Connect]);
+            assert_eq!(registration.poll_timeout(), Some(now + INTERVAL));
+            assert!(!registration.is_complete());
+        }
+    }
+
+    #[test]
+    fn each_id_is_registered_until_it_is_accepted() {
+        let now = Instant::now();
+        let mut registration = half_registered(now);
+        let later = [Step::Probe, Step::Register(TWO)];
+        assert_eq!(steps(&mut registration, now + INTERVAL), later);
+        assert!(!registration.is_complete());
+        assert!(registration.handle_accept(TWO));
+        assert!(!registration.handle_accept(TWO), "no news");
+        assert!(registration.is_complete());
+        assert_eq!(steps(&mut registration, now + 2 * INTERVAL), [Step::Probe]);
+    }
+
+    #[test]
+    fn a_node_manager_that_was_restarted_gets_all_ids_again() {
+        let now = Instant::now();
+        let mut registration = half_registered(now);
+        registration.handle_accept(TWO);
+        registration.handle_lost();
+        assert!(!registration.is_complete());
+        assert_eq!(steps(&mut registration, now), [Step::Connect]);
+        registration.handle_connected();
+        let both = [Step::Register(ONE), Step::Register(TWO)];
+        assert_eq!(steps(&mut registration, now), both);
+    }
+
+    #[test]
+    fn a_component_that_comes_later_is_registered_at_once_and_one_that_has_gone_no_more() {
+        let now = Instant::now();
+        let mut registration = half_registered(now);
+        registration.remove(TWO);
+        assert!(registration.is_complete());
+        registration.add(TWO);
+        assert_eq!(steps(&mut registration, now), [Step::Register(TWO)]);
+    }
+}

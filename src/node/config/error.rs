@@ -1,0 +1,97 @@
+//! The settings that no node can have.
+
+use super::InvalidDelivery;
+use crate::address::ParseIdError;
+use crate::link::InvalidGroup;
+
+/// A setting that no node can have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// 0 names nobody, 65535 everybody.
+    #[error("subsystem {0} cannot be: choose a number from 1 to 65534")]
+    Subsystem(u16),
+    /// 0 names nobody, 255 everybody.
+    #[error("node {0} cannot be: choose a number from 1 to 254")]
+    Node(u8),
+    /// Too little for a packet, or more than one holds.
+    #[error("payload_limit {0} cannot be: choose from 64 to 4079 octets of payload in a packet")]
+    PayloadLimit(usize),
+    /// Less than a packet, more than there are fragments for, or more than a small board should be asked to keep.
+    #[error("max_message {message} cannot be: choose from {payload} (payload_limit) to {longest}")]
+    MaxMessage {
+        /// The length that was chosen, in octets.
+        message: usize,
+        /// [`Config::payload_limit`].
+        payload: usize,
+        /// The most, in octets: 16 MiB, and no more fragments than there are sequence numbers.
+        longest: usize,
+    },
+    /// A table without room, or too large.
+    #[error("max_peers {0} cannot be: choose from 1 to 65536")]
+    MaxPeers(usize),
+    /// A rate of nothing.
+    #[error(
+        "{key} = {{ per_second = {per_second}, burst = {burst} }} cannot be: choose at least 1 for each"
+    )]
+    Rate {
+        /// Section and key.
+        key: &'static str,
+        /// How many in a second.
+        per_second: u32,
+        /// How many at once.
+        burst: u32,
+    },
+    /// A listener that lets nobody in.
+    #[error(
+        "tcp.max_accepted or tcp.max_per_address 0 lets nobody connect: choose 1 or more, or leave \
+             tcp.listen out"
+    )]
+    MaxAccepted,
+    /// Junior delivers to its own clients only.
+    #[error(
+        "routing.forward and junior exclude each other: Junior delivers nothing for components \
+         behind its clients. Leave one of them out"
+    )]
+    JuniorForward,
+    /// Nothing is on a serial line at 0 bits per second.
+    #[error(
+        "baud {baud} of the serial line {device} cannot be: choose what both ends have, such as 19200 or 115200"
+    )]
+    Baud {
+        /// The port.
+        device: String,
+        /// The rate that was chosen.
+        baud: u32,
+    },
+    /// Neither one nor two stop bits.
+    #[error("stop_bits {stop_bits} of the serial line {device} cannot be: choose 1 or 2")]
+    StopBits {
+        /// The port.
+        device: String,
+        /// The number that was chosen.
+        stop_bits: u8,
+    },
+    /// Two lines on one port.
+    #[error("the serial port {0} is named twice: leave one out")]
+    SerialTwice(String),
+    /// A mailbox without room.
+    #[error("a mailbox must hold at least 1 message")]
+    Mailbox,
+    /// A setting of the section `delivery`.
+    #[error(transparent)]
+    Delivery(InvalidDelivery),
+    /// Not a multicast group.
+    #[error(transparent)]
+    Group(InvalidGroup),
+    /// The id of a peer is none.
+    #[error("the id of a peer: {0}")]
+    PeerId(ParseIdError),
+    /// Not the address of a peer.
+    #[error(
+        "`{0}` is no peer's address: write an address of one host, with a port if it is not 3794, \
+         such as 192.168.7.2, 192.168.7.2:3795, [fd00::2]:3795 or (IPv6's link-local addresses \
+         need the interface) [fe80::2%eth0]:3794"
+    )]
+    Peer(String),
+}
