@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::address::JausId;
+#[cfg(unix)]
+use crate::link::junior::DEFAULT_FOLDER;
 use crate::link::local::record::Reason;
 use crate::link::udp::PortTaken;
 use crate::link::{Group, Interfaces};
@@ -66,6 +68,19 @@ pub struct Network {
         conflicts_with_all = ["interface", "loopback", "port", "group", "ttl", "peer"],
     )]
     attach: Option<Address>,
+
+    /// Go through the node manager of a Junior on this host, in the place of UDP of our own; FOLDER
+    /// is where Junior has its sockets [default: /tmp]
+    #[cfg(unix)]
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = DEFAULT_FOLDER,
+        conflicts_with_all = ["loopback", "attach"],
+    )]
+    junior: Option<PathBuf>,
 
     /// Take the settings from a TOML file; flags come on top
     ///
@@ -237,6 +252,10 @@ impl Network {
         node.group = self.group.unwrap_or(node.group);
         node.ttl = self.ttl.unwrap_or(node.ttl);
         node.peers.extend(&self.peer);
+        #[cfg(unix)]
+        if self.junior.is_some() {
+            node.junior.clone_from(&self.junior);
+        }
         node.validate().map_err(Failure::of)?;
         Ok(node)
     }

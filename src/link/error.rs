@@ -120,6 +120,11 @@ pub enum Error {
 
 fn holder_hint(holder: &Holder, address: SocketAddr) -> String {
     match holder {
+        _ if cfg!(unix) && holder.is_junior() => {
+            "(It is Junior's node manager: with --junior, in a settings file junior = \"/tmp\", this \
+             node is its client.)"
+                .to_owned()
+        }
         Holder::Process { pid, .. } => format!("(`kill {pid}` asks it to end.)"),
         _ => format!(
             "(`sudo ss -ulpn 'sport = :{}'` shows who it is.)",
@@ -133,5 +138,25 @@ const fn privileged(port: u16) -> &'static str {
         ": ports below 1024 are for privileged processes, choose a higher one"
     } else {
         ": see the container's or the security module's settings"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn beside_junior_the_remedy_is_to_be_its_client() {
+        let group = ([239, 255, 0, 1], 3794).into();
+        let taken = |name: &str| {
+            let (pid, name) = (7, name.to_owned());
+            let holder = Holder::Process { pid, name };
+            Error::GroupTaken { group, holder }.to_string()
+        };
+        for name in ["JuniorRTE", "NodeManager", "JTSNodeManager"] {
+            assert!(taken(name).contains("with --junior"), "{}", taken(name));
+        }
+        assert!(!taken("python3").contains("--junior"));
     }
 }

@@ -42,6 +42,13 @@ impl fmt::Display for Holder {
 }
 
 impl Holder {
+    /// Whether it is a node manager of Junior, of the JAUS Tool Set or of fkie's packages.
+    #[must_use]
+    pub fn is_junior(&self) -> bool {
+        const NAMES: [&str; 3] = ["JuniorRTE", "NodeManager", "JTSNodeManager"];
+        matches!(self, Self::Process { name, .. } if NAMES.contains(&name.as_str()))
+    }
+
     /// Finds who keeps us from binding to `address`.
     pub(super) fn of(address: SocketAddr) -> Self {
         let Some(entry) = socket_table::all()

@@ -165,6 +165,11 @@ pub(crate) fn introduce(
         );
         output.line(format_args!("TCP connections: {listening}"))?;
     }
+    #[cfg(unix)]
+    if let Some(junior) = node.junior() {
+        let folder = junior.folder.display();
+        output.line(format_args!("through Junior's node manager at {folder}"))?;
+    }
     for line in node.serial_lines() {
         let settings = line.settings;
         output.line(format_args!(

@@ -20,6 +20,7 @@ use jaus::cli::failure::{Failure, Outcome};
 use jaus::cli::network::Network;
 use jaus::cli::output::{Output, colours_wanted, say};
 use jaus::cli::runtime;
+use jaus::node::Config;
 
 /// Find out why nodes do not find each other
 ///
@@ -101,12 +102,7 @@ impl Doctor {
         if self.network.has_file() {
             report.add(Finding::ok("settings", "the settings file can be read"))?;
         }
-        report.add_all(host::buffers(&config))?;
-        let (interfaces, findings) = host::interfaces(&config);
-        report.add_all(findings)?;
-        for interface in &interfaces {
-            report.add_all(port::check(&config, interface))?;
-        }
+        report.add_all(ways(&config))?;
         report.add_all(port::check_tcp(&config))?;
         let listen = self.seconds.unwrap_or(LISTEN);
         if !self.json {
@@ -117,6 +113,19 @@ impl Doctor {
         report.add_all(neighbours::look(config, id, listen).await)?;
         report.add(clock.finish())
     }
+}
+
+/// What leads to the network: interfaces and ports, or Junior.
+fn ways(config: &Config) -> Vec<Finding> {
+    #[cfg(unix)]
+    if let Some(folder) = &config.junior {
+        return vec![port::check_junior(folder)];
+    }
+    let (interfaces, mut findings) = host::interfaces(config);
+    findings.splice(0..0, host::buffers(config));
+    let ports = interfaces.iter().flat_map(|it| port::check(config, it));
+    findings.extend(ports);
+    findings
 }
 
 /// What was found so far; printed as it is found, or at the end as JSON.

@@ -1,7 +1,11 @@
 //! Whether the ports that a node wants can be had, and who is in the way.
 
 use std::net::{SocketAddr, TcpListener};
+#[cfg(unix)]
+use std::path::Path;
 
+#[cfg(unix)]
+use jaus::link::junior;
 use jaus::link::udp::{PortTaken, Settings, UdpLink};
 use jaus::link::{Error, Interface};
 use jaus::node::Config;
@@ -64,9 +68,22 @@ fn judge(config: &Config, interface: &Interface, opened: Result<UdpLink, Error>)
                  addresses, without sharing. Junior does that"
             ),
         )
-        .advice(
-            "end that program; or do without the group: --group off --peer 127.0.0.1 with a --port \
-             other than 3794; or move one of the two to another host",
+        .advice(match holder.is_junior() {
+            true => "be its client, with the same flags and --junior (junior = \"/tmp\" in a settings file)",
+            false => "if it is Junior, be its client: --junior; otherwise end that program, or move \
+                      one of the two to another host",
+        }),
+        Err(error) => Finding::problem(CHECK, error),
+    }
+}
+
+/// The same for a client of Junior, which needs the node manager in the place of ports.
+#[cfg(unix)]
+pub(super) fn check_junior(folder: &Path) -> Finding {
+    match junior::check(folder) {
+        Ok(()) => Finding::ok(
+            CHECK,
+            format_args!("Junior's node manager is there, at {}", folder.display()),
         ),
         Err(error) => Finding::problem(CHECK, error),
     }
