@@ -42,10 +42,11 @@ impl fmt::Display for Holder {
 }
 
 impl Holder {
-    /// Whether it is a node manager of Junior, of the JAUS Tool Set or of fkie's packages.
+    /// Whether it is a node manager of Junior or of the JAUS Tool Set. (fkie's passes no broadcasts
+    /// for clients such as ours.)
     #[must_use]
     pub fn is_junior(&self) -> bool {
-        const NAMES: [&str; 3] = ["JuniorRTE", "NodeManager", "JTSNodeManager"];
+        const NAMES: [&str; 2] = ["JuniorRTE", "NodeManager"];
         matches!(self, Self::Process { name, .. } if NAMES.contains(&name.as_str()))
     }
 

@@ -70,7 +70,7 @@ fn judge(config: &Config, interface: &Interface, opened: Result<UdpLink, Error>)
         )
         .advice(match holder.is_junior() {
             true => "be its client, with the same flags and --junior (junior = \"/tmp\" in a settings file)",
-            false => "if it is Junior, be its client: --junior; otherwise end that program, or move \
+            false => "if it is JuniorRTE, be its client: --junior; otherwise end that program, or move \
                       one of the two to another host",
         }),
         Err(error) => Finding::problem(CHECK, error),
