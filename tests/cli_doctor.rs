@@ -155,7 +155,11 @@ fn a_program_that_keeps_the_group_for_itself_is_a_problem() {
         what.contains("cannot be received") && what.contains("Junior"),
         "{what}"
     );
-    assert!(ports[0]["advice"].as_str().unwrap().contains("--group off"));
+    let advice = ports[0]["advice"].as_str().unwrap();
+    assert!(
+        advice.contains("--junior") && advice.contains("--group off --port 0"),
+        "{advice}"
+    );
 }
 
 #[test]

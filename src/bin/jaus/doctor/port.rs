@@ -68,10 +68,11 @@ fn judge(config: &Config, interface: &Interface, opened: Result<UdpLink, Error>)
                  addresses, without sharing. Junior does that"
             ),
         )
-        .advice(match holder.is_junior() {
-            true => "be its client, with the same flags and --junior (junior = \"/tmp\" in a settings file)",
-            false => "if it is JuniorRTE, be its client: --junior; otherwise end that program, or move \
-                      one of the two to another host",
+        .advice(if holder.is_junior() {
+            "be its client, with the same flags and --junior (junior = \"/tmp\" in a settings file)"
+        } else {
+            "if it is JuniorRTE, be its client: --junior; otherwise end that program, or do without \
+             the group: --group off --port 0, with --peer ADDRESS for each node to reach"
         }),
         Err(error) => Finding::problem(CHECK, error),
     }
