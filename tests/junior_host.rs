@@ -3,6 +3,7 @@
 #![cfg(all(unix, feature = "node"))]
 #![allow(
     clippy::unwrap_used,
+    clippy::expect_used,
     clippy::disallowed_methods,
     clippy::disallowed_types,
     reason = "a test, with sockets of its own"
