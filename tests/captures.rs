@@ -1,15 +1,12 @@
 //! Recorded traffic of other JAUS stacks, put through the wire formats and, in the place of one of
 //! the two parties, through an endpoint.
-//!
-//! The captures are in the directory that `JAUS_SHARED` names (default: `../shared`). Without them
-//! nothing is tested, loudly; with `CI` set that is a failure.
 
 #![cfg(feature = "view")]
 #![expect(clippy::expect_used, reason = "helpers of tests")]
 
 use std::fs::File;
 use std::net::{IpAddr, SocketAddr};
-use std::path::{Path as FilePath, PathBuf};
+use std::path::Path as FilePath;
 use std::time::{Duration, Instant};
 
 use Counter::{AcknowledgementsSent, MessagesDelivered, MessagesReceived};
@@ -19,6 +16,7 @@ use jaus::endpoint::{
 };
 use jaus::view::{Capture, Network};
 use jaus::wire::{Version, judp};
+use jaus_test_kit::evidence;
 
 /// A captured datagram.
 struct Recorded {
@@ -27,28 +25,6 @@ struct Recorded {
     source: SocketAddr,
     destination: SocketAddr,
     payload: Bytes,
-}
-
-/// The directory of captures, if it is there.
-fn captures() -> Option<PathBuf> {
-    let shared = std::env::var_os("JAUS_SHARED").map_or_else(
-        || FilePath::new(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-        PathBuf::from,
-    );
-    let captures = shared.join("captures");
-    if captures.is_dir() {
-        return Some(captures);
-    }
-    assert!(
-        std::env::var_os("CI").is_none(),
-        "CI needs the captures: {} is not there; set JAUS_SHARED",
-        captures.display()
-    );
-    eprintln!(
-        "NOTHING WAS TESTED: {} is not there; set JAUS_SHARED",
-        captures.display()
-    );
-    None
 }
 
 /// The JAUS datagrams of a capture.
@@ -112,7 +88,6 @@ fn contents(datagrams: &[Recorded]) -> Contents {
 /// port.
 #[test]
 fn every_recorded_datagram_is_read() {
-    let Some(captures) = captures() else { return };
     let expected = [
         ("SAE_Management_PacketCapture.pcap", 22, [22, 0, 0], 0),
         (
@@ -157,7 +132,10 @@ fn every_recorded_datagram_is_read() {
         ("openjaus33/openjaus33-peer-wire.pcap", 48, [0, 0, 48], 0),
     ];
     for (file, datagrams, messages, stale) in expected {
-        let found = contents(&recorded(&captures.join(file)));
+        let Some(path) = evidence::capture(file) else {
+            continue;
+        };
+        let found = contents(&recorded(&path));
         assert_eq!(
             found,
             Contents {
@@ -244,7 +222,7 @@ impl Replay {
 /// In the place of Junior's node B, 2.1.1: what arrives, what is acknowledged, what is dropped.
 #[test]
 fn what_junior_sends_is_taken_as_junior_takes_it() {
-    let Some(captures) = captures() else { return };
+    let captures = evidence::captures();
     let plain = |received, delivered, acknowledged| {
         let counters = [
             (MessagesReceived, received),
@@ -314,7 +292,7 @@ fn code(received: &Received) -> u16 {
 
 #[test]
 fn a_large_message_of_junior_is_put_together() {
-    let Some(captures) = captures() else { return };
+    let captures = evidence::captures();
     for file in [
         "03-acked-100KB",
         "04-unacked-100KB-bigbuf",
@@ -343,7 +321,7 @@ fn a_large_message_of_junior_is_put_together() {
 /// Our acknowledgements are the very octets with which Junior's own node B answered.
 #[test]
 fn our_acknowledgements_are_those_that_junior_sends() {
-    let Some(captures) = captures() else { return };
+    let captures = evidence::captures();
     for file in [
         "01-discovery-then-unicast",
         "02-acked-small",
@@ -377,7 +355,7 @@ fn our_acknowledgements_are_those_that_junior_sends() {
 /// Stale octets behind most of its messages neither lose a message nor make one up.
 #[test]
 fn what_jauspp_sends_is_delivered_and_nothing_else() {
-    let Some(captures) = captures() else { return };
+    let captures = evidence::captures();
     for (file, address, ids, received, delivered, stale, peers) in [
         (
             "01-vehsim-client",
@@ -448,7 +426,7 @@ fn what_jauspp_sends_is_delivered_and_nothing_else() {
 /// every subsystem.
 #[test]
 fn openjaus_is_heard_through_both_older_headers() {
-    let Some(captures) = captures() else { return };
+    let captures = evidence::captures();
     for (file, version, received, delivered) in [
         ("judp-wire", Version::As5669, 23, 7),
         ("opc-wire", Version::Ra, 81, 28),
@@ -479,13 +457,15 @@ fn openjaus_is_heard_through_both_older_headers() {
 /// The tool counts sequence numbers per destination, so that the same numbers come again and again.
 #[test]
 fn nothing_that_the_judging_tool_asks_is_lost() {
-    let Some(captures) = captures() else { return };
+    let Some(captures) = evidence::outside("captures/igvc2015") else {
+        return;
+    };
     let judges = ["42.1.1", "42.2.1", "42.2.2", "42.2.3", "42.2.4"];
     for (file, asked) in [
         ("interface_test_1_13pts.pcapng", 71),
         ("qualification-practive-2015.pcap.pcapng", 81),
     ] {
-        let path = captures.join("igvc2015").join(file);
+        let path = captures.join(file);
         let replay = Replay::new(&path, "192.168.1.105", &["105.1.1"]);
         assert_eq!(
             replay.notable(),
@@ -495,7 +475,7 @@ fn nothing_that_the_judging_tool_asks_is_lost() {
         let expected = judges.map(|judge| format!("{judge} 192.168.1.42:3794 judp2"));
         assert_eq!(replay.peers(), expected, "{file}");
     }
-    let path = captures.join("igvc2015/interface_test_1_13pts.pcapng");
+    let path = captures.join("interface_test_1_13pts.pcapng");
     let replay = Replay::new(&path, "192.168.1.42", &judges);
     assert_eq!(
         replay.notable(),

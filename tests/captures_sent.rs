@@ -17,9 +17,6 @@
 #![cfg(feature = "view")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests")]
 
-#[path = "support/shared.rs"]
-mod shared;
-
 use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::net::SocketAddr;
@@ -30,6 +27,7 @@ use bytes::{Bytes, BytesMut};
 use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path, Rate, Received};
 use jaus::view::{Capture, Network};
 use jaus::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, judp};
+use jaus_test_kit::evidence;
 
 /// A recorded datagram: its sender, and the first message in it.
 struct Recorded {
@@ -198,9 +196,7 @@ fn greeting(recorded: &Recorded) -> Recorded {
 /// Junior's nodes, 10.77.0.1 and 10.77.0.2, one file each.
 #[test]
 fn in_juniors_place_we_send_the_same_octets() {
-    let Some(captures) = shared::captures() else {
-        return;
-    };
+    let captures = evidence::captures();
     let (a, b) = ("10.77.0.1:3794", "10.77.0.2:3794");
     for (file, party) in [
         ("01-discovery-then-unicast", a),
@@ -256,9 +252,7 @@ fn in_juniors_place_we_send_the_same_octets() {
 /// All that JAUS++'s components sent, one after the other; its peers are heard before.
 #[test]
 fn in_jausplusplus_place_we_send_the_same_octets_but_for_the_numbers() {
-    let Some(captures) = shared::captures() else {
-        return;
-    };
+    let captures = evidence::captures();
     let mut compared = 0;
     for file in [
         "01-vehsim-client",
@@ -298,9 +292,7 @@ fn in_jausplusplus_place_we_send_the_same_octets_but_for_the_numbers() {
 
 #[test]
 fn every_recording_of_junior_and_jausplusplus_is_compared_somewhere() {
-    let Some(captures) = shared::captures() else {
-        return;
-    };
+    let captures = evidence::captures();
     let sources = [
         "captures_sent.rs",
         "captures.rs",

@@ -3,12 +3,14 @@
 
 mod cli_support;
 
+use jaus_test_kit::evidence;
+
 use std::io::{BufRead, BufReader};
 use std::process::Stdio;
 
 use cli_support::{
     Message, RAW, block, enhanced_packet, interface, ip_packet, jaus, pcap, pcap_of, run,
-    section_header, shared,
+    section_header,
 };
 use serde_json::Value as Json;
 
@@ -389,9 +391,10 @@ fn nobody_reading_the_errors_changes_nothing_else() {
 
 #[test]
 fn every_recorded_capture_is_read_and_its_messages_are_named() {
-    let Some(shared) = shared() else { return };
     for (file, messages, errors) in RECORDED {
-        let path = shared.join("captures").join(file);
+        let Some(path) = evidence::capture(file) else {
+            continue;
+        };
         let run = run(&["decode", path.to_str().unwrap()], b"");
         let lines = run.json();
         let failed: Vec<_> = lines

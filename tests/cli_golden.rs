@@ -3,7 +3,8 @@
 
 mod cli_support;
 
-use cli_support::{run, shared, vectors};
+use cli_support::{run, vectors};
+use jaus_test_kit::evidence;
 use serde_json::json;
 
 /// Decodes and encodes again; says how many lines there were.
@@ -41,7 +42,6 @@ fn assert_identity(vectors: &str, definitions: &[&str]) -> usize {
 
 #[test]
 fn every_golden_vector_of_core_and_mobility_comes_back_as_it_was() {
-    let Some(shared) = shared() else { return };
     let mut count = 0;
     for file in [
         "jts-core-v1.0",
@@ -51,7 +51,7 @@ fn every_golden_vector_of_core_and_mobility_comes_back_as_it_was() {
         "fkie-core-v1.1",
         "fkie-mobility",
     ] {
-        let file = shared.join("golden").join(format!("{file}.jsonl"));
+        let file = evidence::golden().join(format!("{file}.jsonl"));
         count += assert_identity(&vectors(&file), &[]);
     }
     assert!(count > 400, "{count} vectors");
@@ -59,10 +59,12 @@ fn every_golden_vector_of_core_and_mobility_comes_back_as_it_was() {
 
 #[test]
 fn golden_vectors_of_other_services_come_back_with_their_definitions_at_hand() {
-    let Some(shared) = shared() else { return };
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
+        return;
+    };
     for (file, definitions) in [("jts-ugv", "jts"), ("jts-environmentSensing", "jts")] {
-        let definitions = shared.join("jsidl-corpus").join(definitions);
-        let file = shared.join("golden").join(format!("{file}.jsonl"));
+        let definitions = corpus.join(definitions);
+        let file = evidence::golden().join(format!("{file}.jsonl"));
         assert_identity(&vectors(&file), &["--jsidl", definitions.to_str().unwrap()]);
     }
 }

@@ -1,36 +1,21 @@
-//! The generated codec against octets that JTS' own C++ encoder made (`golden/*.jsonl` of the
-//! shared material): every vector of a message that is generated here decodes, shows the stated
-//! values, and encodes to the same octets.
+//! The generated codec against octets that JTS' own C++ encoder made: every vector of a message that
+//! is generated here decodes, shows the stated values, and encodes to the same octets.
 #![cfg(feature = "serde")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::PathBuf;
-use std::{env, fs};
+use std::fs;
 
 use bytes::Bytes;
 use jaus::codec::{MessageInfo, Rounding, Scale, ServiceId};
 use jaus::messages;
+use jaus_test_kit::evidence;
 use serde_json::{Map, Value};
 
-/// Where the shared material is, or `None` where there is none; CI must have it.
-fn shared() -> Option<PathBuf> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared");
-    let path = PathBuf::from(env::var_os("JAUS_SHARED").unwrap_or_else(|| beside.into()));
-    if path.join("golden").is_dir() {
-        return Some(path.join("golden"));
-    }
-    assert!(env::var_os("CI").is_none(), "{} is missing", path.display());
-    eprintln!("SKIPPED: there is no {}; set JAUS_SHARED", path.display());
-    None
-}
-
-fn rows(name: &str) -> Option<Vec<Value>> {
-    let text = fs::read_to_string(shared()?.join(name)).unwrap();
-    Some(
-        text.lines()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect(),
-    )
+fn rows(name: &str) -> Vec<Value> {
+    let text = fs::read_to_string(evidence::golden().join(name)).unwrap();
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
 }
 
 fn octets(hex: &str) -> Bytes {
@@ -146,10 +131,9 @@ fn generated(row: &Value) -> Vec<&'static MessageInfo> {
 
 #[test]
 fn every_vector_decodes_shows_its_values_and_encodes_to_the_same_octets() {
-    let Some(directory) = shared() else { return };
     let mut checked = 0;
     let mut wrong = Vec::new();
-    for entry in fs::read_dir(directory).unwrap() {
+    for entry in fs::read_dir(evidence::golden()).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
         // The examples have services of their own, whose messages only look like these.
@@ -157,7 +141,7 @@ fn every_vector_decodes_shows_its_values_and_encodes_to_the_same_octets() {
         {
             continue;
         }
-        for row in rows(&name).unwrap() {
+        for row in rows(&name) {
             let types = generated(&row);
             let otherwise =
                 |&(file, message): &(&str, &str)| file == name && row["message"] == message;
@@ -227,7 +211,7 @@ fn scale(row: &Value) -> Scale {
 
 #[test]
 fn reals_are_rounded_exactly() {
-    for row in rows("scaling_encode.jsonl").unwrap_or_default() {
+    for row in rows("scaling_encode.jsonl") {
         let raw = scale(&row).raw(row["real"].as_f64().unwrap());
         assert_eq!(raw, row["round_half_up"].as_u64(), "{row}");
     }
@@ -235,7 +219,7 @@ fn reals_are_rounded_exactly() {
 
 #[test]
 fn integers_stand_for_the_reals_that_other_decoders_give_and_come_back() {
-    for row in rows("scaling_decode.jsonl").unwrap_or_default() {
+    for row in rows("scaling_decode.jsonl") {
         let (scale, raw) = (scale(&row), row["raw"].as_u64().unwrap());
         let theirs = row["jts_real"].as_f64().unwrap();
         let tolerance = 4.0 * f64::EPSILON * (scale.upper() - scale.lower());

@@ -3,14 +3,12 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "helpers of tests")]
 
-#[path = "support/shared.rs"]
-mod shared;
-
 use std::fs;
 
 use jaus::address::JausId;
 use jaus::wire::jserial::{self, Counters, Decoder};
 use jaus::wire::{Acknowledgement, Broadcast, Frame, Version};
+use jaus_test_kit::evidence;
 
 /// What was read from the line at once, as a line of the record: time, direction, length, octets.
 fn octets(line: &str) -> Vec<u8> {
@@ -24,9 +22,7 @@ fn octets(line: &str) -> Vec<u8> {
 
 #[test]
 fn juniors_packets_are_read_and_written_octet_for_octet() {
-    let Some(captures) = shared::captures() else {
-        return;
-    };
+    let captures = evidence::captures();
     let record = fs::read_to_string(captures.join("junior/jserial-bytes.txt")).expect("a record");
     let mut decoder = Decoder::new();
     let mut frames = Vec::new();

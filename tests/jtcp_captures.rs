@@ -3,8 +3,6 @@
 #![cfg(feature = "view")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests")]
 
-#[path = "support/shared.rs"]
-mod shared;
 #[path = "support/streams.rs"]
 mod streams;
 
@@ -13,6 +11,7 @@ use std::path::Path;
 use bytes::{Bytes, BytesMut};
 use jaus::wire::jtcp::{self, Decoder};
 use jaus::wire::{DataControl, Frame};
+use jaus_test_kit::evidence;
 use streams::streams;
 
 fn decode(stream: &[u8], part: usize) -> Vec<Frame> {
@@ -52,9 +51,7 @@ fn frames(file: &Path) -> Vec<(Vec<u8>, Vec<Frame>)> {
 
 #[test]
 fn juniors_streams_are_written_octet_for_octet() {
-    let Some(captures) = shared::captures() else {
-        return;
-    };
+    let captures = evidence::captures();
     for (file, count) in [
         ("junior/13-jtcp.pcap", vec![8, 8]),
         ("junior/14-jtcp-64KB.pcap", vec![18]),
@@ -70,9 +67,7 @@ fn juniors_streams_are_written_octet_for_octet() {
 
 #[test]
 fn juniors_64_kb_come_in_17_parts() {
-    let Some(captures) = shared::captures() else {
-        return;
-    };
+    let captures = evidence::captures();
     let (_, frames) = frames(&captures.join("junior/14-jtcp-64KB.pcap")).remove(0);
     let parts: Vec<_> = frames
         .iter()
@@ -86,9 +81,7 @@ fn juniors_64_kb_come_in_17_parts() {
 /// the difference.
 #[test]
 fn jausplusplus_streams_differ_by_their_version_octets() {
-    let Some(captures) = shared::captures() else {
-        return;
-    };
+    let captures = evidence::captures();
     let mut messages = 0;
     for (stream, frames) in frames(&captures.join("jauspp/06-jtcp.pcap")) {
         let each: Vec<_> = frames

@@ -14,13 +14,14 @@
 
 use std::fs::File;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use jaus::component::{Component, Kind};
 use jaus::link::Group;
 use jaus::node::{Config, Node};
 use jaus::view::{Capture, JAUS_PORT, Network};
+use jaus_test_kit::evidence;
 
 /// What the judge waits for an answer at most; reached only when a test fails.
 const JUDGES_PATIENCE: Duration = Duration::from_millis(1500);
@@ -34,24 +35,6 @@ const OURS: u16 = 2105;
 const DESTINATION_SUBSYSTEM: std::ops::Range<usize> = 7..9;
 const SOURCE: std::ops::Range<usize> = 9..13;
 const CODE: std::ops::Range<usize> = 13..15;
-
-fn captures() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let shared = std::env::var_os("JAUS_SHARED").map_or_else(|| "../shared".into(), PathBuf::from);
-    let captures = root.join(shared).join("captures/igvc2015");
-    if captures.is_dir() {
-        return Some(captures);
-    }
-    assert!(
-        std::env::var_os("CI").is_none(),
-        "CI needs the captures; set JAUS_SHARED"
-    );
-    eprintln!(
-        "NOTHING WAS TESTED: no captures in {}; set JAUS_SHARED",
-        captures.display()
-    );
-    None
-}
 
 fn code(datagram: &[u8]) -> u16 {
     u16::from_le_bytes([datagram[CODE.start], datagram[CODE.start + 1]])
@@ -125,9 +108,11 @@ fn answer(judge: &UdpSocket, request: &[u8]) -> Option<Vec<u8>> {
 
 /// Asks everything that the judge asked, and requires every answer.
 fn judge(capture: &str, by_multicast: bool) {
-    let Some(captures) = captures() else { return };
-    let requests = requests(&captures.join(capture));
-    assert!(!requests.is_empty(), "{capture} has requests");
+    let Some(capture) = evidence::capture(&format!("igvc2015/{capture}")) else {
+        return;
+    };
+    let requests = requests(&capture);
+    assert!(!requests.is_empty(), "{} has requests", capture.display());
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .build()

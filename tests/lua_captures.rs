@@ -10,25 +10,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use jaus::view::{Capture, Content, Dictionary, JAUS_PORT, Line, MessageLog, Network};
-
-#[path = "support/shared.rs"]
-mod shared;
+use jaus_test_kit::evidence;
+use jaus_test_kit::tools::has_tshark;
 
 /// By number of the packet: the messages in it, and whether something is wrong with one.
 type Packets = BTreeMap<u64, (Vec<String>, bool)>;
-
-/// Whether there is a `tshark`. Its absence is a failure if `CI` is set, and said loudly otherwise.
-fn tshark_is_there() -> bool {
-    let there = Command::new("tshark").arg("--version").output().is_ok();
-    assert!(
-        there || std::env::var_os("CI").is_none(),
-        "CI needs tshark: install it"
-    );
-    if !there {
-        eprintln!("NOTHING WAS TESTED: there is no tshark; install it");
-    }
-    there
-}
 
 /// What our own log says about the datagrams of a capture.
 fn ours(dictionary: &Dictionary, path: &Path) -> Packets {
@@ -137,10 +123,7 @@ fn captures(directory: &Path, found: &mut Vec<PathBuf>) {
 
 #[test]
 fn tshark_finds_the_messages_and_faults_that_our_own_reading_finds() {
-    let Some(shared) = shared::captures() else {
-        return;
-    };
-    if !tshark_is_there() {
+    if !has_tshark() {
         return;
     }
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join("lua_captures");
@@ -155,7 +138,14 @@ fn tshark_finds_the_messages_and_faults_that_our_own_reading_finds() {
 
     let dictionary = Dictionary::complete();
     let (mut files, mut total) = (Vec::new(), 0);
-    captures(&shared, &mut files);
+    captures(evidence::captures(), &mut files);
+    // Those that are not in the repository, if they are there.
+    evidence::outside("captures/igvc2015")
+        .iter()
+        .for_each(|folder| captures(folder, &mut files));
+    files.extend(evidence::outside(
+        "captures/SAE_Management_PacketCapture.pcap",
+    ));
     files.sort();
     for file in files {
         let (ours, theirs) = (ours(&dictionary, &file), theirs(&script, &file));

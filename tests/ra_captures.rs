@@ -1,8 +1,5 @@
 //! Recorded traffic of OpenJAUS 3.3.1 node managers, with a node of ours in the place of one of them:
 //! whatever the other asked, ours says what the replaced one said.
-//!
-//! The captures are in the directory that `JAUS_SHARED` names (default: `../shared`). Without them
-//! nothing is tested, loudly; with `CI` set that is a failure.
 
 #![cfg(all(feature = "view", feature = "ra33"))]
 #![expect(clippy::expect_used, reason = "helpers of tests")]
@@ -16,9 +13,7 @@ use jaus::ra::node::{Component, Event, Node, RaNode, Settings, Subsystem};
 use jaus::ra::{Counter, RaId};
 use jaus::view::{Capture, Network};
 use jaus::wire::judp;
-
-#[path = "support/shared.rs"]
-mod shared;
+use jaus_test_kit::evidence;
 
 const A: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 0, 1));
 const B: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 0, 2));
@@ -31,8 +26,8 @@ struct Datagram {
     octets: Bytes,
 }
 
-fn recorded(file: &str) -> Option<Vec<Datagram>> {
-    let file = shared::captures()?.join("openjaus33").join(file);
+fn recorded(file: &str) -> Vec<Datagram> {
+    let file = evidence::captures().join("openjaus33").join(file);
     let mut capture = Capture::new(File::open(file).expect("a readable file")).expect("a capture");
     let mut network = Network::new([judp::PORT]);
     let mut datagrams = Vec::new();
@@ -46,7 +41,7 @@ fn recorded(file: &str) -> Option<Vec<Datagram>> {
             octets: Bytes::copy_from_slice(&datagram.payload),
         }));
     }
-    Some(datagrams)
+    datagrams
 }
 
 /// What a datagram says: framing, source, destination, code and data.
@@ -130,9 +125,9 @@ struct Replay {
     clippy::disallowed_methods,
     reason = "an arbitrary beginning of virtual time"
 )]
-fn replay(file: &str, replaced: IpAddr, ours: Subsystem) -> Option<Replay> {
-    let recorded = recorded(file)?;
-    let (start, first) = (Instant::now(), recorded.first()?.time);
+fn replay(file: &str, replaced: IpAddr, ours: Subsystem) -> Replay {
+    let recorded = recorded(file);
+    let (start, first) = (Instant::now(), recorded[0].time);
     let mut node = RaNode::new(Settings::default());
     node.announce(start, ours).expect("a valid subsystem");
     let mut replay = Replay {
@@ -160,7 +155,7 @@ fn replay(file: &str, replaced: IpAddr, ours: Subsystem) -> Option<Replay> {
         }
         replay.drain();
     }
-    Some(replay)
+    replay
 }
 
 impl Replay {
@@ -202,9 +197,7 @@ fn in_place_of_the_second_node_manager_ours_answers_as_it_did_in_both_framings()
     for file in ["openjaus33-opc-wire.pcap", "openjaus33-judp-wire.pcap"] {
         let [manager, communicator] = MANAGERS;
         let ours = subsystem(20, ["OJ_b", "OJNode_b", manager, communicator], &[]);
-        let Some(replay) = replay(file, B, ours) else {
-            return;
-        };
+        let replay = replay(file, B, ours);
         replay.check_answers();
         let other = replay.appeared();
         assert_eq!((other.id, other.name.as_str()), (10, "OJ_a"));
@@ -227,9 +220,7 @@ fn in_place_of_the_first_one_ours_answers_the_storm_of_questions() {
         (45, "Waypoint Driver"),
     ];
     let ours = subsystem(10, ["OJ_a", "OJNode_a", manager, communicator], &others);
-    let Some(mut replay) = replay("openjaus33-opc-wire.pcap", A, ours) else {
-        return;
-    };
+    let mut replay = replay("openjaus33-opc-wire.pcap", A, ours);
     // The vehicle came later there; ours was whole from the beginning.
     replay.expected.retain(|said| said.code != 0x4B01);
     replay.check_answers();
@@ -245,9 +236,7 @@ fn in_place_of_the_probe_ours_is_listed_as_it_was() {
         "Rust Communicator",
     ];
     let ours = subsystem(30, names, &[(33, "Rust PD"), (61, "Rust VKS")]);
-    let Some(replay) = replay("openjaus33-peer-wire.pcap", B, ours) else {
-        return;
-    };
+    let replay = replay("openjaus33-peer-wire.pcap", B, ours);
     replay.check_answers();
     let asked = replay
         .said
@@ -261,9 +250,7 @@ fn in_place_of_the_probe_ours_is_listed_as_it_was() {
 fn components_that_come_and_go_are_seen_to() {
     let [manager, communicator] = MANAGERS;
     let ours = subsystem(20, ["OJ_b", "OJNode_b", manager, communicator], &[]);
-    let Some(replay) = replay("openjaus33-opc-wire.pcap", B, ours) else {
-        return;
-    };
+    let replay = replay("openjaus33-opc-wire.pcap", B, ours);
     let most = replay.events.iter().filter_map(|event| match event {
         Event::Changed(subsystem) => Some(subsystem),
         _ => None,

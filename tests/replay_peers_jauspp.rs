@@ -19,8 +19,6 @@ mod recorded;
 #[path = "support/seat.rs"]
 #[allow(dead_code, reason = "connections are replayed elsewhere")]
 mod seat;
-#[path = "support/shared.rs"]
-mod shared;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::SocketAddr;
@@ -36,6 +34,7 @@ use jaus::peer::Peer;
 use jaus::service::Stack;
 use jaus::view::Dictionary;
 use jaus::wire::Frame;
+use jaus_test_kit::evidence;
 use recorded::Recorded;
 use seat::{Said, Seat};
 
@@ -67,8 +66,8 @@ struct Replay {
 
 impl Replay {
     /// Puts components in the place of those at `address`, and says to them what the others said.
-    fn of(file: &str, address: &str, stacks: impl IntoIterator<Item = Stack>) -> Option<Self> {
-        let all = recorded::datagrams(&shared::captures()?.join("jauspp").join(file));
+    fn of(file: &str, address: &str, stacks: impl IntoIterator<Item = Stack>) -> Self {
+        let all = recorded::datagrams(&evidence::captures().join("jauspp").join(file));
         let address: SocketAddr = address.parse().unwrap();
         let confirmations = all.iter().filter(|it| it.source == address);
         let confirmations = confirmations.filter_map(|it| {
@@ -94,7 +93,7 @@ impl Replay {
         for datagram in all.iter().filter(is_for_us) {
             replay.say(datagram);
         }
-        Some(replay)
+        replay
     }
 
     /// Says one thing, and looks for its answer.
@@ -311,9 +310,7 @@ const NOTHING: BTreeMap<u16, usize> = BTreeMap::new();
 fn the_client_of_the_vehicle_simulation_gets_every_answer_from_a_vehicle_of_ours() {
     let (one, other) = (id("152.1.1"), id("152.1.2"));
     let stacks = [one, other].map(drivable::vehicle);
-    let Some(mut replay) = Replay::of("01-vehsim-client.pcap", "10.99.0.1:3794", stacks) else {
-        return;
-    };
+    let mut replay = Replay::of("01-vehsim-client.pcap", "10.99.0.1:3794", stacks);
     assert_eq!(replay.unanswered, NOTHING);
     let asked: usize = replay.asked.values().sum();
     assert_eq!(asked, 108, "{:?}", replay.asked);
@@ -339,9 +336,7 @@ fn the_client_of_the_vehicle_simulation_gets_every_answer_from_a_vehicle_of_ours
 fn a_client_that_looks_after_its_events_keeps_them_and_creates_nothing_twice() {
     let us = id("77.1.1");
     let stacks = [drivable::vehicle(us)];
-    let Some(replay) = Replay::of("02-rawvehicle-client.pcap", "10.99.0.2:3794", stacks) else {
-        return;
-    };
+    let replay = Replay::of("02-rawvehicle-client.pcap", "10.99.0.2:3794", stacks);
     assert_eq!(replay.unanswered, NOTHING);
     assert!(
         replay.asked[&CreateEvent::CODE] > 2,
@@ -362,10 +357,7 @@ fn a_client_that_looks_after_its_events_keeps_them_and_creates_nothing_twice() {
 fn the_console_with_waypoints_gets_every_answer() {
     let us = id("152.1.1");
     let stacks = [drivable::vehicle(us)];
-    let Some(mut replay) = Replay::of("05-jcopc-challenge2010.pcap", "10.99.0.1:3794", stacks)
-    else {
-        return;
-    };
+    let mut replay = Replay::of("05-jcopc-challenge2010.pcap", "10.99.0.1:3794", stacks);
     assert_eq!(replay.unanswered, NOTHING);
     assert_eq!(replay.asked[&RequestControl::CODE], 36);
     assert_eq!(replay.asked[&SetElement::CODE], 1, "four waypoints");
@@ -376,9 +368,7 @@ fn the_console_with_waypoints_gets_every_answer() {
 #[test]
 fn the_tasks_of_2010_get_every_answer() {
     let stacks = [drivable::vehicle(id("152.1.1"))];
-    let Some(replay) = Replay::of("07-cop-challenge2010.pcap", "10.99.0.1:3794", stacks) else {
-        return;
-    };
+    let replay = Replay::of("07-cop-challenge2010.pcap", "10.99.0.1:3794", stacks);
     assert_eq!(replay.unanswered, NOTHING);
 }
 
@@ -407,9 +397,7 @@ fn an_operator_of_ours_is_what_vehicles_of_jauspp_ask_for() {
             &["152.1.1"],
         ),
     ] {
-        let Some(mut replay) = Replay::of(file, address, [drivable::operator(id(us))]) else {
-            return;
-        };
+        let mut replay = Replay::of(file, address, [drivable::operator(id(us))]);
         let unanswered = replay.unanswered.keys();
         let missing: Vec<_> = unanswered
             .filter(|code| !not_offered.contains(code))

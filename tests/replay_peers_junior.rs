@@ -15,8 +15,6 @@ mod recorded;
 #[path = "support/seat.rs"]
 #[allow(dead_code, reason = "connections are replayed elsewhere")]
 mod seat;
-#[path = "support/shared.rs"]
-mod shared;
 
 use std::net::SocketAddr;
 
@@ -25,6 +23,7 @@ use jaus::address::JausId;
 use jaus::endpoint::{Config, Counter, Event, Outgoing, To};
 use jaus::peer::Peer;
 use jaus::wire::DataControl;
+use jaus_test_kit::evidence;
 use recorded::Recorded;
 use seat::Seat;
 
@@ -38,10 +37,10 @@ fn address(host: &str) -> SocketAddr {
 }
 
 /// What each of the two nodes said.
-fn said(file: &str) -> Option<(Vec<Recorded>, Vec<Recorded>)> {
-    let file = shared::captures()?.join(format!("junior/{file}.pcap"));
+fn said(file: &str) -> (Vec<Recorded>, Vec<Recorded>) {
+    let file = evidence::captures().join(format!("junior/{file}.pcap"));
     let all = recorded::datagrams(&file).into_iter();
-    Some(all.partition(|datagram| datagram.source == address("1")))
+    all.partition(|datagram| datagram.source == address("1"))
 }
 
 /// A node of ours with one component, whose numbers begin with 1 as Junior's do.
@@ -73,9 +72,7 @@ fn a_node_in_the_place_of_b_answers_with_b_s_very_octets() {
         ("10-opc-JAUS01.0", false),
         ("12-priority15", false),
     ] {
-        let Some((of_a, of_b)) = said(file) else {
-            return;
-        };
+        let (of_a, of_b) = said(file);
         let mut seat = node(B, "2");
         for datagram in &of_a {
             seat.run_until(datagram.at);
@@ -94,9 +91,7 @@ fn a_node_in_the_place_of_b_answers_with_b_s_very_octets() {
 
 #[test]
 fn what_junior_repeats_without_an_answer_is_acknowledged_each_time_and_taken_once() {
-    let Some((of_a, _)) = said("08-ack-timeout-no-peer") else {
-        return;
-    };
+    let (of_a, _) = said("08-ack-timeout-no-peer");
     let mut seat = node(B, "2");
     for datagram in &of_a {
         seat.run_until(datagram.at);
@@ -112,9 +107,7 @@ fn what_junior_repeats_without_an_answer_is_acknowledged_each_time_and_taken_onc
 
 #[test]
 fn the_priority_fault_is_counted_and_names_junior() {
-    let Some((of_a, _)) = said("11-priority0-bug") else {
-        return;
-    };
+    let (of_a, _) = said("11-priority0-bug");
     let mut seat = node(B, "2");
     for datagram in &of_a {
         seat.hear(datagram.source, datagram.payload.clone());
@@ -132,9 +125,7 @@ fn a_node_in_the_place_of_a_calls_as_a_does_and_understands_the_answer() {
         ("01-discovery-then-unicast", false),
         ("02-acked-small", true),
     ] {
-        let Some((of_a, of_b)) = said(file) else {
-            return;
-        };
+        let (of_a, of_b) = said(file);
         let payload = of_a[0].frames().0[0].payload.clone();
         let mut seat = node(A, "1");
         seat.say(Outgoing {
@@ -167,9 +158,7 @@ fn a_node_in_the_place_of_a_calls_as_a_does_and_understands_the_answer() {
 /// 100 kB are cut as Junior cuts them, and Junior's acknowledgements end the delivery.
 #[test]
 fn a_large_acknowledged_message_goes_to_junior_as_juniors_own() {
-    let Some((of_a, of_b)) = said("03-acked-100KB") else {
-        return;
-    };
+    let (of_a, of_b) = said("03-acked-100KB");
     let mut seat = node(A, "1");
     let first = of_a[0].frames().0[0].payload.clone();
     let reliable = |payload| Outgoing {

@@ -6,18 +6,18 @@
 #[path = "support/recorded.rs"]
 #[allow(dead_code, reason = "who sent what is enough here")]
 mod recorded;
-#[path = "support/shared.rs"]
-mod shared;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use jaus::address::JausId;
 use jaus::peer::{Certainty, Peer, Recogniser, Verdict};
+use jaus_test_kit::evidence;
 
 /// What is to be thought of each sender of a capture.
-fn verdicts(file: &str) -> Option<BTreeMap<JausId, Verdict>> {
+fn verdicts(file: &Path) -> BTreeMap<JausId, Verdict> {
     let mut recognisers: BTreeMap<JausId, Recogniser> = BTreeMap::new();
-    for datagram in recorded::datagrams(&shared::captures()?.join(file)) {
+    for datagram in recorded::datagrams(file) {
         let (frames, trailing) = datagram.frames();
         for (index, frame) in frames.iter().enumerate() {
             let last = index + 1 == frames.len();
@@ -26,14 +26,11 @@ fn verdicts(file: &str) -> Option<BTreeMap<JausId, Verdict>> {
         }
     }
     let verdicts = recognisers.into_iter();
-    Some(verdicts.map(|(id, it)| (id, it.verdict())).collect())
+    verdicts.map(|(id, it)| (id, it.verdict())).collect()
 }
 
 fn check(file: &str, expected: &[(&str, Peer, Certainty)]) {
-    let Some(verdicts) = verdicts(file) else {
-        return;
-    };
-    for (id, verdict) in verdicts {
+    for (id, verdict) in verdicts(&evidence::captures().join(file)) {
         let id = id.to_string();
         let of_it = expected.iter().find(|(expected, ..)| *expected == id);
         let (peer, certainty) =
@@ -93,9 +90,7 @@ fn junior_is_recognised_by_its_first_call_and_for_sure_by_its_fault() {
         ("11-priority0-bug", Certain),
         ("12-priority15", Likely),
     ] {
-        let Some(verdicts) = verdicts(&format!("junior/{file}.pcap")) else {
-            return;
-        };
+        let verdicts = verdicts(&evidence::captures().join(format!("junior/{file}.pcap")));
         let verdict = &verdicts[&JausId::new(1, 1, 1)];
         assert_eq!(
             (verdict.peer, verdict.certainty),
@@ -113,15 +108,17 @@ fn the_judging_tool_is_recognised() {
         "igvc2015/interface_test_1_13pts.pcapng",
         "igvc2015/qualification-practive-2015.pcap.pcapng",
     ] {
-        let Some(verdicts) = verdicts(file) else {
-            return;
+        let Some(file) = evidence::capture(file) else {
+            continue;
         };
+        let verdicts = verdicts(&file);
         for judge in ["42.1.1", "42.2.1", "42.2.2", "42.2.3", "42.2.4"] {
             let verdict = &verdicts[&judge.parse().unwrap()];
             assert_eq!(
                 (verdict.peer, verdict.certainty),
                 (OpenJausSdk, Likely),
-                "{judge} {file}"
+                "{judge} {}",
+                file.display()
             );
         }
     }

@@ -20,8 +20,6 @@ mod recorded;
 #[path = "support/seat.rs"]
 #[allow(dead_code, reason = "virtual time is of little use here")]
 mod seat;
-#[path = "support/shared.rs"]
-mod shared;
 #[path = "support/streams.rs"]
 mod streams;
 
@@ -35,11 +33,12 @@ use jaus::messages::core::{QueryAuthority, QueryStatus, RegisterServices};
 use jaus::peer::Peer;
 use jaus::wire::jtcp::Decoder;
 use jaus::wire::{Frame, judp};
+use jaus_test_kit::evidence;
 use seat::Seat;
 
 /// The messages of the stream that goes to (or comes from) the listening side.
-fn messages(file: &str, to_listener: bool) -> Option<Vec<(SocketAddr, Vec<Frame>)>> {
-    let all = streams::streams(&shared::captures()?.join(file));
+fn messages(file: &str, to_listener: bool) -> Vec<(SocketAddr, Vec<Frame>)> {
+    let all = streams::streams(&evidence::captures().join(file));
     let wanted = all
         .into_iter()
         .filter(|((_, to), _)| (*to == judp::PORT) == to_listener);
@@ -50,7 +49,7 @@ fn messages(file: &str, to_listener: bool) -> Option<Vec<(SocketAddr, Vec<Frame>
         let client = if to_listener { from } else { to };
         (SocketAddr::from(([10, 77, 0, 1], client)), frames.collect())
     };
-    Some(wanted.map(decode).collect())
+    wanted.map(decode).collect()
 }
 
 fn listening(id: JausId, address: &str) -> Seat {
@@ -63,10 +62,8 @@ fn listening(id: JausId, address: &str) -> Seat {
 #[test]
 fn junior_is_answered_on_its_connection_with_the_messages_that_junior_answered() {
     let us = JausId::new(2, 1, 1);
-    let Some(asked) = messages("junior/13-jtcp.pcap", true) else {
-        return;
-    };
-    let answered = messages("junior/13-jtcp.pcap", false).unwrap();
+    let asked = messages("junior/13-jtcp.pcap", true);
+    let answered = messages("junior/13-jtcp.pcap", false);
     let mut seat = listening(us, "10.77.0.2:3794");
     let (connection, frames) = &asked[0];
     for frame in frames {
@@ -87,9 +84,7 @@ fn junior_is_answered_on_its_connection_with_the_messages_that_junior_answered()
 #[test]
 fn juniors_64_kb_arrive_whole_over_its_connection() {
     let us = JausId::new(2, 1, 1);
-    let Some(asked) = messages("junior/14-jtcp-64KB.pcap", true) else {
-        return;
-    };
+    let asked = messages("junior/14-jtcp-64KB.pcap", true);
     let mut seat = listening(us, "10.77.0.2:3794");
     for frame in &asked[0].1 {
         seat.hear_frame(asked[0].0, frame);
@@ -102,9 +97,7 @@ fn juniors_64_kb_arrive_whole_over_its_connection() {
 /// next call by UDP, at most five seconds later, tells where it is answered from then on.
 #[test]
 fn jauspp_is_answered_by_udp_once_it_has_registered_and_called() {
-    let Some(captures) = shared::captures() else {
-        return;
-    };
+    let captures = evidence::captures();
     let (us, peer) = (JausId::new(102, 1, 1), JausId::new(101, 1, 1));
     let its_address: SocketAddr = "10.99.0.1:3794".parse().unwrap();
     let mut seat = Seat::new("10.99.0.2:3794".parse().unwrap(), Config::default());
@@ -113,7 +106,7 @@ fn jauspp_is_answered_by_udp_once_it_has_registered_and_called() {
     let calls = recorded::datagrams(&captures.join("jauspp/06-jtcp.pcap"));
     let mut calls = calls.iter().filter(|it| it.source == its_address);
     seat.hear(its_address, calls.next().unwrap().payload.clone());
-    let streams = messages("jauspp/06-jtcp.pcap", true).unwrap();
+    let streams = messages("jauspp/06-jtcp.pcap", true);
     let (connection, frames) = streams
         .iter()
         .find(|(_, frames)| frames[0].source == peer)

@@ -17,6 +17,7 @@ use jaus::endpoint::{LinkId, To, Transmit};
 use jaus::link::udp::{PortTaken, Settings, UdpLink, kernel_drops};
 use jaus::link::{Error, Group, Interface, Interfaces, Ip, Slab};
 use jaus::wire::Priority;
+use jaus_test_kit::evidence::not_tested;
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);
@@ -87,8 +88,10 @@ async fn a_link_does_not_hear_itself() {
 #[tokio::test]
 async fn links_with_ipv6_addresses_talk_and_leave_ipv4_to_others() {
     let Ok(loopback6) = Interfaces::Loopback.choose(Ip::V6) else {
-        eprintln!("*** SKIPPED: this host has no IPv6");
-        return;
+        return not_tested(
+            "links_with_ipv6_addresses_talk_and_leave_ipv4_to_others",
+            "this host has no IPv6",
+        );
     };
     let mut a = UdpLink::open(&loopback6[0], &settings()).unwrap();
     // Another node with the same port, but of IPv4.

@@ -9,12 +9,13 @@ mod support;
 
 use std::collections::BTreeMap;
 
+use jaus_test_kit::evidence;
 use jsidl::behaviour::{Guard, Machine, Name, State, Stimulus, Transition, TransitionKind};
 use jsidl::{Library, Loaded, Loader, Severity};
 use proptest::prelude::*;
 
 fn corpus(sources: &[&str]) -> Option<Loaded> {
-    let corpus = support::shared()?.join("jsidl-corpus");
+    let corpus = evidence::outside("jsidl-corpus")?;
     let mut loader = Loader::new();
     for source in sources {
         loader.path(corpus.join(source));

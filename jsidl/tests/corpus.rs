@@ -7,11 +7,12 @@ use std::f64::consts::PI;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use jaus_test_kit::evidence;
 use jsidl::model::{Meaning, Shape, Unsigned};
 use jsidl::{Loaded, Loader, Severity};
 
 fn corpus() -> Option<PathBuf> {
-    support::shared().map(|shared| shared.join("jsidl-corpus"))
+    evidence::outside("jsidl-corpus")
 }
 
 fn load(corpus: &Path, sources: &[&str]) -> Loaded {
@@ -121,14 +122,13 @@ fn of_fkie_only_what_cannot_be_is_an_error() {
 /// the same code, name, service and version.
 #[test]
 fn every_message_of_the_golden_vectors_is_known() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
-    let corpus = shared.join("jsidl-corpus");
     let libraries = ["jts", "fkie", "ffi"].map(|source| (source, load(&corpus, &[source])));
     let examples = load(&corpus, &["jts-examples", "jts"]);
     let mut vectors = 0;
-    for file in fs::read_dir(shared.join("golden")).expect("the folder exists") {
+    for file in fs::read_dir(evidence::golden()).expect("the folder exists") {
         let text = fs::read_to_string(file.expect("readable").path()).expect("UTF-8");
         for line in text.lines().filter(|line| line.contains("\"message_id\"")) {
             let vector: serde_json::Value = serde_json::from_str(line).expect("JSON");

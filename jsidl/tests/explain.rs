@@ -9,6 +9,7 @@
 
 mod support;
 
+use jaus_test_kit::evidence;
 use jsidl::dynamic::{Limits, arbitrary, decode_with, encode};
 use jsidl::explain::{Explanation, Kind, Row, Unexplained, explain, explain_as, table};
 use jsidl::model::Message;
@@ -36,12 +37,12 @@ fn said(explanation: &Explanation) -> Vec<String> {
 
 #[test]
 fn every_octet_of_every_golden_message_is_explained_once_and_in_order() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     let mut total = 0;
-    for (source, rows) in support::golden::sources(&shared) {
-        let library = support::golden::load(&shared, &source);
+    for (source, rows) in support::golden::sources() {
+        let library = support::golden::load(&corpus, &source);
         for row in &rows {
             let message = support::golden::message_of(&library, row);
             let octets = support::golden::octets_of(&row["hex"]);

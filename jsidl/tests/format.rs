@@ -10,6 +10,7 @@ mod support;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use jaus_test_kit::evidence;
 use jsidl::format::{WIDTH, format};
 use roxmltree::{Document, Node};
 
@@ -88,11 +89,11 @@ fn our_definitions_keep_their_meaning_and_are_laid_out_once() {
 
 #[test]
 fn published_definitions_keep_their_meaning_and_are_laid_out_once() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     let mut files = Vec::new();
-    files_of(&shared.join("jsidl-corpus"), &mut files);
+    files_of(&corpus, &mut files);
     assert!(files.len() > 400, "{} files", files.len());
     for file in files {
         assert_stable_and_faithful(&file);

@@ -10,6 +10,7 @@ mod support;
 
 use std::collections::BTreeMap;
 
+use jaus_test_kit::evidence;
 use jsidl::dynamic::{
     decode, encode, from_json, raw_from_real, real_from_raw, shortest_real, to_json,
 };
@@ -38,10 +39,7 @@ fn scale_of(row: &Json) -> (Scale, Unsigned) {
 
 #[test]
 fn real_numbers_become_the_integers_of_exact_rounding() {
-    let Some(shared) = support::shared() else {
-        return;
-    };
-    let rows = golden::lines(&shared.join("golden/scaling_encode.jsonl"));
+    let rows = golden::lines(&evidence::golden().join("scaling_encode.jsonl"));
     for row in &rows {
         let (scale, width) = scale_of(row);
         let raw = raw_from_real(&scale, width, row["real"].as_f64().unwrap());
@@ -53,10 +51,7 @@ fn real_numbers_become_the_integers_of_exact_rounding() {
 
 #[test]
 fn integers_become_the_real_numbers_they_stand_for() {
-    let Some(shared) = support::shared() else {
-        return;
-    };
-    let rows = golden::lines(&shared.join("golden/scaling_decode.jsonl"));
+    let rows = golden::lines(&evidence::golden().join("scaling_decode.jsonl"));
     for row in &rows {
         let (scale, width) = scale_of(row);
         let raw = row["raw"].as_u64().unwrap();
@@ -222,12 +217,12 @@ fn check(message: &Message, row: &Json) {
 
 #[test]
 fn every_golden_message_is_read_shown_and_written_as_it_is() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     let mut total = 0;
-    for (source, rows) in golden::sources(&shared) {
-        let library = golden::load(&shared, &source);
+    for (source, rows) in golden::sources() {
+        let library = golden::load(&corpus, &source);
         for row in &rows {
             check(golden::message_of(&library, row), row);
         }
@@ -255,17 +250,11 @@ const LAID_OUT_OTHERWISE: &[(&str, &str)] = &[
 
 #[test]
 fn our_own_definitions_read_show_and_write_the_golden_messages_of_their_services() {
-    let Some(shared) = support::shared() else {
-        return;
-    };
     let mut loader = jsidl::Loader::new();
     loader.catalogue();
     let ours = loader.load().library;
     let mut vectors = BTreeMap::<String, usize>::new();
-    for row in golden::sources(&shared)
-        .into_iter()
-        .flat_map(|(_, rows)| rows)
-    {
+    for row in golden::sources().into_iter().flat_map(|(_, rows)| rows) {
         let id = golden::id_of(&row);
         let other = |&(source, message): &(&str, &str)| {
             row["source"] == source && row["message"] == message

@@ -7,6 +7,7 @@
 
 mod support;
 
+use jaus_test_kit::evidence;
 use jsidl::behaviour::{
     Machine, Name, Outcome, Run, Stimulus, Transition, TransitionKind, dot, mermaid,
 };
@@ -169,12 +170,12 @@ const PUBLISHED: [(&str, usize, &[&str]); 3] =
 /// Everything that a collection says about machines fits together; what does not is warned of.
 #[test]
 fn every_published_machine_starts_and_leads_to_states_that_exist() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     for (source, services, unsound) in PUBLISHED {
         let mut loader = Loader::new();
-        loader.path(shared.join("jsidl-corpus").join(source));
+        loader.path(corpus.join(source));
         let Loaded {
             library,
             diagnostics,
@@ -198,12 +199,12 @@ fn every_published_machine_starts_and_leads_to_states_that_exist() {
 /// One type for each machine of each service that says something about its behaviour itself.
 #[test]
 fn every_published_machine_can_be_written_as_rust() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     for (source, ..) in PUBLISHED {
         let mut loader = Loader::new();
-        loader.path(shared.join("jsidl-corpus").join(source));
+        loader.path(corpus.join(source));
         let library = loader.load().library;
         let services = || library.services().map(AsRef::<Service>::as_ref);
         let text = rust::module(&library, services(), "::jaus::codec");

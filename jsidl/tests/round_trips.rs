@@ -11,6 +11,7 @@ mod support;
 
 use std::collections::BTreeMap;
 
+use jaus_test_kit::evidence;
 use jsidl::dynamic::{
     Limits, arbitrary, decode, decode_with, encode, encode_with, from_json, to_json,
 };
@@ -104,12 +105,12 @@ fn embedded_definitions_round_trip() {
 
 #[test]
 fn public_definitions_round_trip() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     for family in ["jts", "fkie", "ffi"] {
         let mut loader = Loader::new();
-        loader.path(shared.join("jsidl-corpus").join(family));
+        loader.path(corpus.join(family));
         check_all(&loader.load().library, 4);
     }
 }

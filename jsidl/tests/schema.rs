@@ -10,6 +10,7 @@ mod support;
 
 use std::collections::BTreeMap;
 
+use jaus_test_kit::evidence;
 use jsidl::dynamic::{arbitrary, decode, from_json, to_json};
 use jsidl::model::Message;
 use jsidl::schema::{of_message, of_service};
@@ -30,12 +31,12 @@ fn holds(validator: &Validator, json: &Json) {
 
 #[test]
 fn the_json_of_every_golden_message_is_valid() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     let mut total = 0;
-    for (source, rows) in support::golden::sources(&shared) {
-        let library = support::golden::load(&shared, &source);
+    for (source, rows) in support::golden::sources() {
+        let library = support::golden::load(&corpus, &source);
         let mut validators = BTreeMap::new();
         for row in &rows {
             let message = support::golden::message_of(&library, row);

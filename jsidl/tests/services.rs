@@ -6,6 +6,7 @@ mod support;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use jaus_test_kit::evidence;
 use jsidl::model::{Item, Meaning, Message, Scalar, Service, Shape};
 use jsidl::{Library, Loader};
 
@@ -240,12 +241,12 @@ const DIFFERENT: &[(&str, &[&str], &[&str])] = &[
 
 #[test]
 fn every_service_has_the_octets_that_the_public_ones_have() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     let ours = ours();
     let mut different = BTreeSet::new();
-    for (source, library) in &public(&shared.join("jsidl-corpus")) {
+    for (source, library) in &public(&corpus) {
         for theirs in library.services() {
             let Some(service) = ours.service(&theirs.id) else {
                 continue;
@@ -299,12 +300,12 @@ fn is_left_out(id: &str) -> bool {
 
 #[test]
 fn every_public_service_is_there() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     let ours = ours();
     let mut missing = BTreeSet::new();
-    for (_, library) in &public(&shared.join("jsidl-corpus")) {
+    for (_, library) in &public(&corpus) {
         for theirs in library.services() {
             let id = theirs.id.to_string();
             if ours.service(&theirs.id).is_none() && !is_left_out(&id) {
@@ -317,11 +318,11 @@ fn every_public_service_is_there() {
 
 #[test]
 fn no_sentence_is_taken_from_the_public_definitions() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
     let mut theirs = BTreeSet::new();
-    for (_, library) in &public(&shared.join("jsidl-corpus")) {
+    for (_, library) in &public(&corpus) {
         for text in texts(library) {
             theirs.extend(runs(&text));
         }

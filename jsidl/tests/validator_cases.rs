@@ -12,6 +12,7 @@ mod support;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use jaus_test_kit::evidence;
 use jsidl::{Diagnostic, Diagnostics, Loader};
 
 /// The surroundings of a fragment whose root is this element.
@@ -118,10 +119,10 @@ fn findings(file: &Path) -> Diagnostics {
 }
 
 fn cases(kind: &str, folder: &str) -> Vec<PathBuf> {
-    let Some(shared) = support::shared() else {
+    let Some(cases) = evidence::outside("validator-cases") else {
         return Vec::new();
     };
-    let folder = shared.join("validator-cases").join(kind).join(folder);
+    let folder = cases.join(kind).join(folder);
     let mut files: Vec<_> = fs::read_dir(folder)
         .expect("the folder exists")
         .map(|entry| entry.expect("readable").path())
@@ -366,11 +367,11 @@ fn invalid_definitions_are_rejected_for_the_stated_reason() {
 
 #[test]
 fn missing_declarations_are_named() {
-    let Some(shared) = support::shared() else {
+    let Some(cases) = evidence::outside("validator-cases") else {
         return;
     };
     let mut loader = Loader::new();
-    loader.path(shared.join("validator-cases/invalid/core-broken-declarations"));
+    loader.path(cases.join("invalid/core-broken-declarations"));
     let found = loader.load().diagnostics;
     let missing: Vec<_> = found
         .errors()

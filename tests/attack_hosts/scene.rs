@@ -89,9 +89,7 @@ pub(crate) fn on_testbed(body: impl Fn(&Testbed)) {
     for attempt in 1..=ATTEMPTS {
         let run = || on_hosts(test, Testbed::new, &body);
         match catch_unwind(AssertUnwindSafe(run)) {
-            Ok(ran) => {
-                let may_skip = std::env::var_os("CI").is_none();
-                assert!(ran || may_skip, "no network namespaces on CI");
+            Ok(()) => {
                 return;
             }
             Err(failure) if attempt == ATTEMPTS => resume_unwind(failure),

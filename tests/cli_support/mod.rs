@@ -13,7 +13,7 @@
 )]
 
 use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 use etherparse::PacketBuilder;
@@ -140,25 +140,6 @@ impl Drop for Running {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
-}
-
-/// The folder with recorded captures and golden vectors, which is not part of the repository.
-/// Without it the tests that need it pass, loudly; where `CI` is set they fail.
-pub fn shared() -> Option<PathBuf> {
-    let folder = std::env::var_os("JAUS_SHARED").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-        PathBuf::from,
-    );
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    let missing = format!(
-        "NOT TESTED: {} is not there; set JAUS_SHARED",
-        folder.display()
-    );
-    assert!(std::env::var_os("CI").is_none(), "{missing}");
-    eprintln!("{missing}");
-    None
 }
 
 /// The octets of every golden vector in a file, a line each.

@@ -20,6 +20,4 @@ mod replay;
 mod rover;
 mod safety;
 #[cfg(feature = "view")]
-#[path = "../support/shared.rs"]
-mod shared;
 mod world;

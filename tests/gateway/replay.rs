@@ -1,8 +1,5 @@
 //! Recorded traffic of OpenJAUS 3.3.1, with the gateway in the place of one of its peers: whatever is
 //! asked gets an answer that the peer can use.
-//!
-//! The captures are in the directory that `JAUS_SHARED` names (default: `../shared`). Without them
-//! nothing is tested, loudly; with `CI` set that is a failure.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -20,9 +17,9 @@ use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 use jaus::view::{Capture, Network};
 use jaus::wire::judp;
 use jaus::world;
+use jaus_test_kit::evidence;
 use redb::backends::InMemoryBackend;
 
-use crate::shared;
 use crate::world::{World, address, stack};
 
 /// A recorded datagram: when, from where, to where.
@@ -33,8 +30,8 @@ struct Datagram {
     octets: Bytes,
 }
 
-fn recorded(file: &str, port: u16) -> Option<Vec<Datagram>> {
-    let file = shared::captures()?.join("openjaus33").join(file);
+fn recorded(file: &str, port: u16) -> Vec<Datagram> {
+    let file = evidence::captures().join("openjaus33").join(file);
     let mut capture = Capture::new(File::open(file).unwrap()).unwrap();
     let mut network = Network::new([port]);
     let mut datagrams = Vec::new();
@@ -49,7 +46,7 @@ fn recorded(file: &str, port: u16) -> Option<Vec<Datagram>> {
             octets: Bytes::copy_from_slice(&datagram.payload),
         }));
     }
-    Some(datagrams)
+    datagrams
 }
 
 /// What a datagram says: source, destination, code and data.
@@ -104,9 +101,7 @@ fn replay(world: &mut World, datagrams: &[(Duration, Bytes)]) {
 #[test]
 fn in_place_of_a_node_manager_every_question_of_the_other_is_answered() {
     for file in ["openjaus33-opc-wire.pcap", "openjaus33-judp-wire.pcap"] {
-        let Some(recorded) = recorded(file, judp::PORT) else {
-            return;
-        };
+        let recorded = recorded(file, judp::PORT);
         let a: IpAddr = [10, 77, 0, 1].into();
         let of_a = recorded.into_iter().filter(|it| it.from.ip() == a);
         let of_a: Vec<_> = of_a.map(|it| (it.time, it.octets)).collect();
@@ -187,9 +182,7 @@ fn lists_what_belongs_to(part: u8, report: &Bytes) -> bool {
 
 #[test]
 fn what_openjaus_asks_a_newcomer_is_answered_so_that_it_can_list_all_of_it() {
-    let Some(recorded) = recorded("openjaus33-peer-wire.pcap", judp::PORT) else {
-        return;
-    };
+    let recorded = recorded("openjaus33-peer-wire.pcap", judp::PORT);
     let openjaus: IpAddr = [10, 77, 0, 1].into();
     let of_it = recorded.into_iter().filter(|it| it.from.ip() == openjaus);
     let of_it: Vec<_> = of_it.map(|it| (it.time, it.octets)).collect();
@@ -241,9 +234,7 @@ fn to_our_vehicle(octets: &Bytes) -> Option<(Said, Bytes)> {
 #[test]
 fn in_place_of_its_vehicle_openjaus_waypoint_driver_is_told_and_obeyed() {
     const TO_NODE_MANAGER: u16 = 24629;
-    let Some(recorded) = recorded("openjaus33-opc-lo.pcap", TO_NODE_MANAGER) else {
-        return;
-    };
+    let recorded = recorded("openjaus33-opc-lo.pcap", TO_NODE_MANAGER);
     let to_manager = |it: &&Datagram| it.to.port() == TO_NODE_MANAGER;
     let mut asked: BTreeMap<u16, usize> = BTreeMap::new();
     let mut datagrams = Vec::new();

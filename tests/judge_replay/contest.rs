@@ -8,10 +8,10 @@ use jaus::codec::Message;
 use jaus::messages::core::{CreateEvent, RejectEventRequest};
 use jaus::view::Dictionary;
 use jaus::wire::Frame;
+use jaus_test_kit::evidence;
 use serde_json::{Value as Json, json};
 
 use crate::capture::said_by;
-use crate::cli_support::shared;
 use crate::client::{Client, Exchange, Pauses, is_answered};
 use crate::vehicle::{VEHICLE, Vehicle};
 
@@ -42,7 +42,7 @@ const ORIGINAL: Pauses = Pauses(Duration::from_secs(30));
 
 /// Says everything that the tool said; gives the whole exchange.
 fn replay(capture: &str, pauses: Pauses) -> Option<Vec<Exchange>> {
-    let capture = shared()?.join("captures/igvc2015").join(capture);
+    let capture = evidence::capture(&format!("igvc2015/{capture}"))?;
     let of_judge = |id: jaus::address::JausId| id.subsystem() == JUDGE;
     let said = said_by(&capture, of_judge, JUDGED, VEHICLE);
     assert!(!said.is_empty(), "{} has requests", capture.display());

@@ -8,9 +8,9 @@ use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::messages::core::{CancelEvent, ConfirmEventRequest, CreateEvent};
 use jaus::view::Dictionary;
+use jaus_test_kit::evidence;
 
 use crate::capture::{Said, said_by};
-use crate::cli_support::shared;
 use crate::client::{Client, Exchange, Pauses, is_answered};
 use crate::vehicle::{VEHICLE, Vehicle};
 
@@ -18,11 +18,11 @@ use crate::vehicle::{VEHICLE, Vehicle};
 const SHORT: Pauses = Pauses(Duration::from_millis(50));
 
 /// What a JAUS++ client of this id said in a capture to a vehicle of this subsystem.
-fn said(capture: &str, client: JausId, vehicle: u16) -> Option<Vec<Said>> {
-    let capture = shared()?.join("captures/jauspp").join(capture);
+fn said(capture: &str, client: JausId, vehicle: u16) -> Vec<Said> {
+    let capture = evidence::captures().join("jauspp").join(capture);
     let said = said_by(&capture, |id| id == client, vehicle, VEHICLE);
     assert!(!said.is_empty(), "{} has requests", capture.display());
-    Some(said)
+    said
 }
 
 /// Requires an answer to every request.
@@ -73,9 +73,7 @@ fn one_stream_for_each_subscription(exchanges: &[Exchange]) -> BTreeMap<u8, f64>
 /// Replays a client up to its first cancellation, looks at the streams, and then replays the rest.
 fn events_do_not_multiply(capture: &str, vehicle: u16) {
     const LISTENING: f64 = 2.0;
-    let Some(said) = said(capture, JausId::new(1000, 1, 7), vehicle) else {
-        return;
-    };
+    let said = said(capture, JausId::new(1000, 1, 7), vehicle);
     let cancellation = said.iter().position(|one| one.code() == CancelEvent::CODE);
     let (before, after) = said.split_at(cancellation.expect("it cancels"));
     let mut client = Client::new(Vehicle::start());
@@ -116,9 +114,7 @@ fn a_client_that_subscribes_again_and_again_gets_every_answer_and_no_stream_twic
 #[test]
 fn a_jauspp_console_with_waypoints_gets_every_answer() {
     let console = JausId::new(10002, 1, 1);
-    let Some(said) = said("05-jcopc-challenge2010.pcap", console, 152) else {
-        return;
-    };
+    let said = said("05-jcopc-challenge2010.pcap", console, 152);
     let mut client = Client::new(Vehicle::start());
     client.acknowledges = true;
     all_answered(&client.replay(&said, SHORT));

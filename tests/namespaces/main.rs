@@ -25,7 +25,8 @@ mod vehicle_process;
 use std::time::{Duration, Instant};
 
 use hosts::on_two_hosts;
-use networks::{run, say_skipped};
+use jaus_test_kit::evidence::not_tested;
+use networks::run;
 
 #[test]
 fn nodes_on_two_hosts_meet_by_multicast_and_go_on_by_unicast() {
@@ -80,7 +81,7 @@ fn an_urgent_message_overtakes_what_a_slow_network_holds_back() {
                 "ip",
                 &[&["netns", "exec", network, "tc"], &slow[..]].concat(),
             ) {
-                return say_skipped("an_urgent_message_overtakes_…", &reason);
+                return not_tested("an_urgent_message_overtakes_…", &reason);
             }
             let sink = hosts.start(0, "sink");
             sink.says("listening on");

@@ -1,9 +1,8 @@
-//! Recorded traffic of OpenJAUS 3.3.1. The captures are in the directory that `JAUS_SHARED` names
-//! (default: `../shared`); without them nothing is tested, loudly; with `CI` set that is a failure.
+//! Recorded traffic of OpenJAUS 3.3.1.
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use bytes::Bytes;
 use jaus::codec::Message;
@@ -11,30 +10,12 @@ use jaus::messages::{ra, ra33};
 use jaus::view::{Capture, Datagram, Network};
 use jaus::wire::ra::{HEADER_LEN, Header};
 use jaus::wire::{Frame, judp};
+use jaus_test_kit::evidence;
 
 use super::{Definitions, through_both};
 
 /// Where OpenJAUS's node manager and its components talk, without any framing.
 const INNER_PORT: u16 = 24629;
-
-pub(crate) fn captures() -> Option<PathBuf> {
-    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared");
-    let shared = PathBuf::from(std::env::var_os("JAUS_SHARED").unwrap_or_else(|| beside.into()));
-    let captures = shared.join("captures/openjaus33");
-    if captures.is_dir() {
-        return Some(captures);
-    }
-    assert!(
-        std::env::var_os("CI").is_none(),
-        "{} is missing",
-        captures.display()
-    );
-    eprintln!(
-        "NOTHING WAS TESTED: there is no {}; set JAUS_SHARED",
-        captures.display()
-    );
-    None
-}
 
 /// The messages of a capture, code and data of each.
 fn messages(file: &Path) -> Vec<Bytes> {
@@ -63,7 +44,7 @@ fn message(datagram: &Datagram<'_>) -> Option<Bytes> {
 
 #[test]
 fn every_recorded_message_is_read_and_written_again_by_both_codecs() {
-    let Some(captures) = captures() else { return };
+    let captures = evidence::captures().join("openjaus33");
     let definitions = Definitions::new();
     let mut counted = BTreeMap::new();
     for file in ["judp-wire", "opc-lo", "opc-wire", "peer-wire"] {
@@ -93,7 +74,7 @@ fn every_recorded_message_is_read_and_written_again_by_both_codecs() {
 
 #[test]
 fn the_recorded_vehicle_is_where_its_simulation_begins() {
-    let Some(captures) = captures() else { return };
+    let captures = evidence::captures().join("openjaus33");
     let file = captures.join("openjaus33-opc-lo.pcap");
     let code = ra33::ReportGlobalPose::CODE.to_le_bytes();
     let poses = messages(&file).into_iter();

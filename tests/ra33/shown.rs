@@ -6,13 +6,12 @@ use std::fs::File;
 use bytes::Bytes;
 use jaus::view::{Capture, Dictionary, MessageLog, Network};
 use jaus::wire::judp;
+use jaus_test_kit::evidence;
 use serde_json::Value;
 
-use super::captures::captures;
-
 /// The lines of a capture as JSON.
-fn lines(file: &str) -> Option<Vec<Value>> {
-    let path = captures()?.join("..").join(file);
+fn lines(file: &str) -> Vec<Value> {
+    let path = evidence::captures().join(file);
     let mut capture = Capture::new(File::open(path).unwrap()).unwrap();
     let dictionary = Dictionary::complete();
     let mut network = Network::new([judp::PORT]);
@@ -28,15 +27,13 @@ fn lines(file: &str) -> Option<Vec<Value>> {
             );
         }
     }
-    Some(lines)
+    lines
 }
 
 #[test]
 fn every_recorded_message_of_openjaus_is_shown_by_name_and_fields() {
     for (file, transport) in [("judp", "judp1"), ("opc", "ra"), ("peer", "ra")] {
-        let Some(lines) = lines(&format!("openjaus33/openjaus33-{file}-wire.pcap")) else {
-            return;
-        };
+        let lines = lines(&format!("openjaus33/openjaus33-{file}-wire.pcap"));
         for line in &lines {
             assert_eq!(line["transport"], transport);
             assert_eq!(
@@ -62,8 +59,7 @@ fn messages_of_junior_through_the_older_headers_are_not_taken_for_others() {
         "junior/09-as5669-v1-msgid.pcap",
         "junior/10-opc-JAUS01.0.pcap",
     ] {
-        let Some(lines) = lines(file) else { return };
-        for line in lines {
+        for line in lines(file) {
             let service = line["service"].as_str().unwrap_or_default();
             assert!(!service.starts_with("urn:jaus-rs:ra33:"), "{line}");
         }

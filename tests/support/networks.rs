@@ -1,22 +1,22 @@
 //! Hosts to test on: network namespaces, where this machine lets us make them.
 
-use std::io::Write;
 use std::process::Command;
+
+use jaus_test_kit::evidence::not_tested;
 
 /// Set for a test that was started again in a user namespace.
 const INSIDE: &str = "JAUS_TEST_IN_USER_NAMESPACE";
 
 /// Runs a test's body on hosts: made here; or else in a user namespace, where this test binary is
-/// started again for the same test; or not at all, said loudly. Tells whether it ran.
+/// started again for the same test; or [not at all](not_tested).
 pub(crate) fn on_hosts<H>(
     test: &str,
     make: impl FnOnce() -> Result<H, String>,
     body: impl FnOnce(&H),
-) -> bool {
+) {
     let reason = match make() {
         Ok(hosts) => {
-            body(&hosts);
-            return true;
+            return body(&hosts);
         }
         Err(reason) => reason,
     };
@@ -33,19 +33,13 @@ pub(crate) fn on_hosts<H>(
                 .is_ok_and(|s| s.success()),
             "{test} failed in a user namespace"
         );
-        return true;
+        return;
     }
-    say_skipped(test, &format!("no network namespaces here: {reason}"));
-    false
-}
-
-/// Says it past the test harness, which would keep the words of a test that passes.
-pub(crate) fn say_skipped(test: &str, reason: &str) {
-    let words = format!(
-        "\n*** SKIPPED {test}: {reason}\n\
-         *** To run it: as root, with iproute2 installed.\n\n"
+    let remedy = "run it as root, with iproute2 installed";
+    not_tested(
+        test,
+        &format!("no network namespaces here: {reason}; {remedy}"),
     );
-    std::io::stderr().write_all(words.as_bytes()).unwrap();
 }
 
 /// A command as root of namespaces of its own, which a plain user may often be.

@@ -3,6 +3,8 @@
 use std::cmp::Reverse;
 use std::thread;
 
+use jaus_test_kit::evidence;
+use jaus_test_kit::tools::has_tshark;
 use jsidl::Library;
 use jsidl::dynamic::{Limits, Value, decode_with};
 use jsidl::model::Message;
@@ -11,7 +13,7 @@ use serde_json::Value as Json;
 
 use crate::expected::{agrees, fields, shown};
 use crate::packets::Packets;
-use crate::support::{self, golden};
+use crate::support::golden;
 use crate::tshark;
 
 /// Whose messages they are, which their headers tell.
@@ -85,19 +87,19 @@ fn compare(
 
 #[test]
 fn tshark_prints_the_values_of_every_golden_message() {
-    let Some(shared) = support::shared() else {
+    let Some(corpus) = evidence::outside("jsidl-corpus") else {
         return;
     };
-    if !tshark::is_there() {
+    if !has_tshark() {
         return;
     }
-    let sources = golden::sources(&shared);
+    let sources = golden::sources();
     let check = |source: &str, rows: &[Json]| {
         let vectors: Vec<_> = rows
             .iter()
             .map(|row| golden::octets_of(&row["hex"]))
             .collect();
-        let library = golden::load(&shared, source);
+        let library = golden::load(&corpus, source);
         check_source(&library, source, Family::Services, &vectors)
     };
     let total: usize = thread::scope(|scope| {

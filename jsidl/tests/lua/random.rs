@@ -1,11 +1,11 @@
 //! Random messages of every type that comes with the crate: tshark prints the values that our own
 //! codec reads.
 
+use jaus_test_kit::tools::has_tshark;
 use jsidl::Loader;
 use jsidl::dynamic::{arbitrary, encode};
 
 use crate::golden::{Family, check_source};
-use crate::tshark;
 
 /// Octets that look random and are always the same (an xorshift generator).
 fn entropy(seed: u64) -> Vec<u8> {
@@ -32,7 +32,7 @@ fn tshark_prints_the_values_of_random_messages_of_the_reference_architecture() {
 
 /// Messages of every type that is loaded, more than `least`.
 fn check_random(name: &str, load: fn(&mut Loader) -> &mut Loader, family: Family, least: usize) {
-    if !tshark::is_there() {
+    if !has_tshark() {
         return;
     }
     let mut loader = Loader::new();

@@ -1,6 +1,7 @@
 //! Datagrams and streams as peers write them, and such as nobody should: read without an error of
 //! the dissector.
 
+use jaus_test_kit::tools::has_tshark;
 use jsidl::Library;
 use roxmltree::Document;
 
@@ -20,7 +21,7 @@ fn library() -> Library {
 
 /// What tshark says about packets; nothing if there is no tshark.
 fn dissect(test: &str, packets: &Packets) -> Option<String> {
-    if !tshark::is_there() {
+    if !has_tshark() {
         return None;
     }
     let directory = tshark::directory(test);

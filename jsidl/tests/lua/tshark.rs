@@ -7,19 +7,6 @@ use std::{env, fs};
 use jsidl::Library;
 use roxmltree::{Document, Node};
 
-/// Whether there is a `tshark`; if not, it is said loudly.
-///
-/// # Panics
-/// If it is missing where `CI` is set: there it must not be forgotten.
-pub(crate) fn is_there() -> bool {
-    if Command::new("tshark").arg("--version").output().is_ok() {
-        return true;
-    }
-    assert!(env::var_os("CI").is_none(), "CI needs tshark: install it");
-    eprintln!("NOTHING WAS TESTED: there is no tshark; install it");
-    false
-}
-
 /// A directory of this test's own.
 pub(crate) fn directory(test: &str) -> PathBuf {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR"))

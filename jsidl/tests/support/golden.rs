@@ -9,15 +9,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use jaus_test_kit::evidence;
 use jsidl::Library;
 use jsidl::model::{Id, Message, Version};
 use serde_json::Value as Json;
 
 /// The name of every source with its vectors.
-pub(crate) fn sources(shared: &Path) -> Vec<(String, Vec<Json>)> {
-    let entries = fs::read_dir(shared.join("golden")).unwrap();
+pub(crate) fn sources() -> Vec<(String, Vec<Json>)> {
+    let entries = fs::read_dir(evidence::golden()).unwrap();
     let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
-    files.retain(|file| file.extension().is_some_and(|e| e == "jsonl"));
     files.sort();
     let name = |file: &PathBuf| file.file_stem().unwrap().to_str().unwrap().to_owned();
     let sources = files.iter().map(|file| (name(file), file));
@@ -36,8 +36,7 @@ pub(crate) fn lines(path: &Path) -> Vec<Json> {
 }
 
 /// Where the definitions of a source lie, the source's own first.
-fn directories(shared: &Path, source: &str) -> Vec<PathBuf> {
-    let corpus = shared.join("jsidl-corpus");
+fn directories(corpus: &Path, source: &str) -> Vec<PathBuf> {
     // Types and services of one set are used in others of the same family.
     match source.split_once('-') {
         Some(("jts", "examples")) => vec![corpus.join(source), corpus.join("jts")],
@@ -49,9 +48,9 @@ fn directories(shared: &Path, source: &str) -> Vec<PathBuf> {
     }
 }
 
-pub(crate) fn load(shared: &Path, source: &str) -> Library {
+pub(crate) fn load(corpus: &Path, source: &str) -> Library {
     let mut loader = jsidl::Loader::new();
-    for directory in directories(shared, source) {
+    for directory in directories(corpus, source) {
         loader.path(directory);
     }
     loader.load().library

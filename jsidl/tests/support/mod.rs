@@ -1,11 +1,10 @@
-//! Hand-made definitions that use every construct of the language, and where the shared test data
-//! lies.
+//! Hand-made definitions that use every construct of the language.
 
 #![allow(dead_code, reason = "every test binary uses its own part")]
 
 pub(crate) mod golden;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use jsidl::model::*;
@@ -16,30 +15,6 @@ pub(crate) fn catalogue() -> Library {
     let mut loader = Loader::new();
     loader.catalogue();
     loader.load().library
-}
-
-/// The directory of shared test data, or `None` (said loudly) if it is not on this machine.
-///
-/// # Panics
-/// If it is missing where `CI` is set: there it must not be forgotten.
-pub(crate) fn shared() -> Option<PathBuf> {
-    let root = match std::env::var_os("JAUS_SHARED") {
-        Some(path) => PathBuf::from(path),
-        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
-    };
-    if root.join("golden").is_dir() {
-        return Some(root);
-    }
-    assert!(
-        std::env::var_os("CI").is_none(),
-        "CI needs the shared test data; set JAUS_SHARED, {} has none",
-        root.display()
-    );
-    eprintln!(
-        "NOTHING WAS TESTED: no shared test data in {}; set JAUS_SHARED",
-        root.display()
-    );
-    None
 }
 
 pub(crate) fn message(code: u16, name: &str, body: Option<Item>) -> Message {

@@ -65,25 +65,13 @@ const NOT_CONVERTED: &[u16] = &[0x0008, 0x0009, 0x2B00, 0x2B03, 0x4B00, 0x4B03];
 fn every_message_of_the_capture_is_converted_and_comes_back() {
     use std::collections::BTreeMap;
 
+    use jaus_test_kit::evidence;
+
     use crate::view::{Capture, Network};
     use crate::wire::ra::{HEADER_LEN, Header};
 
-    let shared = std::env::var_os("JAUS_SHARED").unwrap_or_else(|| "../shared".into());
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join(shared)
-        .join("captures/openjaus33/openjaus33-opc-lo.pcap");
-    let Ok(file) = std::fs::File::open(&file) else {
-        assert!(
-            std::env::var_os("CI").is_none(),
-            "CI needs {}",
-            file.display()
-        );
-        return eprintln!(
-            "NOTHING WAS TESTED: {} is not there; set JAUS_SHARED",
-            file.display()
-        );
-    };
-    let mut capture = Capture::new(file).unwrap();
+    let file = evidence::captures().join("openjaus33/openjaus33-opc-lo.pcap");
+    let mut capture = Capture::new(std::fs::File::open(file).unwrap()).unwrap();
     // Where a node manager of OpenJAUS speaks with its components.
     let mut network = Network::new([24629]);
     let mut seen = BTreeMap::new();

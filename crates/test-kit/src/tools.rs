@@ -1,0 +1,22 @@
+//! Programs that tests need and the machine may not have.
+
+use std::process::Command;
+
+use crate::evidence::not_tested;
+
+/// Whether there is a `tshark`. Without it the test proves nothing, and is to return.
+///
+/// # Panics
+/// If there is none and `JAUS_EVIDENCE=required` is set.
+#[must_use]
+pub fn has_tshark() -> bool {
+    let there = Command::new("tshark").arg("--version").output().is_ok();
+    if !there {
+        let thread = std::thread::current();
+        not_tested(
+            thread.name().unwrap_or("a test"),
+            "there is no tshark; install it",
+        );
+    }
+    there
+}
