@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::child::Process;
 use crate::placement::{Placement, Side};
-use crate::roles::Role;
+use crate::roles::{Batching, Role};
 use crate::run::folder;
 
 /// What one run of sending gave: messages sent and received, and seconds from the first message sent
@@ -70,15 +70,6 @@ fn connected(role: &Role, placement: Placement, timeout: Duration) -> (UdpSocket
     let timeout = socket.set_read_timeout(Some(timeout));
     timeout.expect("a timeout");
     (socket, child)
-}
-
-/// How datagrams are handed to the kernel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Batching {
-    /// One with each call.
-    Single,
-    /// As our links do: as many as one call takes (`UDP_SEGMENT`, `UDP_GRO`).
-    Segments,
 }
 
 /// Datagrams of `length` octets to a child that counts them.

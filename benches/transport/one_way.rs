@@ -10,11 +10,11 @@ use jaus::wire::Priority;
 use tokio::time::{sleep, timeout};
 
 use crate::Effort;
-use crate::baseline::{self, Batching, Flow};
+use crate::baseline::{self, Flow};
 use crate::child::Process;
 use crate::placement::{Placement, Side};
 use crate::report::{self, median, ratio, spread};
-use crate::roles::{self, CODE, COUNT, Role};
+use crate::roles::{self, Batching, CODE, COUNT, Role};
 use crate::setting::Setting;
 
 /// Octets of a message.

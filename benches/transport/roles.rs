@@ -8,13 +8,21 @@ use jaus::address::JausId;
 use jaus::endpoint::Received;
 use jaus::node::Peer;
 
-use crate::baseline::Batching;
 use crate::place::Place;
 
 /// The code of all messages here: an experimental one, which no service takes.
 pub(crate) const CODE: [u8; 2] = [0x01, 0xD7];
 /// The code of the message that asks a sink how much came, and of its answer.
 pub(crate) const COUNT: [u8; 2] = [0x02, 0xD7];
+
+/// How datagrams are handed to the kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Batching {
+    /// One with each call.
+    Single,
+    /// As our links do: as many as one call takes (`UDP_SEGMENT`, `UDP_GRO`).
+    Segments,
+}
 
 /// A role, with what it needs to know.
 #[derive(Clone, Debug)]

@@ -22,11 +22,12 @@ use super::error::SendError;
 use super::events::EventSender;
 use super::links::{Links, Survey};
 use super::mailbox::{Mailbox, MailboxLimits};
+use super::receivers::Receivers;
 use super::resident::Residents;
 use super::tap::Taps;
 use crate::address::JausId;
 use crate::endpoint::{
-    self, AttachError, Endpoint, Event, MessageHandle, Outgoing, Received, Sink, first_sequence_at,
+    self, AttachError, Endpoint, Event, MessageHandle, Outgoing, first_sequence_at,
 };
 #[cfg(unix)]
 use crate::link::junior::Claim;
@@ -59,7 +60,7 @@ pub(super) struct Shared {
     pub(super) stopped: watch::Sender<bool>,
     /// Whether no component process can come in (any more).
     pub(super) closed: watch::Sender<bool>,
-    pub(super) residents: Residents,
+    pub(super) residents: Arc<Residents>,
     commons: Mutex<Vec<Arc<dyn Any + Send + Sync>>>,
 }
 
@@ -77,7 +78,7 @@ impl Shared {
             junior: config.junior.clone(),
             stopped: watch::Sender::new(false),
             closed: watch::Sender::new(true),
-            residents: Residents::default(),
+            residents: Arc::default(),
             commons: Mutex::default(),
         }
     }
@@ -131,26 +132,6 @@ fn first_sequence() -> u16 {
     let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
     // A clock that stands before 1970 was never set: then all starts are the same to it.
     first_sequence_at(since_1970.unwrap_or_default())
-}
-
-/// The components' mailboxes, with those who look on.
-pub(super) struct Receivers<'a> {
-    mailboxes: &'a BTreeMap<JausId, Arc<Mailbox>>,
-    pub(super) taps: &'a mut Taps,
-}
-
-impl Sink for Receivers<'_> {
-    fn has_room(&self, to: JausId, priority: Priority) -> bool {
-        let mailbox = self.mailboxes.get(&to);
-        mailbox.is_none_or(|mailbox| mailbox.has_reserve(priority))
-    }
-
-    fn deliver(&mut self, message: Received) {
-        self.taps.message(&message);
-        if let Some(mailbox) = self.mailboxes.get(&message.to) {
-            mailbox.push(message);
-        }
-    }
 }
 
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::task::{Context, Poll};
 use std::time::Instant;
 
-use super::core::Receivers;
+use super::receivers::Receivers;
 use crate::address::JausId;
 use crate::endpoint::{Endpoint, Ingress, LinkId, LinkProfile, Path, Remote, Transmit};
 use crate::link::Slab;

@@ -33,6 +33,7 @@
 //! # }
 //! ```
 
+mod answers;
 mod attendance;
 mod awaiting;
 mod config;
@@ -47,6 +48,7 @@ mod links;
 mod local;
 mod mailbox;
 mod port;
+mod receivers;
 mod resident;
 mod tap;
 

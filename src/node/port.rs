@@ -101,7 +101,7 @@ impl Port {
     #[must_use]
     pub fn reside(&self) -> Resident {
         match &self.sender.way {
-            Way::Here(shared) => Resident::of(shared),
+            Way::Here(shared) => Resident::of(&shared.residents),
             Way::Host(_) => Resident::elsewhere(),
         }
     }

@@ -6,8 +6,6 @@ use std::time::Duration;
 
 use tokio::sync::watch;
 
-use super::core::Shared;
-
 /// How long a stopping node waits for its residents.
 pub(super) const LIMIT: Duration = Duration::from_secs(1);
 
@@ -43,12 +41,12 @@ impl Residents {
 
 /// Keeps a stopping node running for a moment, until this is dropped.
 #[derive(Debug)]
-pub struct Resident(Option<Arc<Shared>>);
+pub struct Resident(Option<Arc<Residents>>);
 
 impl Resident {
-    pub(super) fn of(shared: &Arc<Shared>) -> Self {
-        shared.residents.count.send_modify(|count| *count += 1);
-        Self(Some(Arc::clone(shared)))
+    pub(super) fn of(residents: &Arc<Residents>) -> Self {
+        residents.count.send_modify(|count| *count += 1);
+        Self(Some(Arc::clone(residents)))
     }
 
     /// On the node of another process, which does not wait.
@@ -59,8 +57,8 @@ impl Resident {
     /// Waits until the node is about to stop.
     pub async fn closing(&self) {
         match &self.0 {
-            Some(shared) => {
-                let mut closing = shared.residents.closing.subscribe();
+            Some(residents) => {
+                let mut closing = residents.closing.subscribe();
                 // An error cannot be: the sender is in what we hold.
                 let _ = closing.wait_for(|closing| *closing).await;
             }
@@ -71,8 +69,8 @@ impl Resident {
 
 impl Drop for Resident {
     fn drop(&mut self) {
-        if let Some(shared) = &self.0 {
-            shared.residents.count.send_modify(|count| *count -= 1);
+        if let Some(residents) = &self.0 {
+            residents.count.send_modify(|count| *count -= 1);
         }
     }
 }

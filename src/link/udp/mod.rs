@@ -7,6 +7,7 @@
 
 #[cfg(all(feature = "udp-batch", target_os = "linux"))]
 mod batch;
+mod gso_batch;
 mod open;
 mod receive;
 mod send;
@@ -19,6 +20,7 @@ use std::net::SocketAddr;
 
 use bytes::Bytes;
 
+use gso_batch::GsoBatch;
 use socket::Socket;
 
 pub use settings::{Broadcasts, PortTaken, Settings};
@@ -74,9 +76,9 @@ pub struct UdpLink {
     /// Of the sockets, where the kernel numbers them.
     inodes: Vec<u64>,
     peers: Vec<SocketAddr>,
-    outbox: Backlog<send::GsoBatch>,
+    outbox: Backlog<GsoBatch>,
     /// On its way into the kernel; nothing overtakes it.
-    leaving: VecDeque<send::GsoBatch>,
+    leaving: VecDeque<GsoBatch>,
     /// Whether the kernel has no room for the next of `leaving`.
     full: bool,
     /// Several datagrams to one peer leave with one call if each has no more octets than this.
