@@ -7,7 +7,7 @@ use bytes::Bytes;
 use tracing::{debug, trace, warn};
 
 use super::peers::is_challenge;
-use super::recent::{Class, Fingerprint};
+use super::recent::{Class, Fingerprint, Sighting};
 use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
@@ -28,13 +28,18 @@ pub(super) struct Arrival {
 /// The same message again within this time is a copy made on the way: nobody repeats so fast.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(1);
 
+/// A message is passed on again for so many repetitions. More often than a sender repeats what it
+/// has to give up some day comes what is going round between routers: a frame that has come in, by
+/// damage or malice, as if from one of them.
+const MOST_REPETITIONS: u8 = 32;
+
 /// Result of the duplicate check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Novelty {
     /// Not heard lately.
     New,
-    /// Its sender has sent it again.
-    Repeated,
+    /// Its sender has sent it again, so often by now.
+    Repeated(u8),
     /// The network has made a copy, or brought it in a circle.
     Copy,
 }
@@ -204,13 +209,13 @@ impl Endpoint {
         }
         // Before learning: a copy that came another way must not move the peer there and back.
         let novelty = match self.recall(arrival, frame, seen) {
-            Novelty::Repeated if self.reassembly.awaits(frame) => Novelty::New,
+            Novelty::Repeated(_) if self.reassembly.awaits(frame) => Novelty::New,
             novelty => novelty,
         };
         if novelty != Novelty::New {
             self.reassembly.keep(now, frame);
             self.peers.note(frame.source, |peer| peer.duplicates += 1);
-            if passes && novelty == Novelty::Repeated {
+            if passes && let Novelty::Repeated(1..=MOST_REPETITIONS) = novelty {
                 self.pass_on(now, path, frame);
             }
             return Err(Counter::Duplicate);
@@ -444,7 +449,7 @@ impl Endpoint {
                     Novelty::Copy
                 } else if numbered && age < self.duplicate_window(arrival, frame) {
                     if repeats && age >= REPEAT_INTERVAL {
-                        Novelty::Repeated
+                        Novelty::Repeated(before.repetitions.saturating_add(1))
                     } else {
                         Novelty::Copy
                     }
@@ -456,7 +461,16 @@ impl Endpoint {
         if novelty != Novelty::Copy {
             let stranger = self.peers.is_stranger(frame.source);
             let class = Class { stranger, repeats };
-            self.heard.insert_as(now, seen, way, class);
+            let repetitions = match novelty {
+                Novelty::Repeated(repetitions) => repetitions,
+                Novelty::New | Novelty::Copy => 0,
+            };
+            let sighting = Sighting {
+                time: now,
+                way,
+                repetitions,
+            };
+            self.heard.insert_as(seen, sighting, class);
         }
         novelty
     }

@@ -46,11 +46,12 @@ impl Class {
     }
 }
 
-/// When a frame was put in, and by which way it had come at first.
+/// When a frame was put in, by which way it had come at first, and how often it was repeated since.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sighting {
     pub(super) time: Instant,
     pub(super) way: Way,
+    pub(super) repetitions: u8,
 }
 
 /// A hasher for what is a hash already.
@@ -133,11 +134,17 @@ impl Recent {
             stranger: false,
             repeats: false,
         };
-        self.insert_as(now, seen, Way(0), class);
+        let sighting = Sighting {
+            time: now,
+            way: Way(0),
+            repetitions: 0,
+        };
+        self.insert_as(seen, sighting, class);
     }
 
-    /// Remembers, from now on, that it came by that way.
-    pub(super) fn insert_as(&mut self, now: Instant, seen: Fingerprint, way: Way, class: Class) {
+    /// Remembers when and by which way it came.
+    pub(super) fn insert_as(&mut self, seen: Fingerprint, sighting: Sighting, class: Class) {
+        let now = sighting.time;
         let limit = if class.stranger {
             self.limit.div_ceil(4)
         } else {
@@ -152,7 +159,6 @@ impl Recent {
         while self.order[class].len() >= limit {
             self.forget_oldest(class);
         }
-        let sighting = Sighting { time: now, way };
         self.sightings.insert(seen, sighting);
         self.order[class].push_back((now, seen));
     }
@@ -250,7 +256,12 @@ mod tests {
         recent.insert(start, known);
         for sequence in 100..200 {
             let seen = recent.fingerprint(&frame(sequence, b"\x02\x22"));
-            recent.insert_as(start, seen, Way(0), STRANGER);
+            let sighting = Sighting {
+                time: start,
+                way: Way(0),
+                repetitions: 0,
+            };
+            recent.insert_as(seen, sighting, STRANGER);
         }
         assert!(recent.contains(start, &known, window));
         assert_eq!(recent.len(), 2, "a quarter for strangers");

@@ -96,6 +96,29 @@ fn a_repeated_message_is_passed_on_again_and_a_copy_from_elsewhere_is_not() {
     assert_eq!(known.peer, SocketAddr::from(([10, 0, 0, 7], judp::PORT)));
 }
 
+/// In a ring of routers it comes again by the way that it came by at first.
+#[test]
+fn what_goes_round_between_routers_is_passed_on_only_so_often() {
+    for destination in [C, JausId::EVERYONE, JausId::new(9, 9, 9)] {
+        let mut between = Between::new(router_config());
+        let wish = Flags::default().with_acknowledgement(Acknowledgement::Request);
+        let frame = Frame {
+            flags: wish,
+            ..message(A, destination, 5)
+        };
+        let mut passed = 0;
+        for _round in 0..500 {
+            between.hear(0, 7, &frame);
+            passed += between.sent().len();
+            between.world.now += Duration::from_millis(5);
+        }
+        assert!((20..=33).contains(&passed), "{passed} to {destination}");
+        between.world.now += Duration::from_secs(4);
+        between.hear(0, 7, &frame);
+        assert_eq!(between.sent().len(), 1, "a new message with an old number");
+    }
+}
+
 #[test]
 fn the_next_hops_header_is_spoken() {
     let mut between = Between::new(router_config());
