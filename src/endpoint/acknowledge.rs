@@ -48,6 +48,7 @@ impl Endpoint {
         if !request.destination.is_unicast() {
             return;
         }
+        self.reassembly.hear(now, from.into());
         // The older headers' answers repeat the message code.
         let code_len = match request.version {
             Version::As5669a => 0,

@@ -125,6 +125,8 @@ struct Sender {
     cost: usize,
     /// When one of its runs has grown last, or a fragment came again.
     grown: Instant,
+    /// Whether a fragment was acknowledged.
+    acknowledged: bool,
     /// The same, the last time that somebody looked.
     listed: Instant,
     /// The latest number, and how far it is from the first that was heard.
@@ -141,6 +143,7 @@ impl Sender {
             origin,
             cost: 0,
             grown: now,
+            acknowledged: false,
             listed: now,
             latest: sequence,
             position: 0,
@@ -221,6 +224,8 @@ impl Sender {
 #[derive(Debug, Default)]
 struct Share {
     cost: usize,
+    /// When something that wants an acknowledgement came from there last.
+    heard: Option<Instant>,
     /// As in [`Reassembly::listed`].
     listed: BTreeSet<(Instant, JausId)>,
 }
@@ -229,7 +234,7 @@ struct Share {
 #[derive(Debug)]
 pub(in crate::endpoint) struct Reassembly {
     senders: HashMap<JausId, Sender>,
-    /// The senders by when one of their runs has grown last, or earlier.
+    /// The senders by since when they are idle, or earlier.
     listed: BTreeSet<(Instant, JausId)>,
     cost: usize,
     /// The share of each network address, and the addresses in the order of their shares.
@@ -278,6 +283,7 @@ impl Reassembly {
         let inserted = sender.take_in(now, frame, held, self.max_message, counters);
         if inserted.is_ok() {
             sender.grown = now;
+            sender.acknowledged |= frame.flags.acknowledgement() == Acknowledgement::Request;
         }
         let (after, runs, origin) = (sender.cost, sender.runs.len(), sender.origin);
         self.account(origin, before, after);
@@ -304,6 +310,23 @@ impl Reassembly {
         {
             sender.grown = now;
         }
+    }
+
+    /// Takes note that something wants to be acknowledged which came from that network address.
+    pub(in crate::endpoint) fn hear(&mut self, now: Instant, origin: Origin) {
+        if let Some(share) = self.shares.get_mut(&origin) {
+            share.heard = Some(now);
+        }
+    }
+
+    /// Since when a sender has shown that it goes on. It does not send again what was acknowledged,
+    /// and pauses for as long as its node has more urgent messages for us: of its own or of its
+    /// siblings.
+    fn idle_since(&self, sender: &Sender) -> Instant {
+        let share = self.shares.get(&sender.origin);
+        let heard = share.and_then(|share| share.heard);
+        let heard = heard.filter(|_| sender.acknowledged);
+        heard.map_or(sender.grown, |heard| heard.max(sender.grown))
     }
 
     /// Whether this fragment is the next one of a message that is being put together, and not in it
@@ -370,7 +393,7 @@ impl Reassembly {
             && let Some((listed, source)) = self.oldest_of_most()
         {
             match self.senders.get(&source) {
-                Some(sender) if sender.grown > listed => self.list(source),
+                Some(sender) if self.idle_since(sender) > listed => self.list(source),
                 _ => self.forget_oldest_of(source, counters),
             }
         }
@@ -421,32 +444,32 @@ impl Reassembly {
         self.list(source);
     }
 
-    /// Lists a sender by when it has grown last, or forgets it if it has no run.
+    /// Lists a sender by since when it is idle, or forgets it if it has no run.
     fn list(&mut self, source: JausId) {
-        let Some(sender) = self.senders.get_mut(&source) else {
+        let Some(sender) = self.senders.get(&source) else {
             return;
         };
-        let (origin, before, grown) = (sender.origin, sender.listed, sender.grown);
+        let (origin, before, idle) = (sender.origin, sender.listed, self.idle_since(sender));
         let is_empty = sender.runs.is_empty();
         if is_empty {
             self.senders.remove(&source);
-        } else {
-            sender.listed = grown;
-            self.enlist(origin, grown, source);
+        } else if let Some(sender) = self.senders.get_mut(&source) {
+            sender.listed = idle;
+            self.enlist(origin, idle, source);
         }
-        if is_empty || grown != before {
+        if is_empty || idle != before {
             self.strike(origin, before, source);
         }
     }
 
-    /// Forgets the runs of senders that have sent no fragment for too long. A run may rest longer than
-    /// that, while its sender tries in vain to send one fragment and the others are acknowledged.
+    /// Forgets the runs of senders that are idle for too long. A run may rest longer than that, while
+    /// its sender tries in vain to send one fragment and the others are acknowledged.
     pub(in crate::endpoint) fn expire(&mut self, now: Instant, counters: &mut Counters) {
         while let Some(&(listed, source)) = self.listed.first()
             && listed + self.timeout <= now
         {
             while let Some(sender) = self.senders.get(&source)
-                && sender.grown + self.timeout <= now
+                && self.idle_since(sender) + self.timeout <= now
             {
                 self.forget_oldest_of(source, counters);
             }

@@ -493,6 +493,36 @@ fn a_first_fragment_that_is_repeated_late_does_not_undo_the_message() {
     assert_eq!(payloads(&mut rig), [message]);
 }
 
+/// Its node sends what is more urgent first, of whichever of its components.
+#[test]
+fn what_was_acknowledged_is_kept_while_its_host_has_something_else_acknowledged() {
+    let wish = |mut frame: Frame| {
+        let flags = frame.flags.with_acknowledgement(Acknowledgement::Request);
+        frame.flags = flags;
+        frame
+    };
+    for (is_acknowledged, kept) in [(true, true), (false, false)] {
+        let mut rig = Rig::new();
+        let message = large(600);
+        let parts = fragments(1, &message, 200).into_iter();
+        let parts: Vec<_> = parts
+            .map(|part| if is_acknowledged { wish(part) } else { part })
+            .collect();
+        parts[..2].iter().for_each(|part| rig.hear(part));
+        for number in 100..110 {
+            rig.pass(Config::default().reassembly_timeout / 2);
+            let mut urgent = wish(from_peer(b"\x01\xD7"));
+            (urgent.source, urgent.sequence) = (id("42.1.2"), number);
+            rig.hear(&urgent);
+        }
+        payloads(&mut rig);
+        rig.hear(&parts[2]);
+        assert_eq!(payloads(&mut rig).contains(&message), kept);
+        rig.pass(Config::default().reassembly_timeout * 2);
+        assert_eq!(rig.endpoint.unfinished(), 0);
+    }
+}
+
 #[test]
 fn what_was_acknowledged_is_kept_while_the_sender_waits_longest() {
     let config = Config::default();
