@@ -7,9 +7,9 @@
 //! * `JuniorRTE` in the folder is the node manager's socket. One connected socket of the link sends
 //!   for all components, because the node manager looks only at the source id of a message.
 //! * It delivers to `<folder>/<id as a decimal number>`, so each component has a socket there
-//!   ([`Claim`]). A wildcard from the network arrives there once for each component, with that
+//!   (`Claim`). A wildcard from the network arrives there once for each component, with that
 //!   component's id in its place.
-//! * [`Registration`] says when to register each id (Connect, answered by Accept), and to do it
+//! * `Registration` says when to register each id (Connect, answered by Accept), and to do it
 //!   again with a node manager that was restarted.
 //!
 //! Each datagram carries one message, as the node manager reads no second one. It stops all

@@ -22,7 +22,7 @@ pub enum ConfigError {
     MaxMessage {
         /// The length that was chosen, in octets.
         message: usize,
-        /// [`Config::payload_limit`].
+        /// [`Config::payload_limit`](super::Config::payload_limit).
         payload: usize,
         /// The most, in octets: 16 MiB, and no more fragments than there are sequence numbers.
         longest: usize,
