@@ -28,9 +28,8 @@ pub(super) struct Arrival {
 /// The same message again within this time is a copy made on the way: nobody repeats so fast.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(1);
 
-/// A message is passed on again for so many repetitions. More often than a sender repeats what it
-/// has to give up some day comes what is going round between routers: a frame that has come in, by
-/// damage or malice, as if from one of them.
+/// A repeated message is passed on this often. No sender repeats more often before it gives up; a
+/// frame that circulates between routers, corrupted or forged as if one of them had sent it, does.
 const MOST_REPETITIONS: u8 = 32;
 
 /// Result of the duplicate check.
@@ -38,10 +37,19 @@ const MOST_REPETITIONS: u8 = 32;
 enum Novelty {
     /// Not heard lately.
     New,
-    /// Its sender has sent it again, so often by now.
+    /// Its sender has sent it again; how often so far.
     Repeated(u8),
     /// The network has made a copy, or brought it in a circle.
     Copy,
+}
+
+impl Novelty {
+    const fn repetitions(self) -> u8 {
+        match self {
+            Self::Repeated(repetitions) => repetitions,
+            Self::New | Self::Copy => 0,
+        }
+    }
 }
 
 impl Endpoint {
@@ -461,14 +469,10 @@ impl Endpoint {
         if novelty != Novelty::Copy {
             let stranger = self.peers.is_stranger(frame.source);
             let class = Class { stranger, repeats };
-            let repetitions = match novelty {
-                Novelty::Repeated(repetitions) => repetitions,
-                Novelty::New | Novelty::Copy => 0,
-            };
             let sighting = Sighting {
                 time: now,
                 way,
-                repetitions,
+                repetitions: novelty.repetitions(),
             };
             self.heard.insert_as(seen, sighting, class);
         }

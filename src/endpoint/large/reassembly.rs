@@ -312,16 +312,16 @@ impl Reassembly {
         }
     }
 
-    /// Takes note that something wants to be acknowledged which came from that network address.
+    /// Notes that a message that wants an acknowledgement came from that network address.
     pub(in crate::endpoint) fn hear(&mut self, now: Instant, origin: Origin) {
         if let Some(share) = self.shares.get_mut(&origin) {
             share.heard = Some(now);
         }
     }
 
-    /// Since when a sender has shown that it goes on. It does not send again what was acknowledged,
-    /// and pauses for as long as its node has more urgent messages for us: of its own or of its
-    /// siblings.
+    /// Since when a sender is idle. A sender never repeats acknowledged parts, and it pauses a large
+    /// message while its node has something more urgent for us, from any component. So parts that
+    /// were acknowledged count as active while such messages arrive from that address.
     fn idle_since(&self, sender: &Sender) -> Instant {
         let share = self.shares.get(&sender.origin);
         let heard = share.and_then(|share| share.heard);

@@ -1,10 +1,10 @@
 //! Which peer is forgotten when the table is full, and how many peers each network address holds.
 //!
-//! A newcomer takes the place of a peer of the address that holds most, if that is another. Otherwise
-//! who was only heard goes first, then whom we have spoken to, then who has acknowledged something
-//! of ours; among equals the one heard longest ago. Those in conversation with us stay as long as
-//! they are heard now and then: if nobody else can go, a newcomer is not taken in. So invented ids
-//! replace each other.
+//! A newcomer evicts a peer of the network address that holds most, if that is another one. Otherwise
+//! peers that were only heard go first, then those we have spoken to, then those that have
+//! acknowledged something of ours; among equals the one heard longest ago. Peers in conversation
+//! with us stay as long as they are heard now and then: if none can be evicted, the newcomer is
+//! refused. Invented ids therefore only replace each other.
 
 use std::collections::{BTreeSet, HashMap};
 use std::time::{Duration, Instant};
@@ -134,7 +134,7 @@ impl Places {
 }
 
 impl Peers {
-    /// Whether somebody is known or could be: there is room, or somebody can go.
+    /// Whether an id is known or can be added: there is room, or a peer can be evicted.
     pub(in crate::endpoint) fn has_room_for(
         &mut self,
         now: Instant,
@@ -146,8 +146,8 @@ impl Peers {
             || self.next_to_go(now, from.into()).is_some()
     }
 
-    /// Who can be forgotten for a newcomer from a network address. An address that holds a quarter of
-    /// the table gets no more of it, and makes room for those that hold less, whoever it holds.
+    /// The peer to evict for a newcomer from a network address. An address that holds a quarter of the
+    /// table gets no more of it, and makes room for addresses that hold less.
     pub(super) fn next_to_go(&mut self, now: Instant, newcomer: Origin) -> Option<JausId> {
         let (most, holder) = self.places.most()?;
         let own = self.places.held(newcomer);
@@ -171,8 +171,8 @@ impl Peers {
             .find_map(|standing| self.longest_silent(now, of, standing, standing.silence()))
     }
 
-    /// Who of a standing was heard longest ago, if that is long enough. Who was heard since it got
-    /// its place goes to the end; so a look costs no more than was heard.
+    /// The peer of a standing that was heard longest ago, if that is long enough. Peers heard since
+    /// they got their place move to the end, so a search costs no more than was heard.
     fn longest_silent(
         &mut self,
         now: Instant,

@@ -20,7 +20,7 @@
 //! # Trust
 //!
 //! Junior authenticates nothing. Any user who may write to the folder can answer as the node
-//! manager, and any local process can send to a component's socket in anybody's name. Its messages
+//! manager, and any local process can send to a component's socket under any id. Its messages
 //! are trusted no more than those of the network; see `docs/several-nodes-on-one-host.md`.
 
 mod claim;

@@ -218,7 +218,7 @@ impl Writer {
         }
     }
 
-    /// Writes all, for whoever alone has the connection.
+    /// Writes everything that waits; for the sole owner of the connection.
     pub(crate) async fn flush(&mut self) -> Result<(), Error> {
         poll_fn(|cx| self.poll_flush(cx)).await
     }

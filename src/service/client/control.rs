@@ -132,7 +132,7 @@ enum State {
     Lost(ControlLost),
     /// Since when it is being given back.
     Releasing(Instant),
-    /// The application has been told its end. It is remembered for as long as a peer may yet answer
+    /// The application knows that it has ended. It is kept for as long as the peer may still answer
     /// a release.
     Over,
 }
@@ -187,13 +187,13 @@ impl Controls {
         let Some((&peer, control)) = found else {
             return;
         };
-        // Else the peer may hold its end for as long as nobody tells it.
         match control.state {
             State::Lost(ControlLost::TakenBack | ControlLost::Outranked) => {
                 control.state = State::Over;
                 self.news.push_back((id, ControlNews::Released));
             }
             State::Releasing(_) | State::Over => {}
+            // Else the peer may hold its end for as long as nobody tells it.
             State::Asking | State::Held | State::Lost(_) => {
                 control.state = State::Releasing(now);
                 control.give_back(now, peer, out);
@@ -361,8 +361,8 @@ impl Control {
         self.next = now + self.patience.interval;
     }
 
-    /// Whether the peer may yet answer a release, which then is not the end of what was requested
-    /// after it: a network may bring the request first.
+    /// Whether the peer may still answer a release. That answer does not end what was requested
+    /// after it: a network may deliver the request first.
     fn awaits_answer_to_release(&self, now: Instant) -> bool {
         self.released
             .is_some_and(|released| now < released + Self::RELEASE_LIMIT)
@@ -429,11 +429,11 @@ impl Control {
         if self.state != State::Held {
             return None;
         }
-        if !is_ours && self.denied {
-            return self.lose(ControlLost::NotAvailable);
-        }
         if !is_ours {
-            return self.lose_or_ask_again(now, peer, ControlLost::Restarted, out);
+            return match self.denied {
+                true => self.lose(ControlLost::NotAvailable),
+                false => self.lose_or_ask_again(now, peer, ControlLost::Restarted, out),
+            };
         }
         if self.denied && self.lifetime == Some(Duration::ZERO) {
             self.confirmed = now;
@@ -457,9 +457,9 @@ impl Control {
         }
     }
 
-    /// The peer says that it is not controlled any more. If a release may have come after the request
-    /// that was granted, that is what ended it, and control is requested again: whoever else has it
-    /// by now keeps it, and the answer says so.
+    /// The peer says that this client no longer controls it. If a release may have arrived after the
+    /// request that was granted, that release ended it, and control is requested again. Another
+    /// client that has control by now keeps it, and the answer says so.
     fn lose_or_ask_again(
         &mut self,
         now: Instant,
