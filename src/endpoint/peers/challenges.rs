@@ -68,7 +68,9 @@ impl Peers {
         self.challenges.has_room(cause.into())
             && self.pin(id).is_none()
             && self.states.get(&id).is_some_and(|state| {
-                state.challenge.is_none() && state.settled_until.is_none_or(|until| until <= now)
+                let pause = state.unanswered.filter(|(at, _)| *at == cause);
+                let pauses = [state.settled_until, pause.map(|(_, until)| until)];
+                state.challenge.is_none() && pauses.into_iter().flatten().all(|until| until <= now)
             })
     }
 
@@ -179,14 +181,15 @@ impl Peers {
             (Finding::Stays, _) => (before, RouteState::Verified),
             _ => (before, RouteState::of(challenge.doubt.was_verified)),
         };
-        // Who has moved and proven it may move on at once: programs that run one after the other
-        // have an id in common.
-        let pause = match finding {
-            Finding::Moves { verified: true } => Duration::ZERO,
-            Finding::Unanswered if challenge.rival.is_none() => UNANSWERED,
-            _ => SETTLED,
-        };
-        state.settled_until = Some(now + pause);
+        // Programs that run one after the other share an id: a verified move may be followed by
+        // the next at once, and an unanswered challenge must not delay a move.
+        match finding {
+            Finding::Moves { verified: true } => {}
+            Finding::Unanswered if challenge.rival.is_none() => {
+                state.unanswered = Some((before, now + UNANSWERED));
+            }
+            _ => state.settled_until = Some(now + SETTLED),
+        }
         self.set_route(id, path, route);
     }
 

@@ -93,6 +93,8 @@ pub(super) struct PeerState {
     pub(super) challenge: Option<Challenge>,
     /// Until when it is not challenged again, nor moved.
     pub(super) settled_until: Option<Instant>,
+    /// The path on which a challenge timed out, and when it may be challenged again.
+    pub(super) unanswered: Option<(Path, Instant)>,
 }
 
 impl PeerState {
@@ -130,6 +132,7 @@ impl PeerState {
             heard_on_route: now,
             challenge: None,
             settled_until: None,
+            unanswered: None,
         }
     }
 

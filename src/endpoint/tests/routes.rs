@@ -159,6 +159,24 @@ fn processes_that_run_one_after_the_other_with_one_id_are_each_followed_at_once(
 }
 
 #[test]
+fn a_peer_is_followed_to_a_new_port_after_its_old_one_has_not_answered_a_challenge() {
+    let mut rig = Rig::new();
+    rig.meet_peer();
+    rig.endpoint.challenge(rig.now, PEER);
+    for _ in 0..4 {
+        rig.pass(Duration::from_millis(300));
+    }
+    assert!(!rig.endpoint.peers.is_challenged(PEER), "the challenge has timed out");
+    rig.transmits();
+    let port = Path {
+        peer: SocketAddr::from(([10, 0, 0, PEER_HOST], 40_000)).into(),
+        ..path(PEER_HOST)
+    };
+    rig.hear_datagram(port, judp::encode(&again(1)).unwrap());
+    assert_eq!(destination(&mut rig), To::Peer(port.peer));
+}
+
+#[test]
 fn a_forged_sender_gets_nothing_for_a_peer_that_was_not_asked_yet() {
     let mut rig = Rig::new();
     rig.hear(&again(1));
