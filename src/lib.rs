@@ -19,8 +19,6 @@
 pub mod actuator;
 pub mod address;
 mod as_text;
-#[cfg(feature = "cli")]
-pub mod cli;
 pub mod codec;
 #[cfg(feature = "node")]
 pub mod component;

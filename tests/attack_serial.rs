@@ -8,20 +8,17 @@
     reason = "a test with devices"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::fs::File;
 use std::io::{Read, Write};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use group::own_group;
 use jaus::address::JausId;
 use jaus::endpoint::{Counter, Outgoing, Remote};
 use jaus::link::serial::Settings;
 use jaus::node::{Config, Node, Port};
 use jaus::wire::{Acknowledgement, Flags, Frame, jserial};
+use jaus_test_kit::group::own_group;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 const VEHICLE: JausId = JausId::new(101, 1, 1);

@@ -9,13 +9,9 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::future::Future;
 use std::time::Duration;
 
-use group::own_group;
 use jaus::address::JausId;
 use jaus::component::{
     AttachError, Change, Component, FindError, Handlers, Kind, Level, Liveness, Patience,
@@ -27,6 +23,7 @@ use jaus::messages::core::{
 };
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
 use jaus::node::{Config, Node};
+use jaus_test_kit::group::own_group;
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);

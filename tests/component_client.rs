@@ -10,13 +10,9 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::future::Future;
 use std::time::Duration;
 
-use group::own_group;
 use jaus::address::JausId;
 use jaus::codec::{Message, ServiceId};
 use jaus::component::{
@@ -31,6 +27,7 @@ use jaus::messages::core::{
 };
 use jaus::node::{Config, Node, Port};
 use jaus::wire::Priority;
+use jaus_test_kit::group::own_group;
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);

@@ -6,14 +6,11 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::time::Duration;
 
-use group::own_group;
 use jaus::component::{Component, Kind};
 use jaus::node::{Config, Node};
+use jaus_test_kit::group::own_group;
 
 /// What this process holds in memory, in octets.
 fn resident() -> usize {

@@ -10,20 +10,17 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use group::own_group;
 use jaus::address::JausId;
 use jaus::endpoint::{Counter, Outgoing};
 use jaus::node::{Config, Node, Port};
 use jaus::wire::{Frame, judp};
+use jaus_test_kit::group::own_group;
 
 const FLOOD: u32 = 100_000;
 const SOURCES: u32 = 10_000;

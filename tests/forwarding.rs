@@ -10,17 +10,14 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::net::SocketAddr;
 use std::time::Duration;
 
 use bytes::Bytes;
-use group::own_group;
 use jaus::address::JausId;
 use jaus::endpoint::{Counter, Outgoing, Received};
 use jaus::node::{Config, Node, Port};
+use jaus_test_kit::group::own_group;
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);

@@ -10,8 +10,6 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
 #[path = "ocu/scene.rs"]
 mod scene;
 

@@ -10,15 +10,11 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::future::Future;
 use std::path::PathBuf;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use group::own_group;
 use jaus::actuator::{Actuator, MotorConfig, SimulatedMotor, SimulatedStop};
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Kind, State};
@@ -35,6 +31,7 @@ use jaus::parts::{
     Hardware, Part, PartError, PoseSensor, PrimitiveDriver, Seat, VectorDriver, VelocitySensor,
 };
 use jaus::service::ground::{StageReport, StageState};
+use jaus_test_kit::group::own_group;
 use tokio::task::JoinHandle;
 
 const PRIMITIVE: JausId = JausId::new(101, 33, 33);

@@ -10,16 +10,13 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::collections::BTreeSet;
 use std::time::Duration;
 
 use bytes::Bytes;
-use group::own_group;
 use jaus::endpoint::{Counter, Event, Outgoing};
 use jaus::node::{Config, Node, Port};
+use jaus_test_kit::group::own_group;
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);

@@ -10,18 +10,15 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::time::Duration;
 
 use bytes::Bytes;
-use group::own_group;
 use jaus::address::JausId;
 use jaus::endpoint::{Event, Outgoing, Received, Unacknowledged};
 use jaus::link::Group;
 use jaus::node::{Config, Events, MailboxLimits, Node, Port, StartError};
 use jaus::wire::{Broadcast, Priority};
+use jaus_test_kit::group::own_group;
 
 /// Longer than anything takes; reached only when a test fails.
 const LIMIT: Duration = Duration::from_secs(20);

@@ -8,13 +8,9 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::future::Future;
 use std::time::Duration;
 
-use group::own_group;
 use jaus::codec::{Message, ServiceId};
 use jaus::component::{Component, FindError, Handlers, Kind};
 use jaus::link::Group;
@@ -22,6 +18,7 @@ use jaus::messages::mobility::local_vector_driver::{V1_0, V1_1};
 use jaus::messages::mobility::{self, v1_0};
 use jaus::messages::registry;
 use jaus::node::{Config, Node};
+use jaus_test_kit::group::own_group;
 use tokio::sync::mpsc;
 
 const NEWEST_FIRST: [ServiceId; 2] = [V1_1, V1_0];

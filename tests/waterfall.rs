@@ -11,14 +11,10 @@
     reason = "a test with sockets"
 )]
 
-#[path = "support/group.rs"]
-mod group;
-
 use std::future::Future;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use group::own_group;
 use jaus::address::JausId;
 use jaus::codec::{FormattedBlob, Message};
 use jaus::component::{Component, Control, Kind};
@@ -34,6 +30,7 @@ use jaus::parts::{
     Part, PathDriver, PoseSensor, PrimitiveDriver, Seat, VectorDriver, VelocitySensor,
 };
 use jaus::service::ground::{StageReport, StageState};
+use jaus_test_kit::group::own_group;
 use tokio::task::JoinHandle;
 
 const PRIMITIVE: JausId = JausId::new(101, 33, 33);

@@ -10,8 +10,8 @@ use jaus::messages::mobility::{
 };
 use jaus::service::{Event, Patience};
 
-use crate::rover::bytes;
 use crate::world::{World, subsystem};
+use jaus_test_kit::rover::bytes;
 
 const GLOBAL: JausId = JausId::new(20, 1, 34);
 const LOCAL: JausId = JausId::new(20, 1, 44);

@@ -9,8 +9,8 @@ use jaus::service::mobility::Vehicle;
 use jaus::service::{Kind, Management, Service};
 use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 
-use crate::rover::bytes;
 use crate::world::{World, stack, subsystem};
+use jaus_test_kit::rover::bytes;
 
 const RA_POSE: RaId = RaId::new(101, 1, 38, 7);
 /// The RA operator.

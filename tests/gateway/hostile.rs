@@ -7,8 +7,8 @@ use bytes::Bytes;
 use jaus::gateway::{Counter, Settings};
 use jaus::ra::{Message, RaId};
 
-use crate::rover::{Rover, SUBSYSTEM, datagram};
 use crate::world::{World, subsystem};
+use jaus_test_kit::rover::{Rover, SUBSYSTEM, datagram};
 
 fn stranger(host: u16) -> SocketAddr {
     let [high, low] = host.to_be_bytes();

@@ -11,8 +11,8 @@ use jaus::service::mobility::Vehicle;
 use jaus::service::{Kind, Management, Service, Stack, State};
 use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 
-use crate::rover::bytes;
 use crate::world::{World, stack, subsystem};
+use jaus_test_kit::rover::bytes;
 
 const VEHICLE: JausId = JausId::new(101, 1, 7);
 const RA_DRIVER: RaId = RaId::new(101, 1, 33, 7);

@@ -20,8 +20,8 @@ use jaus::service::mobility::Vehicle;
 use jaus::service::{Event, Kind, Management, Patience, Service};
 use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 
-use crate::rover::{Rover, SUBSYSTEM, bytes};
 use crate::world::{World, stack, subsystem};
+use jaus_test_kit::rover::{Rover, SUBSYSTEM, bytes};
 
 const JAUS_WAYPOINTS: JausId = JausId::new(20, 1, 45);
 const VEHICLE: JausId = JausId::new(101, 1, 7);

@@ -17,7 +17,6 @@ mod lists;
 mod ra_vehicle;
 #[cfg(feature = "view")]
 mod replay;
-mod rover;
 mod safety;
 #[cfg(feature = "view")]
 mod world;

@@ -16,8 +16,8 @@ use jaus::service::{
     Topic, When,
 };
 
-use crate::rover::{Rover, SUBSYSTEM, bytes};
 use crate::world::{COMMANDER, OPERATOR, World, stack, subsystem};
+use jaus_test_kit::rover::{Rover, SUBSYSTEM, bytes};
 
 const JAUS_DRIVER: JausId = JausId::new(20, 1, 33);
 const JAUS_POSE: JausId = JausId::new(20, 1, 38);

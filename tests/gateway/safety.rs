@@ -12,8 +12,8 @@ use jaus::service::mobility::Vehicle;
 use jaus::service::{Kind, Management, Service};
 use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 
-use crate::rover::{Rover, SUBSYSTEM, bytes};
 use crate::world::{COMMANDER, Power, World, stack, subsystem};
+use jaus_test_kit::rover::{Rover, SUBSYSTEM, bytes};
 
 fn millis(millis: u64) -> Duration {
     Duration::from_millis(millis)

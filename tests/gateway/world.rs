@@ -18,7 +18,7 @@ use jaus::service::{
     Transport,
 };
 
-use crate::rover::Rover;
+use jaus_test_kit::rover::Rover;
 
 pub(crate) const GATEWAY: JausId = JausId::new(250, 1, 1);
 /// The gateway among RA systems: its commander.

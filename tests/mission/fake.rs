@@ -3,7 +3,6 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use crate::group::own_group;
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Handlers, Kind, Management, Subscription, When};
 use jaus::messages::ground::report_mission::Stage as MissionStage;
@@ -19,6 +18,7 @@ use jaus::node::{Config, Node};
 use jaus::parts::{Part, Planner, Seat};
 use jaus::service::mobility::Vehicle;
 use jaus::vehicle::{Frame, Limits, Pilot, SkidSteer, SkidSteerConfig};
+use jaus_test_kit::group::own_group;
 use tokio::task::JoinHandle;
 
 /// How long anything may take; far longer than it does.

@@ -15,7 +15,5 @@
 )]
 
 mod fake;
-#[path = "../support/group.rs"]
-mod group;
 mod missions;
 mod whole;

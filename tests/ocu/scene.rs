@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, UNIX_EPOCH};
 
-use crate::group::own_group;
 use futures_util::{SinkExt, StreamExt};
 use jaus::component::{AccessControl, Builder, Component, Handlers, Kind, Management, TimeOfDay};
 use jaus::link::Group;
@@ -17,6 +16,7 @@ use jaus::ocu::{Listen, Station};
 use jaus::parts::{Part, Seat};
 use jaus::service::mobility::Vehicle;
 use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+use jaus_test_kit::group::own_group;
 use serde_json::{Value, json};
 use tokio::net::TcpStream;
 use tokio::task::JoinHandle;

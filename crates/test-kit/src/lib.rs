@@ -1,4 +1,18 @@
-//! What the tests of the workspace have in common.
+//! What the tests of the workspace share: evidence, hosts in network namespaces, processes, peers.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::expect_used,
+    clippy::missing_panics_doc,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that cannot go on fails"
+)]
 
 pub mod evidence;
+pub mod group;
+#[cfg(target_os = "linux")]
+pub mod hosts;
+pub mod rover;
 pub mod tools;
+pub mod vehicle_process;

@@ -1,8 +1,17 @@
-//! Programs that tests need and the machine may not have.
+//! What tests use of this machine: the files of the workspace, and programs that it may not have.
 
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::evidence::not_tested;
+
+/// The path of a file of the workspace, given from its top level.
+#[must_use]
+pub fn workspace(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .join(path)
+}
 
 /// Whether there is a `tshark`. Without it the test proves nothing, and is to return.
 ///

@@ -166,7 +166,10 @@ fn a_peer_is_followed_to_a_new_port_after_its_old_one_has_not_answered_a_challen
     for _ in 0..4 {
         rig.pass(Duration::from_millis(300));
     }
-    assert!(!rig.endpoint.peers.is_challenged(PEER), "the challenge has timed out");
+    assert!(
+        !rig.endpoint.peers.is_challenged(PEER),
+        "the challenge has timed out"
+    );
     rig.transmits();
     let port = Path {
         peer: SocketAddr::from(([10, 0, 0, PEER_HOST], 40_000)).into(),

@@ -129,7 +129,7 @@ mod tests {
         }
     }
     #[test]
-    #[cfg(feature = "cli")]
+    #[cfg(feature = "serde")]
     fn a_mistake_in_a_settings_file_is_named_with_its_place_and_what_would_do() {
         let error = toml::from_str::<crate::node::Config>("local = \"10.0.0.1:3794\"");
         let error = error.unwrap_err().to_string();

@@ -227,7 +227,7 @@ mod tests {
         assert_eq!(window, usual.retransmission_window);
     }
 
-    #[cfg(feature = "cli")]
+    #[cfg(feature = "serde")]
     #[test]
     fn a_file_says_times_and_sizes_with_their_units() {
         let read = |text: &str| toml::from_str::<Delivery>(text).map_err(|error| error.to_string());

@@ -141,7 +141,7 @@ mod tests {
         );
     }
 
-    #[cfg(feature = "cli")]
+    #[cfg(feature = "serde")]
     #[test]
     fn a_file_sets_what_it_names_and_mistakes_are_named() {
         let read = |text: &str| toml::from_str::<Config>(text).map_err(|error| error.to_string());

@@ -412,7 +412,7 @@ mod tests {
 }
 
 #[cfg(test)]
-#[cfg(feature = "cli")]
+#[cfg(feature = "serde")]
 mod toml_tests {
     use super::*;
 

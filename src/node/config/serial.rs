@@ -63,7 +63,7 @@ mod tests {
         assert!(error(&[line(), line()]).contains("/dev/ttyUSB0 is named twice"));
     }
 
-    #[cfg(feature = "cli")]
+    #[cfg(feature = "serde")]
     #[test]
     fn a_line_needs_no_more_than_its_device() {
         let read = |text: &str| toml::from_str::<Settings>(text).map_err(|error| error.to_string());

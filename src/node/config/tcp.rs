@@ -120,7 +120,7 @@ mod tests {
         }
     }
 
-    #[cfg(feature = "cli")]
+    #[cfg(feature = "serde")]
     #[test]
     fn a_file_may_name_both_or_one_and_nothing_else() {
         let read = |text: &str| toml::from_str::<Tcp>(text).map_err(|error| error.to_string());

@@ -247,7 +247,7 @@ mod tests {
         }
     }
 
-    #[cfg(feature = "cli")]
+    #[cfg(feature = "serde")]
     #[test]
     fn settings_take_both_and_name_what_is_wrong() {
         #[derive(Debug, serde::Deserialize)]

@@ -1,0 +1,77 @@
+//! `jaus-local-vector-driver`: keeps the speed and the heading of a vehicle.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Args;
+use jaus::address::JausId;
+use jaus::parts::{Part, VectorDriver};
+use jaus::vehicle::Limits;
+use jaus_cli::failure::Failure;
+use jaus_cli::runtime::{between, seconds};
+use jaus_cli::{Ready, launch};
+
+#[derive(Args)]
+struct Flags {
+    /// The vehicle's speed at full effort in m/s, from 0.05 to 20; half of it backwards
+    #[arg(long, value_name = "M/S", default_value = "2", value_parser = |text: &str| between(text, 0.05, 20.0))]
+    speed: f64,
+
+    /// The vehicle's turn rate at full effort in rad/s, from 0.05 to 10
+    #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
+    yaw_rate: f64,
+
+    /// The greatest acceleration in m/s², from 0.05 to 20; it slows down twice as well
+    #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.05, 20.0))]
+    acceleration: f64,
+
+    /// Stop when it has not been commanded for so many seconds
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
+    silence: Duration,
+
+    /// Stop when pose or velocity are older than this many seconds
+    #[arg(long, value_name = "SECONDS", default_value = "0.6", value_parser = seconds)]
+    stale: Duration,
+
+    /// The authority with which the primitive driver is controlled
+    #[arg(long, value_name = "CODE", default_value = "100")]
+    authority: u8,
+
+    /// After how many seconds control ends unless its client asks for it again; 0 for never
+    #[arg(long, value_name = "SECONDS", default_value = "3")]
+    control_timeout: u8,
+}
+
+impl Ready for Flags {
+    const PROGRAM: &'static str = "jaus-local-vector-driver";
+    const ABOUT: &'static str =
+        "Keep a vehicle's speed and heading by commanding its primitive driver";
+    const EXAMPLES: &'static str = "Primitive driver, local pose sensor and velocity state sensor are found by Discovery in \
+        the same subsystem, in any order of start.\n\nExamples:\n  \
+        jaus-local-vector-driver --loopback            for trying things out on one computer\n  \
+        jaus-local-vector-driver --attach              on the node of this host\n  \
+        jaus-local-vector-driver --speed 1 --stale 1   a slow vehicle with slow sensors";
+    const ID: JausId = JausId::new(101, 44, 44);
+
+    fn part(self) -> Result<impl Part, Failure> {
+        let usual = Limits::default();
+        Ok(VectorDriver {
+            limits: Limits {
+                speed: self.speed,
+                reverse: self.speed / 2.0,
+                yaw_rate: self.yaw_rate,
+                acceleration: self.acceleration,
+                deceleration: 2.0 * self.acceleration,
+                ..usual
+            },
+            silence: self.silence,
+            stale: self.stale,
+            authority: self.authority,
+            control_timeout: self.control_timeout,
+        })
+    }
+}
+
+fn main() -> ExitCode {
+    launch::<Flags>()
+}

@@ -1,0 +1,121 @@
+//! `jaus-planner`: plans missions over the map and has them driven.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Args;
+use jaus::address::JausId;
+use jaus::mission::{LostLink, Settings, Vehicle};
+use jaus::parts::{Part, Planner};
+use jaus_cli::failure::Failure;
+use jaus_cli::{Ready, launch, runtime};
+
+#[derive(Args)]
+struct Flags {
+    /// How wide the vehicle is, in metres, from 0 to 100
+    #[arg(long, value_name = "METRES", default_value = "0.6", value_parser = |text: &str| between(text, 0.0, 100.0))]
+    width: f64,
+
+    /// How much room it is to have on both sides, in metres, from 0 to 100
+    #[arg(long, value_name = "METRES", default_value = "0.1", value_parser = |text: &str| between(text, 0.0, 100.0))]
+    margin: f64,
+
+    /// The greatest speed in m/s, from 0.01 to 100, of missions that choose none
+    #[arg(long, value_name = "M/S", default_value = "1", value_parser = |text: &str| between(text, 0.01, 100.0))]
+    speed: f64,
+
+    /// How far from the straight line of a segment the vehicle may be, in metres, from 0.01 to 10
+    #[arg(long, value_name = "METRES", default_value = "0.3", value_parser = |text: &str| between(text, 0.01, 10.0))]
+    tolerance: f64,
+
+    /// What the map is called that is planned on; if the store has only one, it is taken anyway
+    #[arg(long, value_name = "NAME", default_value = "traversability")]
+    map: String,
+
+    /// How often a mission is begun at most, when a stage is blocked
+    #[arg(long, value_name = "COUNT", default_value = "3", value_parser = clap::value_parser!(u8).range(1..))]
+    attempts: u8,
+
+    /// Seconds from a blocked attempt to the next
+    #[arg(long, value_name = "SECONDS", default_value = "3", value_parser = runtime::seconds)]
+    pause: Duration,
+
+    /// Seconds that a stage may take to begin, or to come back
+    #[arg(long, value_name = "SECONDS", default_value = "15", value_parser = runtime::seconds)]
+    patience: Duration,
+
+    /// Seconds that the vehicle may drive without getting on
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = runtime::seconds)]
+    stall: Duration,
+
+    /// What the vehicle does when the operator's link is lost: stop; hold its position, and keep the
+    /// mission for a new operator's approval; or return along the driven path
+    #[arg(long, value_name = "POLICY", default_value = "stop", value_parser = lost_link)]
+    lost_link: LostLink,
+
+    /// With which authority the path segment driver is controlled; an operator with a greater one
+    /// can take over
+    #[arg(long, value_name = "CODE", default_value = "100")]
+    authority: u8,
+
+    /// The least authority that an operator needs to control the planner
+    #[arg(long, value_name = "CODE", default_value = "1")]
+    least_authority: u8,
+}
+
+impl Ready for Flags {
+    const PROGRAM: &'static str = "jaus-planner";
+    const ABOUT: &'static str = "Plan missions over the map, and have them driven";
+    const EXAMPLES: &'static str = "\
+        It finds the knowledge store, the pose sensor and the drivers in its own subsystem, in any \
+        order of start.\nAn operator takes control of it, sets a destination and approves the path.\n\n\
+        Examples:\n  \
+        jaus-planner --loopback               for trying things out on one computer\n  \
+        jaus-planner --attach                 on the node of this host (jaus-communicator --local)\n  \
+        jaus-planner --width 1.2 --margin 0.3 for a larger vehicle\n  \
+        jaus-planner --config planner.toml    flags from a file: in [component], width = 1.2";
+    const ID: JausId = JausId::new(101, 36, 36);
+
+    fn part(self) -> Result<impl Part, Failure> {
+        Ok(Planner {
+            vehicle: Vehicle {
+                width: self.width,
+                margin: self.margin,
+            },
+            mission: Settings {
+                attempts: self.attempts,
+                pause: self.pause,
+                patience: self.patience,
+                stall: self.stall,
+                speed: self.speed,
+                lost_link: self.lost_link,
+                ..Settings::default()
+            },
+            map: self.map,
+            authority: self.authority,
+            least_authority: self.least_authority,
+            tolerance: self.tolerance,
+        })
+    }
+}
+
+fn main() -> ExitCode {
+    launch::<Flags>()
+}
+
+/// Reads a flag's number between two bounds.
+fn between(text: &str, least: f64, most: f64) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (least..=most).contains(&number) => Ok(number),
+        _ => Err(format!("write a number from {least} to {most}")),
+    }
+}
+
+fn lost_link(text: &str) -> Result<LostLink, String> {
+    match text {
+        "stop" => Ok(LostLink::Stop),
+        "hold" => Ok(LostLink::Hold),
+        "return" => Ok(LostLink::Return),
+        _ => Err("write stop, hold or return".to_owned()),
+    }
+}

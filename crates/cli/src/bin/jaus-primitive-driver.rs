@@ -1,0 +1,202 @@
+//! `jaus-primitive-driver`: the wheels of a vehicle, simulated or on stepper motors.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Args;
+use jaus::actuator::{MotorConfig, WheelsConfig};
+use jaus::address::JausId;
+use jaus::parts::{Motors, Part, PrimitiveDriver, Stop};
+use jaus::vehicle::Limits;
+use jaus_cli::failure::Failure;
+use jaus_cli::runtime::{between, seconds};
+use jaus_cli::{Ready, launch};
+
+#[derive(Args)]
+struct Flags {
+    /// The speed at full effort in m/s, from 0.05 to 20; half of it backwards
+    #[arg(long, value_name = "M/S", default_value = "2", value_parser = |text: &str| between(text, 0.05, 20.0))]
+    speed: f64,
+
+    /// The turn rate at full effort in rad/s, from 0.05 to 10
+    #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
+    yaw_rate: f64,
+
+    /// Metres between the left and the right wheels, as it counts in turns, from 0.05 to 10
+    #[arg(long, value_name = "M", default_value = "0.5", value_parser = |text: &str| between(text, 0.05, 10.0))]
+    track: f64,
+
+    /// Stop the motors when no effort has come for so many seconds
+    #[arg(long, value_name = "SECONDS", default_value = "0.5", value_parser = seconds)]
+    silence: Duration,
+
+    /// The motors brake by themselves when the program has not repeated its command for so many
+    /// seconds, because it hangs
+    #[arg(long, value_name = "SECONDS", default_value = "0.2", value_parser = seconds)]
+    deadline: Duration,
+
+    /// After how many seconds control ends unless its client asks for it again; 0 for never
+    #[arg(long, value_name = "SECONDS", default_value = "3")]
+    control_timeout: u8,
+
+    /// Stop while this file exists: a simulated stop input
+    #[arg(long, value_name = "FILE")]
+    stop_file: Option<PathBuf>,
+
+    #[command(flatten)]
+    simulation: Simulation,
+
+    #[cfg(all(feature = "gpio", target_os = "linux"))]
+    #[command(flatten)]
+    gpio: gpio::Gpio,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Simulated motors")]
+struct Simulation {
+    /// After how many seconds a motor has come within a third of its speed, from 0.01 to 10
+    #[arg(long, value_name = "SECONDS", default_value = "0.25", value_parser = |text: &str| between(text, 0.01, 10.0))]
+    response: f64,
+
+    /// How uneven the motors are, as a share of their strength from 0 to 0.5
+    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = |text: &str| between(text, 0.0, 0.5))]
+    noise: f64,
+
+    /// Which unevenness it is: the same number gives the same one
+    #[arg(long, default_value = "1")]
+    seed: u64,
+}
+
+impl Ready for Flags {
+    const PROGRAM: &'static str = "jaus-primitive-driver";
+    const ABOUT: &'static str = "Drive the wheels of a vehicle with the efforts that its controller sets, and count their travel";
+    const EXAMPLES: &'static str = "Examples:\n  \
+        jaus-primitive-driver --loopback            simulated wheels, for trying things out\n  \
+        jaus-primitive-driver --attach              on the node of this host\n  \
+        jaus-primitive-driver --noise 0.1 --seed 7  with motors that are uneven";
+    const ID: JausId = JausId::new(101, 33, 33);
+
+    fn part(self) -> Result<impl Part, Failure> {
+        Ok(PrimitiveDriver {
+            motors: self.motors(),
+            stop: self.stop(),
+            wheels: WheelsConfig {
+                track: self.track,
+                top: self.speed,
+                limits: Limits {
+                    speed: self.speed,
+                    reverse: self.speed / 2.0,
+                    yaw_rate: self.yaw_rate,
+                    ..Limits::default()
+                },
+            },
+            silence: self.silence,
+            control_timeout: self.control_timeout,
+        })
+    }
+}
+
+impl Flags {
+    fn stop(&self) -> Option<Stop> {
+        #[cfg(all(feature = "gpio", target_os = "linux"))]
+        if let Some((chip, line)) = self.gpio.stop_line.clone() {
+            return Some(Stop::Gpio { chip, line });
+        }
+        self.stop_file.clone().map(Stop::File)
+    }
+
+    fn motors(&self) -> Motors {
+        #[cfg(all(feature = "gpio", target_os = "linux"))]
+        if let Some(motors) = self.gpio.motors(self.speed, self.deadline) {
+            return Motors::Gpio(motors);
+        }
+        Motors::Simulated(MotorConfig {
+            top: self.speed,
+            response: self.simulation.response,
+            noise: self.simulation.noise,
+            seed: self.simulation.seed,
+            deadline: self.deadline,
+            ..MotorConfig::default()
+        })
+    }
+}
+
+#[cfg(all(feature = "gpio", target_os = "linux"))]
+mod gpio {
+    use std::path::PathBuf;
+    use std::time::Duration;
+
+    use clap::Args;
+    use jaus::actuator::StepperConfig;
+    use jaus::parts::GpioMotors;
+    use jaus_cli::runtime::between;
+
+    #[derive(Args)]
+    #[command(next_help_heading = "Stepper motors on GPIO lines")]
+    pub(super) struct Gpio {
+        /// The chip that the motors' drivers are on, such as /dev/gpiochip0; simulated motors without it
+        #[arg(long, value_name = "CHIP", requires_all = ["left", "right"])]
+        gpio: Option<PathBuf>,
+
+        /// Lines of the left motor: pulses, direction
+        #[arg(long, value_name = "STEP,DIRECTION", value_parser = lines, requires = "gpio")]
+        left: Option<(u32, u32)>,
+
+        /// Lines of the right motor, which is mounted the other way round
+        #[arg(long, value_name = "STEP,DIRECTION", value_parser = lines, requires = "gpio")]
+        right: Option<(u32, u32)>,
+
+        /// A stop input: a normally closed contact between this line and ground, such as
+        /// /dev/gpiochip0:5. An open contact or a cut wire stops the motors; closed again, it ends all
+        /// emergencies
+        #[arg(long, value_name = "CHIP:LINE", value_parser = chip_and_line, conflicts_with = "stop_file")]
+        pub(super) stop_line: Option<(PathBuf, u32)>,
+
+        /// Pulses for a metre of travel, from 1 to 1000000
+        #[arg(long, value_name = "PULSES", default_value = "2546", value_parser = |text: &str| between(text, 1.0, 1e6))]
+        steps_per_metre: f64,
+
+        /// Metres per second squared that the motors do without losing steps, from 0.01 to 100; twice
+        /// as much when they get slower
+        #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.01, 100.0))]
+        ramp: f64,
+    }
+
+    impl Gpio {
+        pub(super) fn motors(&self, top: f64, deadline: Duration) -> Option<GpioMotors> {
+            Some(GpioMotors {
+                chip: self.gpio.clone()?,
+                stepper: StepperConfig {
+                    steps_per_metre: self.steps_per_metre,
+                    top,
+                    acceleration: self.ramp,
+                    deceleration: 2.0 * self.ramp,
+                    deadline,
+                },
+                left: self.left?,
+                right: self.right?,
+            })
+        }
+    }
+
+    fn chip_and_line(text: &str) -> Result<(PathBuf, u32), String> {
+        let pair = text.rsplit_once(':').filter(|(chip, _)| !chip.is_empty());
+        pair.and_then(|(chip, line)| Some((PathBuf::from(chip), line.parse().ok()?)))
+            .ok_or_else(|| {
+                "write a chip and the number of a line such as /dev/gpiochip0:5".to_owned()
+            })
+    }
+
+    fn lines(text: &str) -> Result<(u32, u32), String> {
+        let number = |text: &str| text.trim().parse::<u32>().ok();
+        let pair = text.split_once(',');
+        let pair = pair.and_then(|(step, direction)| Some((number(step)?, number(direction)?)));
+        pair.filter(|(step, direction)| step != direction)
+            .ok_or_else(|| "write two different line numbers such as 17,27".to_owned())
+    }
+}
+
+fn main() -> ExitCode {
+    launch::<Flags>()
+}

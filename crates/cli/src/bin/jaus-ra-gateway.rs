@@ -1,0 +1,262 @@
+//! `jaus-ra-gateway`: OpenJAUS 3.3 and other RA 3.x systems among JAUS components, and the other way
+//! round.
+
+use std::net::Ipv4Addr;
+use std::process::ExitCode;
+use std::str::FromStr;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use jaus::address::JausId;
+use jaus::component::Kind;
+use jaus::gateway::{Gateway, RaGateway, Report, Settings, Show};
+use jaus::link::{Group, STANDARD_PORT};
+use jaus::node::{Config, units};
+use jaus::parts::Part;
+use jaus::ra::RaId;
+use jaus::ra::carrier::Dialect;
+use jaus::ra::ids::{self, ComponentEntry, SubsystemEntry};
+use jaus_cli::output::Output;
+use jaus_cli::runtime::seconds;
+use jaus_cli::{Failure, Ready, launch};
+
+#[derive(Args)]
+struct Flags {
+    /// How long a client waits for an answer from the other side, in seconds
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = seconds)]
+    patience: Duration,
+
+    /// The most authority that is claimed of RA components, whatever the JAUS client has
+    #[arg(long, value_name = "CODE", default_value = "255")]
+    authority: u8,
+
+    /// Seconds without a Request Control after which a JAUS client's control of an RA component ends,
+    /// with a quarter's grace; 0 never ends it
+    #[arg(long, value_name = "SECONDS", default_value = "4")]
+    control_timeout: u8,
+
+    /// Show only this JAUS subsystem to RA systems (repeatable) [default: all that have a number
+    /// there]
+    #[arg(long, value_name = "SUBSYSTEM", value_parser = clap::value_parser!(u16).range(1..=65534))]
+    show: Vec<u16>,
+
+    /// When it ends, print who sees whom, and what was carried across and refused; with =TIME, such
+    /// as =10s, also each time that has passed
+    #[arg(
+        long,
+        value_name = "TIME",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0s",
+        value_parser = units::duration,
+    )]
+    stats: Option<Duration>,
+
+    /// Print that as JSON, one object a line
+    #[arg(long, requires = "stats")]
+    json: bool,
+
+    #[command(flatten)]
+    ra: RaNetwork,
+
+    #[command(flatten)]
+    ids: Ids,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "RA network")]
+struct RaNetwork {
+    /// The interface of the RA network, by name or IPv4 address [default: the JAUS node's first]
+    #[arg(long, value_name = "INTERFACE")]
+    ra_interface: Option<String>,
+
+    /// How messages for everybody are put into datagrams; those for one go the way that it speaks
+    #[arg(long, value_enum, default_value = "auto")]
+    framing: Framing,
+
+    /// The multicast group of the RA network, or off
+    #[arg(long, value_name = "ADDRESS", default_value = "224.1.0.1:3794")]
+    ra_group: Group,
+
+    /// A host of the RA network that multicast does not reach, by its IPv4 address: heartbeats and what
+    /// else goes to the group go to it, too (repeatable)
+    #[arg(long, value_name = "ADDRESS")]
+    ra_peer: Vec<Ipv4Addr>,
+
+    /// Our UDP port there. RA systems answer to 3794, whatever it is
+    #[arg(long, value_name = "PORT", default_value_t = STANDARD_PORT)]
+    ra_port: u16,
+
+    /// How many routers multicast may pass there
+    #[arg(long, value_name = "HOPS", default_value = "32")]
+    ra_ttl: u8,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Framing {
+    /// In all framings that are heard, and nothing before the first is heard
+    Auto,
+    /// "JAUS01.0", JAUS_OPC_UDP_Interface of OpenJAUS
+    Opc,
+    /// AS5669 1.0, JUDP_Interface of OpenJAUS
+    Judp,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Who is who")]
+struct Ids {
+    /// Add this to RA subsystems' numbers to get those by which JAUS sees them
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
+    ra_offset: i32,
+
+    /// Add this to JAUS subsystems' numbers to get those by which RA systems see them
+    #[arg(
+        long,
+        value_name = "NUMBER",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
+    jaus_offset: i32,
+
+    /// An RA subsystem that JAUS sees by another number, such as 20=1200 (repeatable)
+    #[arg(long, value_name = "RA=JAUS", value_parser = pair::<u8, u16>)]
+    ra_subsystem: Vec<(u8, u16)>,
+
+    /// A JAUS subsystem that RA systems see by another number, such as 4711=101 (repeatable)
+    #[arg(long, value_name = "JAUS=RA", value_parser = pair::<u16, u8>)]
+    jaus_subsystem: Vec<(u16, u8)>,
+
+    /// An RA component that JAUS sees by another id, such as 20.1.70.1=20.1.200 (repeatable)
+    #[arg(long, value_name = "RA=JAUS", value_parser = pair::<RaId, JausId>)]
+    ra_component: Vec<(RaId, JausId)>,
+
+    /// A JAUS component that RA systems see as another instance, such as 101.1.9=101.1.33.1
+    /// (repeatable)
+    #[arg(long, value_name = "JAUS=RA", value_parser = pair::<JausId, RaId>)]
+    jaus_component: Vec<(JausId, RaId)>,
+}
+
+/// Two sides of an equals sign.
+fn pair<A: FromStr, B: FromStr>(text: &str) -> Result<(A, B), String>
+where
+    A::Err: std::fmt::Display,
+    B::Err: std::fmt::Display,
+{
+    let (from, to) = text
+        .split_once('=')
+        .ok_or("write two numbers or ids with an equals sign between them, such as 20=1200")?;
+    let from = from.parse();
+    let to = to.parse();
+    Ok((
+        from.map_err(|error: A::Err| format!("left of the equals sign: {error}"))?,
+        to.map_err(|error: B::Err| format!("right of the equals sign: {error}"))?,
+    ))
+}
+
+impl Ready for Flags {
+    const PROGRAM: &'static str = "jaus-ra-gateway";
+    const ABOUT: &'static str =
+        "Show OpenJAUS 3.3 and other RA 3.x systems to JAUS, and JAUS components to them";
+    const EXAMPLES: &'static str = "Examples:\n  \
+        jaus-ra-gateway --interface eth0                  both networks on one cable\n  \
+        jaus-ra-gateway --interface eth0 --ra-interface eth1\n  \
+        jaus-ra-gateway --interface eth0 --framing judp   for JUDP_Interface: true\n  \
+        jaus-ra-gateway --interface eth0 --ra-peer 10.1.2.3   beyond a router\n  \
+        jaus-ra-gateway --interface eth0 --ra-offset 1000 RA subsystem 20 is 1020 among JAUS\n  \
+        jaus-ra-gateway --interface eth0 --show 101 --stats=10s";
+    const ID: JausId = JausId::new(250, 1, 1);
+    const KIND: Kind = Kind::OtherSubsystem;
+    const SUBSYSTEM: &'static str = "RA gateway";
+
+    fn for_node(&self) -> impl FnOnce(&mut Config) + 'static {
+        // RA systems answer to port 3794 alone, JAUS peers to whatever they hear us from.
+        let shared = self.ra.ra_interface.is_none() && self.ra.ra_port == STANDARD_PORT;
+        move |config: &mut Config| {
+            if shared && config.port == STANDARD_PORT {
+                config.port = 0;
+            }
+        }
+    }
+
+    fn part(self) -> Result<impl Part, Failure> {
+        let reporter = match self.json {
+            true => print_json,
+            false => print_text,
+        };
+        let settings = self.settings();
+        // Mistaken ids are told before anything is opened.
+        Gateway::check(&settings).map_err(Failure::of)?;
+        Ok(RaGateway {
+            settings,
+            interface: self.ra.ra_interface,
+            group: self.ra.ra_group,
+            ttl: self.ra.ra_ttl,
+            port: self.ra.ra_port,
+            reports: self.stats,
+            reporter,
+        })
+    }
+}
+
+impl Flags {
+    fn settings(&self) -> Settings {
+        let mut settings = Settings {
+            ids: self.ids.settings(),
+            patience: self.patience,
+            authority: self.authority,
+            timeout: Duration::from_secs(self.control_timeout.into()),
+            ..Settings::default()
+        };
+        if !self.show.is_empty() {
+            settings.show = Show::Only(self.show.iter().copied().collect());
+        }
+        let peers = self.ra.ra_peer.iter().copied();
+        settings.ra.carrier.peers = peers.map(Into::into).collect();
+        settings.ra.carrier.group_dialects = match self.ra.framing {
+            // In the framings that are heard; all RA systems tell regularly that they are there.
+            Framing::Auto => Vec::new(),
+            Framing::Opc => vec![Dialect::Opc],
+            Framing::Judp => vec![Dialect::As5669],
+        };
+        settings
+    }
+}
+
+impl Ids {
+    fn settings(&self) -> ids::Settings {
+        let mut settings = ids::Settings::default();
+        settings.ra_offset = self.ra_offset;
+        settings.jaus_offset = self.jaus_offset;
+        let subsystem = |ra, jaus| SubsystemEntry { ra, jaus };
+        let component = |ra, jaus| ComponentEntry { ra, jaus };
+        let ra = self.ra_subsystem.iter();
+        settings.ra_subsystems = ra.map(|&(ra, jaus)| subsystem(ra, jaus)).collect();
+        let jaus = self.jaus_subsystem.iter();
+        settings.jaus_subsystems = jaus.map(|&(jaus, ra)| subsystem(ra, jaus)).collect();
+        let ra = self.ra_component.iter();
+        settings.ra_components = ra.map(|&(ra, jaus)| component(ra, jaus)).collect();
+        let jaus = self.jaus_component.iter();
+        settings.jaus_components = jaus.map(|&(jaus, ra)| component(ra, jaus)).collect();
+        settings
+    }
+}
+
+fn print_text(report: &Report) {
+    // Nobody reading is no reason to stop.
+    let _ = Output::new().part(&format!("\n{report}"));
+}
+
+fn print_json(report: &Report) {
+    if let Ok(json) = serde_json::to_string(report) {
+        let _ = Output::new().line(json);
+    }
+}
+
+fn main() -> ExitCode {
+    launch::<Flags>()
+}

@@ -1,0 +1,216 @@
+//! Child processes of the load: this program again, which takes orders on its standard input and
+//! answers each on its standard output, as lines of JSON. A child ends when its input does, also
+//! when the parent was killed.
+#![expect(clippy::disallowed_methods, reason = "waits for processes")]
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+use jaus::address::JausId;
+use jaus_cli::failure::Failure;
+use serde::{Deserialize, Serialize};
+
+use super::latencies::Latencies;
+
+/// The hidden subcommand that a child runs.
+pub(crate) const SUBCOMMAND: &str = "load-child";
+/// How long a child may take to end after its input was closed.
+const END: Duration = Duration::from_secs(3);
+
+/// What the parent wants of a child.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) enum Order {
+    /// Run a node that serves component processes.
+    Serve(NodeOrder),
+    /// Attach components, each by a connection of its own, to the nodes at these addresses.
+    Attach(Vec<(String, u8)>),
+    /// Whom each of the attached components sends to.
+    Partners(Vec<JausId>),
+    /// Send, and measure.
+    Measure(Run),
+}
+
+/// A node of the load. It finds the others by their addresses, without multicast, so that it
+/// disturbs no other node of this host.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct NodeOrder {
+    pub(super) node: u8,
+    /// Where components attach.
+    pub(super) socket: PathBuf,
+    /// The UDP addresses of all nodes of the load; the first is node 1.
+    pub(super) addresses: Vec<SocketAddr>,
+    /// How many components there are on all nodes.
+    pub(super) components: u16,
+}
+
+/// One step of the schedule, as one process runs it.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(super) struct Run {
+    /// Tells the messages of this step from late ones of an earlier step.
+    pub(super) number: u32,
+    /// Messages per second of this process.
+    pub(super) pace: Pace,
+    /// How many messages a component sends at once, where the pace is a rate.
+    pub(super) burst: u32,
+    /// How long messages count. Those of the warm-up before that do not.
+    pub(super) time: Duration,
+    /// Octets of a message.
+    pub(super) size: usize,
+    pub(super) acknowledged_by: Acknowledger,
+}
+
+/// When messages are sent.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(super) enum Pace {
+    /// This many per second, whether or not earlier ones are acknowledged.
+    PerSecond(f64),
+    /// As fast as possible: each component keeps this many messages unacknowledged.
+    Window(u32),
+}
+
+/// Who acknowledges a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Acknowledger {
+    /// The receiving component sends a message back
+    Component,
+    /// The receiving component's node acknowledges (AS5669A), and repeats are sent as needed
+    Node,
+}
+
+/// A child's answer to an order.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) enum Answer {
+    Ready,
+    Attached(Vec<JausId>),
+    Measured(Tally),
+    Failed(String),
+}
+
+/// What the components of one or several processes measured in one step.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct Tally {
+    /// Messages acknowledged, those of the warm-up included.
+    pub(super) all: u64,
+    /// Messages sent that count.
+    pub(super) sent: u64,
+    /// Messages that the sender's connection refused.
+    pub(super) refused: u64,
+    /// From sending to the acknowledgement, of each message that counts and was acknowledged.
+    pub(super) latencies: Latencies,
+}
+
+impl Tally {
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.all += other.all;
+        self.sent += other.sent;
+        self.refused += other.refused;
+        self.latencies.merge(&other.latencies);
+    }
+
+    /// Messages that count and were not acknowledged.
+    pub(super) fn lost(&self) -> u64 {
+        self.sent.saturating_sub(self.latencies.count())
+    }
+}
+
+/// A running child, as its parent sees it.
+pub(super) struct Process {
+    name: String,
+    child: Child,
+    /// `None` once it is closed, which ends the child.
+    orders: Option<ChildStdin>,
+    answers: Receiver<String>,
+}
+
+impl Process {
+    /// Starts a child, which `name` names in errors.
+    pub(super) fn start(name: String) -> Result<Self, Failure> {
+        let failed = |error| Failure::new(format!("cannot start the {name}: {error}"));
+        let program = std::env::current_exe().map_err(failed)?;
+        let mut command = Command::new(program);
+        command.arg(SUBCOMMAND);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        // Ctrl-C is for the parent; the child then sees the end of its input, and cleans up.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut command, 0);
+        let mut child = command.spawn().map_err(failed)?;
+        let (sender, answers) = channel();
+        if let Some(output) = child.stdout.take() {
+            std::thread::spawn(move || {
+                let lines = BufReader::new(output).lines().map_while(Result::ok);
+                lines.for_each(|line| drop(sender.send(line)));
+            });
+        }
+        let orders = child.stdin.take();
+        Ok(Self {
+            name,
+            child,
+            orders,
+            answers,
+        })
+    }
+
+    /// Gives an order, without waiting for the answer.
+    pub(super) fn order(&mut self, order: &Order) -> Result<(), Failure> {
+        let line = serde_json::to_string(order).map_err(Failure::of)?;
+        let written = self
+            .orders
+            .as_mut()
+            .is_some_and(|pipe| writeln!(pipe, "{line}").is_ok());
+        written.then_some(()).ok_or_else(|| self.ended())
+    }
+
+    /// Waits for the answer to the oldest order that is not answered.
+    pub(super) fn answer(&mut self, patience: Duration) -> Result<Answer, Failure> {
+        let line = self
+            .answers
+            .recv_timeout(patience)
+            .map_err(|error| match error {
+                RecvTimeoutError::Timeout => {
+                    let seconds = patience.as_secs_f64();
+                    Failure::new(format!(
+                        "the {} did not answer within {seconds} s",
+                        self.name
+                    ))
+                }
+                RecvTimeoutError::Disconnected => self.ended(),
+            })?;
+        match serde_json::from_str(&line).map_err(Failure::of)? {
+            Answer::Failed(why) => Err(Failure::new(format!("the {}: {why}", self.name))),
+            answer => Ok(answer),
+        }
+    }
+
+    /// Processor time that its main thread, which does all the work, has used. Only Linux says.
+    pub(super) fn processor_time(&self) -> Option<Duration> {
+        let path = format!("/proc/{}/schedstat", self.child.id());
+        let text = std::fs::read_to_string(path).ok()?;
+        let nanoseconds = text.split_whitespace().next()?.parse().ok()?;
+        Some(Duration::from_nanos(nanoseconds))
+    }
+
+    fn ended(&self) -> Failure {
+        Failure::new(format!("the {} has ended unexpectedly", self.name))
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        drop(self.orders.take());
+        let step = Duration::from_millis(10);
+        for _ in 0..END.as_millis() / step.as_millis() {
+            if !matches!(self.child.try_wait(), Ok(None)) {
+                return;
+            }
+            std::thread::sleep(step);
+        }
+        // An error would mean that it has ended after all.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,178 @@
+//! `jaus-tester mission`: a mission through the whole chain, checked step by step.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "what passes is told with the time since the beginning"
+)]
+
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
+
+use clap::Args;
+use jaus::component::{Component, Kind};
+use jaus::node::{Tap, Tapped};
+use jaus::parts::tester::{MissionTest, figure, steps};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::network::Network;
+use jaus_cli::output::Output;
+use jaus_cli::runtime;
+use tokio::sync::mpsc;
+
+/// Drive a mission through all components of a vehicle, and check each answer
+///
+/// Finds planner, knowledge store, sensors and drivers of a subsystem, takes control of the planner,
+/// sets a destination, approves the path, watches the stages begin one after the other, and checks
+/// where the vehicle stands in the end. Each message that passes the tester is shown as a line. Exit
+/// status 1 means that a step has failed.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus-tester mission --loopback                 a vehicle on this computer\n  \
+    jaus-tester mission --to 4,-2.5 --junit mission.xml\n  \
+    jaus-tester mission --subsystem 105 --quiet    only the steps")]
+pub(crate) struct MissionCommand {
+    /// The vehicle's subsystem
+    #[arg(long, value_name = "NUMBER", default_value = "101", value_parser = clap::value_parser!(u16).range(1..=65534))]
+    subsystem: u16,
+
+    /// Where to drive to, X,Y in metres of the local frame [default: some four metres away]
+    #[arg(long, value_name = "X,Y", value_parser = point, allow_hyphen_values = true)]
+    to: Option<(f64, f64)>,
+
+    /// The greatest speed in m/s
+    #[arg(long, value_name = "M/S", default_value = "1", value_parser = speed)]
+    speed: f32,
+
+    /// With which authority the planner is controlled
+    #[arg(long, value_name = "CODE", default_value = "200")]
+    authority: u8,
+
+    /// How long a step may take, but for the drive
+    #[arg(long, value_name = "SECONDS", default_value = "15", value_parser = runtime::seconds)]
+    patience: Duration,
+
+    /// How long the drive may take
+    #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = runtime::seconds)]
+    drive: Duration,
+
+    /// Write the steps into this file, as a JUnit report
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+
+    /// Do not show messages
+    #[arg(long)]
+    quiet: bool,
+
+    /// Show the messages of discovery and events' upkeep, too
+    #[arg(long, conflicts_with = "quiet")]
+    all: bool,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+/// Passages that may wait to be shown.
+const WAITING: usize = 4096;
+
+impl MissionCommand {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let steps = runtime::run(self.drive())?;
+        if let Some(file) = &self.junit {
+            let report = steps::junit("jaus-tester mission", &steps);
+            std::fs::write(file, report).map_err(|error| Failure::file(file, &error))?;
+        }
+        Ok(Outcome::complete_if(steps::all_pass(&steps)))
+    }
+
+    async fn drive(&self) -> Result<Vec<steps::Step>, Failure> {
+        let (port, stay) = self.network.join_for_a_moment().await?;
+        let begin = SystemTime::now();
+        let mut output = Output::new();
+        let node = stay.node();
+        let tap = node.as_ref().filter(|_| !self.quiet);
+        let mut tap = tap.map(|node| node.tap(WAITING));
+        if tap.is_none() && !self.quiet {
+            output
+                .line("the messages pass the node of another process: `jaus watch` shows them")?;
+        }
+        let tester = Component::builder(Kind::OperatorControlUnit, "Tester");
+        let tester = tester.live_on(port).map_err(Failure::of)?;
+        output.line(format_args!(
+            "{} tests subsystem {}",
+            tester.id(),
+            self.subsystem
+        ))?;
+        let (tell, mut told) = mpsc::unbounded_channel();
+        let test = MissionTest {
+            subsystem: self.subsystem,
+            to: self.to,
+            speed: self.speed,
+            authority: self.authority,
+            patience: self.patience,
+            drive: self.drive,
+        };
+        let until = runtime::end(None);
+        tokio::pin!(until);
+        let steps = {
+            // It tells as many steps as there are, and no more.
+            let running = test.run(&tester, |step| _ = tell.send(step.clone()));
+            tokio::pin!(running);
+            loop {
+                tokio::select! {
+                    biased;
+                    Some(tapped) = next(&mut tap) => self.show(&tapped, begin, &mut output)?,
+                    Some(step) = told.recv() => output.line(step)?,
+                    steps = &mut running => break steps,
+                    () = &mut until => return Err(Failure::new("interrupted before the end")),
+                }
+            }
+        };
+        while let Ok(step) = told.try_recv() {
+            output.line(step)?;
+        }
+        let passed = steps
+            .iter()
+            .filter(|step| matches!(step.verdict, steps::Verdict::Pass(_)));
+        output.line(format_args!(
+            "{} of {} steps passed",
+            passed.count(),
+            steps.len()
+        ))?;
+        drop(tester);
+        stay.end().await;
+        Ok(steps)
+    }
+
+    fn show(&self, tapped: &Tapped, begin: SystemTime, output: &mut Output) -> Result<(), Failure> {
+        match tapped {
+            Tapped::Lost(count) => output.line(format_args!("{count} messages were not shown")),
+            Tapped::Passage(passage) => {
+                let lines = figure::lines(passage, begin).into_iter();
+                let mut lines = lines.filter(|line| self.all || !line.is_chatter());
+                lines.try_for_each(|line| output.line(line))
+            }
+        }
+    }
+}
+
+async fn next(tap: &mut Option<Tap>) -> Option<Tapped> {
+    match tap {
+        Some(tap) => tap.next().await,
+        None => None,
+    }
+}
+
+/// A flag's place in the local frame: `4,-2.5`.
+fn point(text: &str) -> Result<(f64, f64), String> {
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|it| it.is_finite());
+    let pair = text
+        .split_once(',')
+        .and_then(|(x, y)| Some((number(x)?, number(y)?)));
+    pair.ok_or_else(|| "write X and Y in metres such as 4,-2.5".to_owned())
+}
+
+/// A flag's speed.
+fn speed(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(speed) if (0.01..=100.0).contains(&speed) => Ok(speed),
+        _ => Err("write a speed from 0.01 to 100 m/s".to_owned()),
+    }
+}

@@ -1,0 +1,137 @@
+//! `jaus-vector-knowledge-store`: the objects and maps of a vehicle, kept through power cuts.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use jaus::address::JausId;
+use jaus::parts::{Broken, KnowledgeStore, Part};
+use jaus::vehicle::Frame;
+use jaus::world::{Picture, Raster};
+use jaus_cli::failure::Failure;
+use jaus_cli::runtime::between;
+use jaus_cli::{Ready, launch};
+
+#[derive(Args)]
+struct Flags {
+    /// The file that everything is kept in [default: knowledge-store.redb in $STATE_DIRECTORY,
+    /// $XDG_STATE_HOME/jaus or ~/.local/state/jaus]
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
+
+    /// If the file is damaged, keep it under another name and begin anew
+    #[arg(long)]
+    set_broken_aside: bool,
+
+    /// Degrees of latitude of the local frame's origin, north positive
+    #[arg(long, value_name = "DEGREES", default_value = "0", allow_negative_numbers = true, value_parser = |text: &str| between(text, -90.0, 90.0))]
+    latitude: f64,
+
+    /// Degrees of longitude of the local frame's origin, east positive
+    #[arg(long, value_name = "DEGREES", default_value = "0", allow_negative_numbers = true, value_parser = |text: &str| between(text, -180.0, 180.0))]
+    longitude: f64,
+
+    #[command(flatten)]
+    map: Map,
+}
+
+/// A map to begin with, unless there is one of its name already
+#[derive(Args)]
+#[command(next_help_heading = "A map to begin with, unless there is one of its name already")]
+struct Map {
+    /// A map of 16 x 16 cells around the origin, for trying things out
+    #[arg(long, conflicts_with = "import")]
+    demo_map: bool,
+
+    /// A PGM picture (black is impassable), or text (# impassable, . free, 0 to 9 in between); north
+    /// at the top
+    #[arg(long, value_name = "FILE")]
+    import: Option<PathBuf>,
+
+    /// What the imported map is called
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "traversability",
+        requires = "import"
+    )]
+    map_name: String,
+
+    /// Metres of a side of its cells, from 0.001 to 1000
+    #[arg(long, value_name = "M", default_value = "1", requires = "import", value_parser = |text: &str| between(text, 0.001, 1000.0))]
+    cell: f64,
+
+    /// X of its south-western corner in metres, to the north [default: its middle is the origin]
+    #[arg(long, value_name = "M", requires = "import", allow_negative_numbers = true, value_parser = |text: &str| between(text, -1e7, 1e7))]
+    x: Option<f64>,
+
+    /// Y of its south-western corner in metres, to the east [default: its middle is the origin]
+    #[arg(long, value_name = "M", requires = "import", allow_negative_numbers = true, value_parser = |text: &str| between(text, -1e7, 1e7))]
+    y: Option<f64>,
+}
+
+impl Ready for Flags {
+    const PROGRAM: &'static str = "jaus-vector-knowledge-store";
+    const ABOUT: &'static str = "Keep the objects and maps of a vehicle, and tell of them";
+    const EXAMPLES: &'static str = "Examples:\n  \
+        jaus-vector-knowledge-store --loopback --demo-map     for trying things out\n  \
+        jaus-vector-knowledge-store --import yard.pgm --cell 0.25\n  \
+        jaus-vector-knowledge-store --attach --store /var/lib/jaus/world.redb";
+    const ID: JausId = JausId::new(101, 61, 61);
+
+    fn part(self) -> Result<impl Part, Failure> {
+        Ok(KnowledgeStore {
+            file: self.store.unwrap_or_else(usual_file),
+            broken: if self.set_broken_aside {
+                Broken::SetAside
+            } else {
+                Broken::Refuse
+            },
+            map: self.map.read()?,
+            frame: Frame::at(self.latitude, self.longitude),
+        })
+    }
+}
+
+impl Map {
+    fn read(self) -> Result<Option<(Raster, Picture)>, Failure> {
+        if self.demo_map {
+            return Ok(Some(KnowledgeStore::demo_map()));
+        }
+        let Some(file) = self.import else {
+            return Ok(None);
+        };
+        if self.map_name.len() > Raster::MOST_NAME {
+            return Err(Failure::new(
+                "--map-name has more than 255 octets; shorten it",
+            ));
+        }
+        let octets = std::fs::read(&file).map_err(|error| Failure::file(&file, &error))?;
+        let picture = Picture::read(&octets)
+            .map_err(|error| Failure::new(format!("--import {}: {error}", file.display())))?;
+        let middle = |count: u16| f64::from(count) * self.cell / -2.0;
+        let corner = (
+            self.x.unwrap_or_else(|| middle(picture.rows)),
+            self.y.unwrap_or_else(|| middle(picture.columns)),
+        );
+        let raster = picture.at(self.map_name, self.cell as f32, corner);
+        Ok(Some((raster, picture)))
+    }
+}
+
+/// In the directory that the service manager gives, or where users' programs keep their state.
+fn usual_file() -> PathBuf {
+    let set = |name: &str| std::env::var_os(name).filter(|it| !it.is_empty());
+    let given = set("STATE_DIRECTORY").map(PathBuf::from);
+    let users = || {
+        let state = set("XDG_STATE_HOME").map(PathBuf::from);
+        let state = state.or_else(|| Some(Path::new(&set("HOME")?).join(".local/state")));
+        state.map(|state| state.join("jaus"))
+    };
+    let directory = given.or_else(users).unwrap_or_default();
+    directory.join(KnowledgeStore::FILE)
+}
+
+fn main() -> ExitCode {
+    launch::<Flags>()
+}

@@ -1,0 +1,43 @@
+//! `jaus-velocity-state-sensor`: how fast a vehicle moves, as its wheels tell.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Args;
+use jaus::address::JausId;
+use jaus::parts::{Part, VelocitySensor};
+use jaus_cli::failure::Failure;
+use jaus_cli::runtime::{between, seconds};
+use jaus_cli::{Ready, launch};
+
+#[derive(Args)]
+struct Flags {
+    /// How often to ask for the travel of the wheels, in hertz from 1 to 100
+    #[arg(long, value_name = "HZ", default_value = "25", value_parser = |text: &str| between(text, 1.0, 100.0))]
+    rate: f64,
+
+    /// Tell no velocity any more when the wheels have not been heard for so many seconds
+    #[arg(long, value_name = "SECONDS", default_value = "0.3", value_parser = seconds)]
+    silence: Duration,
+}
+
+impl Ready for Flags {
+    const PROGRAM: &'static str = "jaus-velocity-state-sensor";
+    const ABOUT: &'static str = "Tell how fast a vehicle moves, as the travel of its wheels says";
+    const EXAMPLES: &'static str = "The wheels are found by Discovery: whoever offers Wheel Odometry in the same \
+        subsystem, such as jaus-primitive-driver.\n\nExamples:\n  \
+        jaus-velocity-state-sensor --loopback   for trying things out on one computer\n  \
+        jaus-velocity-state-sensor --attach     on the node of this host";
+    const ID: JausId = JausId::new(101, 42, 42);
+
+    fn part(self) -> Result<impl Part, Failure> {
+        Ok(VelocitySensor {
+            hz: self.rate,
+            silence: self.silence,
+        })
+    }
+}
+
+fn main() -> ExitCode {
+    launch::<Flags>()
+}

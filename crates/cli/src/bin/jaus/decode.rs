@@ -1,0 +1,180 @@
+//! `jaus decode`: captures, or lines of hex, to one JSON object a line.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use bytes::Bytes;
+use clap::Args;
+use jaus::view::{self, Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::output::{Output, say};
+
+use crate::definitions::Definitions;
+
+/// Print captured messages, or lines of hex, as one JSON object a line
+///
+/// A message that cannot be read gives {"error":…,"offset":…} on its line, and the run goes on;
+/// the exit status is then 1.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus decode drive.pcapng\n  \
+    jaus decode drive.pcap --port 3794 --port 50000 | grep ReportGlobalPose\n  \
+    tcpdump -i eth0 -U -w - udp port 3794 | jaus decode -\n  \
+    echo '00 2B 02' | jaus decode --hex\n  \
+    jaus decode --hex --jsidl my-services/ < messages.txt\n\n\
+    Offsets count octets from 0: in a message from the first octet of its code, in a datagram or a \
+    capture from its beginning.")]
+pub(crate) struct Decode {
+    /// A pcap or pcapng file, or with --hex a text file; - is standard input
+    #[arg(required_unless_present = "hex", value_name = "FILE")]
+    file: Option<PathBuf>,
+
+    /// Read lines of hexadecimal digits, each one message beginning with its two code octets
+    #[arg(long)]
+    hex: bool,
+
+    /// Read messages without their headers by the definitions of the Reference Architecture (RA 3.x,
+    /// OpenJAUS 3.x); in a capture the headers tell
+    #[arg(long, requires = "hex")]
+    ra: bool,
+
+    /// The UDP port that JAUS messages come from or go to (repeatable)
+    #[arg(long, value_name = "PORT", default_values_t = [JAUS_PORT], conflicts_with = "hex")]
+    port: Vec<u16>,
+
+    #[command(flatten)]
+    definitions: Definitions,
+}
+
+impl Decode {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let mut dictionary = self.definitions.load()?;
+        if self.ra {
+            dictionary.prefer_reference_architecture();
+        }
+        let input = open(self.file.as_deref())?;
+        let mut printer = Printer {
+            output: Output::new(),
+            complete: true,
+        };
+        if self.hex {
+            read_hex(BufReader::new(input), &dictionary, &mut printer)?;
+        } else {
+            self.read_capture(input, &dictionary, &mut printer)?;
+        }
+        Ok(Outcome::complete_if(printer.complete))
+    }
+
+    fn read_capture(
+        &self,
+        input: Box<dyn Read>,
+        dictionary: &Dictionary,
+        printer: &mut Printer,
+    ) -> Result<(), Failure> {
+        let name = self.file.as_deref().unwrap_or(Path::new("-"));
+        let mut capture = Capture::new(BufReader::new(input))
+            .map_err(|error| Failure::new(format!("{}: {error}", name.display())))?;
+        let mut network = Network::new(self.port.iter().copied());
+        let mut log = MessageLog::new(dictionary);
+        while let Some(frame) = capture.next_frame() {
+            match frame {
+                Ok(frame) => {
+                    let Some(datagram) = network.handle_frame(&frame) else {
+                        continue;
+                    };
+                    for line in log.read(frame.time, &datagram) {
+                        printer.print(&line)?;
+                    }
+                }
+                Err(error) => printer.print(&Line::from(&error))?,
+            }
+        }
+        report_unread(&network, &log);
+        Ok(())
+    }
+}
+
+/// Standard output, and whether every line so far could be read.
+struct Printer {
+    output: Output,
+    complete: bool,
+}
+
+impl Printer {
+    fn print(&mut self, line: &Line<'_>) -> Result<(), Failure> {
+        self.complete &= !line.is_error();
+        self.output.line(line.to_json())
+    }
+}
+
+/// The file, or standard input for `-` and for no file.
+fn open(path: Option<&Path>) -> Result<Box<dyn Read>, Failure> {
+    match path {
+        Some(path) if path != Path::new("-") => {
+            let file = File::open(path).map_err(|error| Failure::file(path, &error))?;
+            Ok(Box::new(file))
+        }
+        _ => Ok(Box::new(io::stdin())),
+    }
+}
+
+/// Every line one message; blank lines are passed over.
+fn read_hex(
+    mut input: impl BufRead,
+    dictionary: &Dictionary,
+    printer: &mut Printer,
+) -> Result<(), Failure> {
+    let mut text = Vec::new();
+    loop {
+        text.clear();
+        let length = input
+            .read_until(b'\n', &mut text)
+            .map_err(|error| Failure::new(format!("cannot read the lines of hex: {error}")))?;
+        if length == 0 {
+            return Ok(());
+        }
+        let text = String::from_utf8_lossy(&text);
+        if text.trim().is_empty() {
+            continue;
+        }
+        match view::from_hex(&text) {
+            Ok(octets) => printer.print(&dictionary.line(&Bytes::from(octets)))?,
+            Err(error) => {
+                let offset = error.offset as u64;
+                printer.print(&Line::of_error(None, &error, offset))?;
+            }
+        }
+    }
+}
+
+/// Says on standard error what the capture holds besides the lines printed.
+fn report_unread(network: &Network, log: &MessageLog<'_>) {
+    let counts = network.counts();
+    let notes = [
+        (
+            counts.tcp_segments,
+            "TCP segments passed over: JTCP is not read yet",
+        ),
+        (
+            counts.unknown_links,
+            "frames passed over: their link type is not understood",
+        ),
+        (
+            counts.incomplete_datagrams,
+            "datagrams left out: some of their IP fragments are missing",
+        ),
+        (
+            log.incomplete_messages(),
+            "large messages not shown: some of their parts are missing",
+        ),
+    ];
+    for (count, note) in notes {
+        if count > 0 {
+            say(format_args!("note: {count} {note}"));
+        }
+    }
+    if log.stale_octets() > 0 {
+        tracing::info!(octets = log.stale_octets(), "passed over behind messages");
+    }
+}

@@ -1,0 +1,58 @@
+//! `--jsidl` and `--service`: which definitions messages are read and written by.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use jaus::view::Dictionary;
+use jaus_cli::failure::Failure;
+use jaus_cli::output::say;
+
+#[derive(Args)]
+pub(crate) struct Definitions {
+    /// Add the service definitions of a JSIDL file or directory (repeatable)
+    ///
+    /// They come before the built-in ones. Mistakes in them are listed on standard error; what has
+    /// none is used.
+    #[arg(long, value_name = "PATH")]
+    jsidl: Vec<PathBuf>,
+
+    /// The service meant where several define the same message code (repeatable)
+    ///
+    /// A URN, or a URN and version: urn:jaus:jss:core:Events or urn:jaus:jss:core:Events@1.0
+    #[arg(long, value_name = "URN")]
+    service: Vec<String>,
+}
+
+impl Definitions {
+    /// The built-in definitions and those of `--jsidl`.
+    pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
+        let mut dictionary = Dictionary::complete();
+        self.add(&mut dictionary)?;
+        for service in &self.service {
+            service
+                .parse()
+                .and_then(|service| dictionary.prefer(service))
+                .map_err(|error| Failure::new(format!("--service {service}: {error}")))?;
+        }
+        Ok(dictionary)
+    }
+
+    fn add(&self, dictionary: &mut Dictionary) -> Result<(), Failure> {
+        if self.jsidl.is_empty() {
+            return Ok(());
+        }
+        let added = dictionary.load(&self.jsidl);
+        for diagnostic in added.diagnostics.errors() {
+            say(diagnostic);
+        }
+        if added.messages > 0 {
+            return Ok(());
+        }
+        let paths = self.jsidl.iter().map(|path| path.display().to_string());
+        let paths: Vec<_> = paths.collect();
+        Err(Failure::new(format!(
+            "no message definition could be loaded from {}",
+            paths.join(", ")
+        )))
+    }
+}

@@ -1,0 +1,193 @@
+//! The demo's own operator: a client like any other, which has the planner drive somewhere and
+//! watches. Whoever takes control on the page has the greater authority, and it lets go.
+
+use std::time::Duration;
+
+use jaus::address::JausId;
+use jaus::component::{Component, Control, Update, When};
+use jaus::messages::ground::report_mission::Stage;
+use jaus::messages::ground::{
+    QueryMission, QueryPlannedPath, ReportMission, ReportPlannedPath, SetDestination,
+    mission_planner,
+};
+use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
+use jaus_cli::failure::Failure;
+
+use super::story::{Story, Who};
+
+/// Below the page's, which is 200, so that a person can always take over.
+const AUTHORITY: u8 = 150;
+/// X, Y and yaw, by their bits in the presence vector of a query and its report.
+const POSE: u16 = 0b100_0011;
+/// Between two lines about the way.
+const LOOK: Duration = Duration::from_secs(2);
+
+/// How a mission ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ending {
+    /// At the destination.
+    Arrived,
+    /// Elsewhere.
+    Stopped,
+}
+
+pub(super) struct Operator<'s> {
+    component: Component,
+    story: &'s mut Story,
+}
+
+impl<'s> Operator<'s> {
+    pub(super) fn new(component: Component, story: &'s mut Story) -> Self {
+        Self { component, story }
+    }
+
+    /// Has the vehicle driven to a place in its local frame, in metres, and waits for the end.
+    pub(super) async fn drive(&mut self, (x, y): (f64, f64)) -> Result<Ending, Failure> {
+        let planner = self.find(mission_planner::URN).await?;
+        let sensor = self.find(local_pose_sensor::URN).await?;
+        let control = self.component.control(planner, AUTHORITY).await;
+        let control = control.map_err(Failure::of)?;
+        self.tell(
+            Who::Operator,
+            format!("takes control of the planner {planner} with authority {AUTHORITY}"),
+        )?;
+        control.resume().await.map_err(Failure::of)?;
+        let destination = SetDestination {
+            x,
+            y,
+            approved: jaus::messages::ground::set_destination::Approved::YES,
+            ..SetDestination::default()
+        };
+        control.deliver(&destination).await.map_err(Failure::of)?;
+        self.tell(
+            Who::Operator,
+            format!("wants the vehicle at x {x} m, y {y} m, and approves whatever path there is"),
+        )?;
+        let ending = self.watch(planner, sensor).await;
+        self.leave(control).await;
+        ending
+    }
+
+    async fn find(&self, urn: &str) -> Result<JausId, Failure> {
+        self.component.find(urn).await.map_err(Failure::of)
+    }
+
+    /// Tells the stages as they come, and where the vehicle is meanwhile.
+    async fn watch(&mut self, planner: JausId, sensor: JausId) -> Result<Ending, Failure> {
+        let component = self.component.clone();
+        let mut missions = component
+            .subscribe::<ReportMission, _>(planner, &QueryMission {}, When::OnChange)
+            .await
+            .map_err(Failure::of)?;
+        let mut looks = tokio::time::interval(LOOK);
+        let mut told = None;
+        loop {
+            let report = tokio::select! {
+                update = missions.next() => match update {
+                    Some(Update::Report(report)) => report,
+                    Some(Update::Down { why, .. }) => {
+                        self.tell(Who::Operator, format!("hears nothing from the planner: {why}"))?;
+                        continue;
+                    }
+                    Some(Update::Up) => continue,
+                    None => return Err(Failure::new("the planner has gone")),
+                },
+                _ = looks.tick() => {
+                    if told == Some(Stage::DRIVING) {
+                        self.tell_pose(sensor).await?;
+                    }
+                    continue;
+                }
+            };
+            if told == Some(report.stage) {
+                continue;
+            }
+            told = Some(report.stage);
+            self.tell_stage(planner, &report).await?;
+            match report.stage {
+                Stage::ARRIVED => {
+                    self.tell_pose(sensor).await?;
+                    return Ok(Ending::Arrived);
+                }
+                Stage::FAILED | Stage::STOPPED => return Ok(Ending::Stopped),
+                _ => {}
+            }
+        }
+    }
+
+    async fn tell_stage(&mut self, planner: JausId, report: &ReportMission) -> Result<(), Failure> {
+        let mut words = match report.stage {
+            Stage::MAP => "asks the knowledge store for the map".to_owned(),
+            Stage::PLANNING => "looks for a path on it".to_owned(),
+            Stage::AWAITING_APPROVAL => "has a path, and waits for approval".to_owned(),
+            Stage::PATH => format!(
+                "hands {} to the path segment driver: {:.1} m",
+                self.pieces(planner).await,
+                report.remaining
+            ),
+            Stage::VECTOR => {
+                "the path segment driver takes the vector driver under control".to_owned()
+            }
+            Stage::PRIMITIVE => {
+                "the vector driver takes the primitive driver under control".to_owned()
+            }
+            Stage::DRIVING => "all stages obey: under way".to_owned(),
+            Stage::ARRIVED => "arrived".to_owned(),
+            Stage::FAILED => "gives up".to_owned(),
+            Stage::STOPPED => "stopped".to_owned(),
+            _ => return Ok(()),
+        };
+        let reason = report.reason.to_string();
+        if !reason.is_empty() {
+            words = format!("{words} ({reason})");
+        }
+        if report.attempt > 1 {
+            words = format!("{words}; attempt {} of {}", report.attempt, report.attempts);
+        }
+        self.tell(Who::Planner, words)
+    }
+
+    /// How many pieces the path has, in words.
+    async fn pieces(&self, planner: JausId) -> String {
+        let report: Result<ReportPlannedPath, _> =
+            self.component.query(planner, &QueryPlannedPath {}).await;
+        match report.map(|path| path.point_list.len().saturating_sub(1)) {
+            Ok(1) => "a straight path".to_owned(),
+            Ok(pieces) if pieces > 1 => format!("a path of {pieces} pieces"),
+            _ => "the path".to_owned(),
+        }
+    }
+
+    async fn tell_pose(&mut self, sensor: JausId) -> Result<(), Failure> {
+        let query = QueryLocalPose {
+            presence_vector: POSE,
+        };
+        let pose: Result<ReportLocalPose, _> = self.component.query(sensor, &query).await;
+        match pose {
+            Ok(pose) => self.tell(
+                Who::Vehicle,
+                format!(
+                    "at x {:.1} m, y {:.1} m, heading {:.0}°",
+                    pose.x_m().unwrap_or_default(),
+                    pose.y_m().unwrap_or_default(),
+                    pose.yaw_rad()
+                        .unwrap_or_default()
+                        .to_degrees()
+                        .rem_euclid(360.0)
+                ),
+            ),
+            Err(error) => self.tell(Who::Vehicle, format!("does not tell where it is: {error}")),
+        }
+    }
+
+    /// Gives control back, unless somebody else has it by now.
+    async fn leave(&mut self, control: Control) {
+        if control.is_held() {
+            control.release().await;
+        }
+    }
+
+    fn tell(&mut self, who: Who, words: impl std::fmt::Display) -> Result<(), Failure> {
+        self.story.tell(who, words)
+    }
+}

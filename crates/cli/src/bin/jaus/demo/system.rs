@@ -1,0 +1,111 @@
+//! The whole G-Bat in one process: three nodes of the vehicle and the operator's, each part a task of
+//! its own, all on loopback. The parts are those that the programs `jaus-…` run.
+
+use std::convert::Infallible;
+use std::path::PathBuf;
+use std::{fs, process};
+
+use jaus::address::JausId;
+use jaus::component::Kind;
+use jaus::node::{Config, Node};
+use jaus::parts::{KnowledgeStore, Part, PartError, Seat};
+use jaus_cli::failure::Failure;
+use tokio::task::JoinSet;
+
+/// The operator's subsystem.
+pub(super) const OPERATOR: u16 = 42;
+/// The vehicle's subsystem.
+pub(super) const VEHICLE: u16 = 101;
+/// What the vehicle is called.
+pub(super) const NAME: &str = "G-Bat";
+
+/// Nodes and the parts that run on them.
+pub(super) struct System {
+    nodes: Vec<Node>,
+    /// Where the knowledge store keeps its file as long as the demo runs.
+    scratch: Scratch,
+    parts: JoinSet<(&'static str, PartError)>,
+}
+
+impl System {
+    /// Nobody yet.
+    pub(super) fn new() -> Self {
+        Self {
+            nodes: Vec::new(),
+            scratch: Scratch(
+                std::env::temp_dir().join(format!("jaus-demo-{}.redb", process::id())),
+            ),
+            parts: JoinSet::new(),
+        }
+    }
+
+    /// A knowledge store with the map that a vehicle is shown on.
+    pub(super) fn store(&self) -> KnowledgeStore {
+        KnowledgeStore {
+            file: self.scratch.0.clone(),
+            map: Some(KnowledgeStore::demo_map()),
+            ..KnowledgeStore::default()
+        }
+    }
+
+    /// Another node, on loopback.
+    pub(super) fn node(&mut self, subsystem: u16, number: u8) -> Result<Node, Failure> {
+        let node = Node::start(Config::loopback(subsystem, number)).map_err(Failure::of)?;
+        self.nodes.push(node.clone());
+        Ok(node)
+    }
+
+    /// Another part, under a component number of a node.
+    pub(super) fn start(
+        &mut self,
+        node: &Node,
+        number: u8,
+        name: &'static str,
+        part: impl Part,
+    ) -> Result<JausId, Failure> {
+        let port = node.attach(number).map_err(Failure::of)?;
+        let id = port.id();
+        let (kind, subsystem) = match id.subsystem() {
+            OPERATOR => (Kind::OperatorControlUnit, "Operator"),
+            _ => (Kind::Vehicle, NAME),
+        };
+        let seat = Seat {
+            port,
+            node: Some(node.clone()),
+            kind,
+            name: subsystem.to_owned(),
+        };
+        self.parts.spawn(async move {
+            let Err(error): Result<Infallible, _> = part.run(seat).await;
+            (name, error)
+        });
+        Ok(id)
+    }
+
+    /// Waits until a part can not go on, which none should come to.
+    pub(super) async fn failure(&mut self) -> Failure {
+        match self.parts.join_next().await {
+            Some(Ok((name, error))) => Failure::new(format!("the {name} can not go on: {error}")),
+            Some(Err(error)) => Failure::new(format!("a part has ended: {error}")),
+            None => std::future::pending().await,
+        }
+    }
+
+    /// Ends all parts, then the nodes.
+    pub(super) async fn stop(mut self) {
+        self.parts.shutdown().await;
+        for node in self.nodes {
+            node.shutdown().await;
+        }
+    }
+}
+
+/// A file that is removed in the end.
+struct Scratch(PathBuf);
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // It may never have been made.
+        let _ = fs::remove_file(&self.0);
+    }
+}

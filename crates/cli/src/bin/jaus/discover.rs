@@ -1,0 +1,108 @@
+//! `jaus discover`: who is there, and what they offer.
+
+use std::time::Duration;
+
+use clap::Args;
+use jaus::component::{Component, Kind};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::network::Network;
+use jaus_cli::output::{Output, say};
+use jaus_cli::runtime::{self, Clock};
+use jaus_cli::tree;
+
+/// Show subsystems, nodes, components and their services
+///
+/// Looks for a moment, and prints the tree of what was found. Exit status 1 means that nobody was
+/// there.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus discover\n  \
+    jaus discover --watch\n  \
+    jaus discover --interface eth0 --seconds 10 --json | jq\n  \
+    jaus discover --peer 192.168.7.2      where multicast does not reach\n  \
+    jaus discover --attach                beside the components of this host's node\n  \
+    jaus discover --loopback              finds `jaus demo` in another terminal")]
+pub(crate) struct Discover {
+    /// Go on, and print who comes, changes and goes; Ctrl-C ends it
+    #[arg(long)]
+    watch: bool,
+
+    /// Print JSON: the tree as one object, or with --watch one object for each change
+    #[arg(long)]
+    json: bool,
+
+    /// How long to look [default: 3; with --watch without end]
+    #[arg(long, value_parser = runtime::seconds)]
+    seconds: Option<Duration>,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+/// How long to look if nobody says.
+const LOOK: Duration = Duration::from_secs(3);
+
+impl Discover {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        runtime::run(async {
+            let (port, stay) = self.network.join_for_a_moment().await?;
+            // As a guest it has a name for itself alone, and none for the subsystem that it is in.
+            let subsystem = if stay.is_guest() { "" } else { "jaus discover" };
+            let component = Component::builder(Kind::OtherSubsystem, subsystem)
+                .component_name("jaus discover")
+                .live_on(port)
+                .map_err(Failure::of)?;
+            let outcome = if self.watch {
+                self.watch(&component).await
+            } else {
+                runtime::end(Some(self.seconds.unwrap_or(LOOK))).await;
+                self.print_tree(&component)
+            };
+            drop(component);
+            stay.end().await;
+            outcome
+        })
+    }
+
+    fn print_tree(&self, component: &Component) -> Result<Outcome, Failure> {
+        let mut output = Output::new();
+        let directory = component.directory();
+        let lines = tree::lines(&directory, Some(component.id()));
+        if self.json {
+            output.line(tree::json(&directory, component.id()))?;
+        } else {
+            lines.iter().try_for_each(|line| output.line(line))?;
+        }
+        if lines.is_empty() {
+            let seconds = self.seconds.unwrap_or(LOOK).as_secs_f64();
+            say(format_args!(
+                "nobody answered within {seconds} s. --interface chooses the network, --peer \
+                 reaches where multicast does not, --seconds looks longer"
+            ));
+        }
+        Ok(Outcome::complete_if(!lines.is_empty()))
+    }
+
+    async fn watch(&self, component: &Component) -> Result<Outcome, Failure> {
+        let mut output = Output::new();
+        let mut changes = component.watch();
+        let end = runtime::end(self.seconds);
+        tokio::pin!(end);
+        let clock = Clock::start();
+        loop {
+            let change = tokio::select! {
+                () = &mut end => return Ok(Outcome::Done),
+                change = changes.next() => change,
+            };
+            let Some(change) = change else {
+                return Err(Failure::new("the node has stopped"));
+            };
+            let directory = component.directory();
+            if self.json {
+                output.line(tree::change_json(change, &directory))?;
+            } else if let Some(words) = tree::in_words(change, &directory) {
+                output.line(format_args!("{clock}  {words}"))?;
+            }
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! `jaus doctor`: looks at everything that keeps nodes from finding each other, and says what to
+//! do. One file per check; a check gives [`Finding`]s. With `--peer` it examines one peer instead:
+//! see [`peer`].
+
+mod finding;
+mod host;
+mod neighbours;
+mod peer;
+mod port;
+mod ra;
+
+use std::time::Duration;
+
+use clap::Args;
+use serde_json::json;
+
+use self::finding::{Finding, Mark};
+use self::peer::{Target, Wish};
+use jaus::node::Config;
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::network::Network;
+use jaus_cli::output::{Output, colours_wanted, say};
+use jaus_cli::runtime;
+
+/// Find out why nodes do not find each other
+///
+/// Looks at this host's interfaces, port, buffers and clock, then goes on the network for a
+/// moment: does multicast come back, who is there, do two of them have one id? It needs no
+/// rights. Give it the flags or the settings file of the node that does not work. Exit status: 0
+/// all is well, 1 there are warnings, 2 there are problems.
+///
+/// With --peer it examines one peer: recognises it, and tries the exchanges with it one by one, in
+/// the order in which integrations fail. Nothing is commanded. Exit status: 0 all went well, 1 some
+/// exchange failed, 2 nothing can be exchanged.
+#[derive(Args)]
+#[command(mut_arg("peer", |peer| peer.long("unicast")))]
+#[command(after_help = "Examples:\n  \
+    jaus doctor\n  \
+    jaus doctor --config node.toml        with the settings of a node\n  \
+    jaus doctor --id 101.1.1              and whether somebody has that id already\n  \
+    jaus doctor --interface eth0 --seconds 10\n  \
+    jaus doctor --peer 192.168.7.2        what works with whoever is there\n  \
+    jaus doctor --peer 77.1.1             the same, found by its id\n  \
+    jaus doctor --json | jq '.findings[] | select(.mark != \"ok\")'")]
+pub(crate) struct Doctor {
+    /// Examine this peer: an id (77.1.1), an address (192.168.7.2 or 192.168.7.2:3795), or both
+    /// (77.1.1@192.168.7.2)
+    // The network's flag for peers has this one's usual id.
+    #[arg(id = "examined", long = "peer", value_name = "ADDRESS")]
+    examined: Option<Target>,
+
+    /// Take control of the peer and release it again, if nobody has it
+    #[arg(long, requires = "examined")]
+    control: bool,
+
+    /// How long to listen to the network [default: 3; with --peer 6 at most]
+    #[arg(long, value_parser = runtime::seconds)]
+    seconds: Option<Duration>,
+
+    /// Print the findings as one JSON object
+    #[arg(long)]
+    json: bool,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+/// How long to listen if nobody says.
+const LISTEN: Duration = Duration::from_secs(3);
+
+impl Doctor {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        if let Some(target) = self.examined {
+            let (id, config) = self.network.for_examination()?;
+            let wish = Wish {
+                target,
+                listen: self.seconds,
+                control: self.control,
+                json: self.json,
+                colours: colours_wanted(&std::io::stdout()),
+            };
+            return runtime::run(peer::examine(wish, id, config));
+        }
+        let mut report = Report {
+            output: Output::new(),
+            colours: colours_wanted(&std::io::stdout()),
+            json: self.json,
+            findings: Vec::new(),
+        };
+        runtime::run(self.examine(&mut report))?;
+        report.close()
+    }
+
+    async fn examine(&self, report: &mut Report) -> Result<(), Failure> {
+        let (id, config) = match self.network.for_examination() {
+            Ok(settings) => settings,
+            Err(failure) => {
+                let advice = "correct it: nothing else can be looked at before";
+                return report.add(Finding::problem("settings", failure).advice(advice));
+            }
+        };
+        if self.network.has_file() {
+            report.add(Finding::ok("settings", "the settings file can be read"))?;
+        }
+        report.add_all(ways(&config))?;
+        report.add_all(port::check_tcp(&config))?;
+        let listen = self.seconds.unwrap_or(LISTEN);
+        if !self.json {
+            let seconds = listen.as_secs_f64();
+            say(format_args!("listening to the network for {seconds} s …"));
+        }
+        let clock = host::ClockWatch::start();
+        report.add_all(neighbours::look(config, id, listen).await)?;
+        report.add(clock.finish())
+    }
+}
+
+/// What leads to the network: interfaces and ports, or Junior.
+fn ways(config: &Config) -> Vec<Finding> {
+    #[cfg(unix)]
+    if let Some(folder) = &config.junior {
+        return vec![port::check_junior(folder)];
+    }
+    let (interfaces, mut findings) = host::interfaces(config);
+    findings.splice(0..0, host::buffers(config));
+    let ports = interfaces.iter().flat_map(|it| port::check(config, it));
+    findings.extend(ports);
+    findings
+}
+
+/// What was found so far; printed as it is found, or at the end as JSON.
+struct Report {
+    output: Output,
+    colours: bool,
+    json: bool,
+    findings: Vec<Finding>,
+}
+
+impl Report {
+    fn add(&mut self, finding: Finding) -> Result<(), Failure> {
+        if !self.json {
+            self.output.line(finding.in_words(self.colours))?;
+        }
+        self.findings.push(finding);
+        Ok(())
+    }
+
+    fn add_all(&mut self, findings: impl IntoIterator<Item = Finding>) -> Result<(), Failure> {
+        findings
+            .into_iter()
+            .try_for_each(|finding| self.add(finding))
+    }
+
+    fn close(mut self) -> Result<Outcome, Failure> {
+        let count = |mark| self.findings.iter().filter(|f| f.mark == mark).count();
+        let (problems, warnings) = (count(Mark::Problem), count(Mark::Warning));
+        if self.json {
+            let findings: Vec<_> = self.findings.iter().map(Finding::to_json).collect();
+            self.output.line(json!({
+                "problems": problems,
+                "warnings": warnings,
+                "findings": findings,
+            }))?;
+        } else {
+            let counted = |count: usize, what: &str| match count {
+                1 => format!("1 {what}"),
+                _ => format!("{count} {what}s"),
+            };
+            self.output.line(match (problems, warnings) {
+                (0, 0) => "\nAll is well.".to_owned(),
+                _ => format!(
+                    "\n{}, {}.",
+                    counted(problems, "problem"),
+                    counted(warnings, "warning")
+                ),
+            })?;
+        }
+        Ok(match (problems, warnings) {
+            (0, 0) => Outcome::Done,
+            (0, _) => Outcome::Incomplete,
+            _ => Outcome::Broken,
+        })
+    }
+}

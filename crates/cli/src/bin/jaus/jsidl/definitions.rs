@@ -1,0 +1,79 @@
+//! Loading definitions for a subcommand, and printing what is wrong with them.
+
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use jaus_cli::failure::Failure;
+use jaus_cli::output::colours_wanted;
+use jsidl::model::Service;
+use jsidl::{Diagnostic, Diagnostics, Loaded, Loader, Style, catalogue};
+
+/// The name of standard input among paths.
+pub(crate) const STANDARD_INPUT: &str = "-";
+
+/// The definitions of these paths, which may refer to the built-in ones.
+pub(crate) fn load(paths: &[PathBuf]) -> Result<Loaded, Failure> {
+    let mut loader = Loader::new();
+    for path in paths {
+        if path == Path::new(STANDARD_INPUT) {
+            loader.text("standard input", &standard_input()?);
+            continue;
+        }
+        path.metadata()
+            .map_err(|error| Failure::file(path, &error))?;
+        loader.path(path);
+    }
+    loader.catalogue();
+    Ok(loader.load())
+}
+
+pub(crate) fn standard_input() -> Result<String, Failure> {
+    let mut text = String::new();
+    io::stdin()
+        .read_to_string(&mut text)
+        .map_err(|error| Failure::new(format!("cannot read standard input: {error}")))?;
+    Ok(text)
+}
+
+/// What is found in the user's own files. Built-in definitions may suffer from them, but that is
+/// not what the user can mend.
+pub(crate) fn own_findings(loaded: &Loaded) -> Vec<&Diagnostic> {
+    let findings = loaded.diagnostics.iter();
+    findings
+        .filter(|finding| !catalogue::holds(&finding.location))
+        .collect()
+}
+
+/// The services of the user's own files.
+pub(crate) fn own_services(loaded: &Loaded) -> impl Iterator<Item = &Arc<Service>> + Clone {
+    let services = loaded.library.services();
+    services.filter(|service| !catalogue::holds(&service.location))
+}
+
+/// Prints a finding on standard error. If nobody reads that, it is not said.
+pub(crate) fn complain(diagnostics: &Diagnostics, finding: &Diagnostic) {
+    let _ = writeln!(
+        io::stderr().lock(),
+        "{}",
+        diagnostics.excerpt(finding, style())
+    );
+}
+
+/// How excerpts look on this standard output or terminal.
+pub(crate) fn style() -> Style {
+    Style {
+        colours: colours_wanted(&io::stdout()),
+        width: terminal_size::terminal_size()
+            .map_or(Style::default().width, |(width, _)| usize::from(width.0)),
+    }
+}
+
+/// For example `no errors`, `1 error`, `2 errors`.
+pub(crate) fn counted(count: usize, what: &str) -> String {
+    match count {
+        0 => format!("no {what}s"),
+        1 => format!("1 {what}"),
+        count => format!("{count} {what}s"),
+    }
+}

@@ -1,0 +1,124 @@
+//! `jaus jsidl diff`: what changed between two sets of definitions, and whether the wire is affected.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use jaus_cli::failure::Failure;
+use jaus_cli::output::Output;
+use jsidl::diff::{Change, compare};
+use jsidl::model::Location;
+use jsidl::{Loaded, Severity, catalogue};
+use serde_json::{Value, json};
+
+use super::definitions::{complain, counted, load, own_findings};
+
+/// Compare two sets of service definitions, and tell whether the wire is affected
+///
+/// It is affected if two parties, one built from each side, would misunderstand each other or miss a
+/// message. Such changes are marked with !. Descriptions and state machines are not compared. Exit
+/// status: 0 the wire is as it was; 1 it is affected; 2 a side cannot be read or has errors.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus jsidl diff old/Lights.xml new/Lights.xml\n  \
+    jaus jsidl diff --json released-services/ my-services/ | jq 'select(.wire)'\n  \
+    git show v1.0:Lights.xml | jaus jsidl diff - Lights.xml")]
+pub(crate) struct Arguments {
+    /// A JSIDL file, or a directory with `.xml` files; - is standard input
+    #[arg(value_name = "OLD")]
+    old: PathBuf,
+
+    /// What OLD has become
+    #[arg(value_name = "NEW")]
+    new: PathBuf,
+
+    /// Print every change as one JSON object a line, and no summary
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let old = sound(&arguments.old)?;
+    let new = sound(&arguments.new)?;
+    let own = |service: &jsidl::model::Service| !catalogue::holds(&service.location);
+    let changes = compare(&old.library, &new.library, own);
+    let wire = changes.iter().filter(|change| change.wire).count();
+    let mut output = Output::new();
+    if arguments.json {
+        for change in &changes {
+            output.line(to_json(change))?;
+        }
+    } else {
+        print(&mut output, &changes)?;
+        output.line(summary(changes.len(), wire))?;
+    }
+    Ok(ExitCode::from(u8::from(wire > 0)))
+}
+
+/// The definitions of a side. What has errors is not there to be compared, so there may be none.
+fn sound(path: &Path) -> Result<Loaded, Failure> {
+    let loaded = load(&[path.to_owned()])?;
+    let findings = own_findings(&loaded);
+    let errors: Vec<_> = findings
+        .into_iter()
+        .filter(|finding| finding.severity == Severity::Error)
+        .collect();
+    for error in &errors {
+        complain(&loaded.diagnostics, error);
+    }
+    if errors.is_empty() {
+        return Ok(loaded);
+    }
+    Err(Failure::new(format!(
+        "{}: {}; mend that first, then compare",
+        path.display(),
+        counted(errors.len(), "error")
+    )))
+}
+
+/// The changes of each service under its name.
+fn print(output: &mut Output, changes: &[Change]) -> Result<(), Failure> {
+    let mut service = None;
+    for change in changes {
+        if service != Some(&change.service) {
+            output.line(&change.service)?;
+            service = Some(&change.service);
+        }
+        let mark = if change.wire { '!' } else { ' ' };
+        let path = change.path.join(" / ");
+        let colon = if path.is_empty() { "" } else { ": " };
+        output.line(format_args!("{mark} {path}{colon}{change}"))?;
+    }
+    Ok(())
+}
+
+fn summary(changes: usize, wire: usize) -> String {
+    match (changes, wire) {
+        (0, _) => "no changes".to_owned(),
+        (changes, 0) => format!("{}; the wire is as it was", counted(changes, "change")),
+        (changes, wire) => format!(
+            "{}; the wire is affected by {wire} (marked with !)",
+            counted(changes, "change")
+        ),
+    }
+}
+
+fn to_json(change: &Change) -> Value {
+    let place = |location: &Option<Location>| {
+        location.as_ref().map(|location| {
+            json!({
+                "file": location.file.display().to_string(),
+                "line": location.line,
+                "column": location.column,
+            })
+        })
+    };
+    json!({
+        "service": change.service.to_string(),
+        "path": change.path,
+        "message": change.message,
+        "wire": change.wire,
+        "old": place(&change.old),
+        "new": place(&change.new),
+    })
+}

@@ -1,0 +1,154 @@
+//! `jaus jsidl fmt`: lays definitions out.
+
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+use jaus_cli::failure::Failure;
+use jaus_cli::output::{Output, say};
+use jsidl::{Diagnostics, format};
+
+use super::definitions::{STANDARD_INPUT, complain, counted, standard_input};
+
+/// How the namespaces of the language begin.
+const NAMESPACE: &str = "urn:jaus:jsidl:";
+
+/// Lay service definitions out: indentation, order of attributes, line width
+///
+/// Two blanks a level, attributes in one order, lines of at most 116 characters; comments, texts and
+/// the meaning stay. Files are replaced as a whole or not at all. Exit status: 0 all is laid out;
+/// 1 with --check, a file is not, or a file is no definition; 2 a path that cannot be read.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus jsidl fmt my-services/\n  \
+    jaus jsidl fmt --check my-services/\n  \
+    jaus jsidl fmt - < Lights.xml")]
+pub(crate) struct Arguments {
+    /// JSIDL files, and directories with `.xml` files; - lays standard input out to standard output
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+
+    /// Change nothing, and name the files that would be changed
+    #[arg(long)]
+    check: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let mut run = Run {
+        check: arguments.check,
+        output: Output::new(),
+        changed: 0,
+        same: 0,
+        faulty: 0,
+    };
+    for path in &arguments.paths {
+        if path == Path::new(STANDARD_INPUT) {
+            run.standard_input()?;
+        } else if path.is_dir() {
+            let files = jsidl::definition_files(path).map_err(Failure::new)?;
+            if files.is_empty() {
+                say(format_args!(
+                    "{}: there is no `.xml` file here",
+                    path.display()
+                ));
+            }
+            for file in files {
+                run.file(&file, true)?;
+            }
+        } else {
+            run.file(path, false)?;
+        }
+    }
+    run.summary();
+    let failed = run.faulty > 0 || (run.check && run.changed > 0);
+    Ok(ExitCode::from(u8::from(failed)))
+}
+
+struct Run {
+    check: bool,
+    output: Output,
+    changed: usize,
+    same: usize,
+    faulty: usize,
+}
+
+impl Run {
+    fn standard_input(&mut self) -> Result<(), Failure> {
+        let text = standard_input()?;
+        match format::format("standard input", &text) {
+            Err(findings) => self.report(&findings),
+            Ok(laid_out) if self.check => self.count(laid_out == text),
+            Ok(laid_out) => self.output.part(&laid_out)?,
+        }
+        Ok(())
+    }
+
+    /// A file that was `found` in a directory and is no definition is passed over.
+    fn file(&mut self, path: &Path, found: bool) -> Result<(), Failure> {
+        let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
+        match format::format(path, &text) {
+            Err(_) if found && !text.contains(NAMESPACE) => {}
+            Err(findings) => self.report(&findings),
+            Ok(laid_out) if laid_out == text => self.count(true),
+            Ok(laid_out) => {
+                self.output.line(path.display())?;
+                self.count(false);
+                if !self.check {
+                    replace(path, &laid_out).map_err(|error| Failure::file(path, &error))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn count(&mut self, same: bool) {
+        if same {
+            self.same += 1;
+        } else {
+            self.changed += 1;
+        }
+    }
+
+    fn report(&mut self, findings: &Diagnostics) {
+        self.faulty += 1;
+        for finding in findings {
+            complain(findings, finding);
+        }
+    }
+
+    fn summary(&self) {
+        if self.changed + self.same == 0 {
+            return;
+        }
+        let changed = counted(self.changed, "file");
+        let what = if self.check {
+            "to be laid out"
+        } else {
+            "laid out"
+        };
+        say(format_args!("{changed} {what}, {} as before", self.same));
+    }
+}
+
+/// Puts a text in the place of a file: a reader sees the old one or the new one, whole.
+fn replace(path: &Path, text: &str) -> std::io::Result<()> {
+    // A link stays a link.
+    let path = fs::canonicalize(path)?;
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(std::format!(".{}.tmp", std::process::id()));
+    let beside = path.with_file_name(name);
+    let written = write(&beside, text, &path).and_then(|()| fs::rename(&beside, &path));
+    if written.is_err() {
+        let _ = fs::remove_file(&beside);
+    }
+    written
+}
+
+fn write(beside: &Path, text: &str, path: &Path) -> std::io::Result<()> {
+    let mut file = File::create_new(beside)?;
+    file.set_permissions(fs::metadata(path)?.permissions())?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()
+}

@@ -1,0 +1,56 @@
+//! `jaus jsidl`: work on service definitions, one file per subcommand.
+
+mod check;
+mod datagram;
+mod definitions;
+mod diff;
+mod docs;
+mod explain;
+mod fmt;
+mod lua;
+mod ra;
+mod rust;
+mod schema;
+mod sources;
+
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+use jaus_cli::failure::Failure;
+
+/// Check, compare and lay out service definitions (JSIDL), and make things from them
+#[derive(Args)]
+#[command(after_help = "Begin with `jaus jsidl check my-services/`.\n\n\
+    Wherever definitions are read, they may refer to the built-in ones (the core set and all others \
+    that come with this program) without naming them.")]
+pub(crate) struct Jsidl {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Check(check::Arguments),
+    Fmt(fmt::Arguments),
+    Diff(diff::Arguments),
+    Rust(rust::Arguments),
+    Lua(lua::Arguments),
+    Docs(docs::Arguments),
+    Schema(schema::Arguments),
+    Explain(explain::Arguments),
+}
+
+impl Jsidl {
+    pub(crate) fn run(self) -> Result<ExitCode, Failure> {
+        match self.command {
+            Command::Check(arguments) => check::run(&arguments),
+            Command::Fmt(arguments) => fmt::run(&arguments),
+            Command::Diff(arguments) => diff::run(&arguments),
+            Command::Rust(arguments) => rust::run(&arguments),
+            Command::Lua(arguments) => lua::run(&arguments),
+            Command::Docs(arguments) => docs::run(&arguments),
+            Command::Schema(arguments) => schema::run(&arguments),
+            Command::Explain(arguments) => explain::run(&arguments),
+        }
+    }
+}

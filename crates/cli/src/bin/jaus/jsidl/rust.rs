@@ -1,0 +1,78 @@
+//! `jaus jsidl rust`: typed messages for services of a user's own.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use jaus_cli::failure::Failure;
+use jaus_cli::output::{Output, say};
+use jsidl::model::Service;
+
+use super::sources::{self, Sources};
+
+/// Write the messages of your services as a Rust module
+///
+/// The messages of the built-in services are in the crate `jaus`, and yours may refer to them.
+/// Definitions with errors are not written.
+#[derive(Args)]
+#[command(after_help = "Example:\n  \
+    jaus jsidl rust services/ -o src\n\n\
+    A crate with a dependency on `jaus` then says:\n\n  \
+    mod messages;\n\n\
+    It is less work to let the build do it. With the crate `jsidl` among the build-dependencies, \
+    this is all of build.rs:\n\n  \
+    fn main() {\n      \
+        jsidl::build::Build::new().path(\"services\").module(\"messages\", \"urn:example:\").run();\n  \
+    }\n\n\
+    and this brings the messages in:\n\n  \
+    pub mod messages {\n      \
+        include!(concat!(env!(\"OUT_DIR\"), \"/messages.rs\"));\n  \
+    }\n\n\
+    Exit status: 0 written; 1 not written, because a definition has errors; 2 not written.")]
+pub(crate) struct Arguments {
+    /// JSIDL files, and directories with `.xml` files
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+
+    /// The directory to write to
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+
+    /// What the module, and its file, is called
+    #[arg(long, value_name = "NAME", default_value = "messages", value_parser = module)]
+    module: String,
+
+    /// Where the generated code finds the codec runtime
+    #[arg(long, value_name = "RUST_PATH", default_value = "::jaus::codec")]
+    runtime: String,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
+    let Sources { loaded, sound } = sources::load(&arguments.paths)?;
+    if !sound {
+        say("nothing was written: mend the definitions first; `jaus jsidl check` says more");
+        return Ok(ExitCode::from(1));
+    }
+    let library = sources::own(&loaded);
+    if library.services().next().is_none() {
+        return Err(Failure::new("these files define no service"));
+    }
+    let services = library.services().map(AsRef::<Service>::as_ref);
+    let text = jsidl::rust::module(&loaded.library, services, &arguments.runtime);
+    let path = arguments.output.join(format!("{}.rs", arguments.module));
+    sources::write(&path, &text)?;
+    let summary = sources::summary(&library);
+    Output::new().line(format_args!("{}: {summary}", path.display()))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A name that can be that of a module.
+fn module(name: &str) -> Result<String, String> {
+    let starts_well = name.starts_with(|c: char| c.is_ascii_lowercase() || c == '_');
+    let goes_on_well = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    if starts_well && name.chars().all(goes_on_well) {
+        Ok(name.to_owned())
+    } else {
+        Err("a module is called by lower-case letters, digits and _".to_owned())
+    }
+}

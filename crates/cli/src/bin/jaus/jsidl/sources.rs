@@ -1,0 +1,75 @@
+//! The definitions that something is to be made from, and the files that are made.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use jaus_cli::failure::Failure;
+use jsidl::model::Service;
+use jsidl::{Library, Loaded, Severity, catalogue};
+
+use super::definitions::{self, counted};
+
+/// What was loaded, with what is wrong in it said on standard error.
+pub(super) struct Sources {
+    pub(super) loaded: Loaded,
+    /// Whether the user's own files are without errors.
+    pub(super) sound: bool,
+}
+
+/// Loads files and directories, which may refer to each other and to the built-in definitions.
+pub(super) fn load(paths: &[PathBuf]) -> Result<Sources, Failure> {
+    let loaded = definitions::load(paths)?;
+    let mut sound = true;
+    for finding in definitions::own_findings(&loaded) {
+        if finding.severity == Severity::Error {
+            definitions::complain(&loaded.diagnostics, finding);
+            sound = false;
+        }
+    }
+    Ok(Sources { loaded, sound })
+}
+
+/// The services of the user's own files alone.
+pub(super) fn own(loaded: &Loaded) -> Library {
+    let mut own = Library::default();
+    for service in definitions::own_services(loaded) {
+        own.insert(service.clone());
+    }
+    own
+}
+
+/// Writes a file, and makes the directories that lead to it.
+pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    if let Some(parent) = path
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty())
+    {
+        fs::create_dir_all(parent).map_err(|error| Failure::file(parent, &error))?;
+    }
+    fs::write(path, text).map_err(|error| Failure::file(path, &error))
+}
+
+/// For example `3 services with 14 messages`.
+pub(super) fn summary(library: &Library) -> String {
+    let messages = library.services().map(|s| s.messages().count()).sum();
+    format!(
+        "{} with {}",
+        counted(library.services().count(), "service"),
+        counted(messages, "message")
+    )
+}
+
+/// Which services something is made of: the user's own, or all if no paths are given.
+pub(super) fn wanted<P>(
+    library: &Library,
+    paths: &[P],
+) -> Result<impl Fn(&Service) -> bool + use<P>, Failure> {
+    let all = paths.is_empty();
+    let wanted = move |service: &Service| all || !catalogue::holds(&service.location);
+    if library.services().any(|service| wanted(service)) {
+        return Ok(wanted);
+    }
+    Err(Failure::new(
+        "no service is usable in these files; `jaus jsidl check` says why",
+    ))
+}

@@ -1,0 +1,267 @@
+//! `jaus judge`: puts a component through the acceptance tests of the public JAUS contests, and
+//! says in words what is wrong.
+
+mod json;
+mod junit;
+mod memory;
+mod panel;
+mod papers;
+mod recording;
+mod report;
+mod runner;
+mod script;
+mod step;
+mod subject;
+mod verdict;
+mod watch;
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use clap::Args;
+use jaus::address::JausId;
+use jaus::view::Dictionary;
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::network::Network;
+use jaus_cli::output::{Output, say};
+use jaus_cli::runtime;
+
+use panel::Panel;
+use papers::Papers;
+use recording::Recording;
+use runner::Runner;
+use step::{Form, Name, Step};
+use subject::Subject;
+
+/// The judge's main component, as in the contests; the others are 42.2.1 to 42.2.4.
+const MAIN: JausId = JausId::new(42, 1, 1);
+
+/// Judge whether a component does what the public JAUS contests ask of it
+///
+/// Part A are the six tasks of the 2010 challenge, part B the 36 steps of the interface tasks since
+/// 2014, as their judging tool was seen to ask them, and part C what their judges look for besides:
+/// that a vehicle moves only for the client in control, and stops in standby, in an emergency and
+/// after control is released, although new efforts go on arriving 10 times a second: an effort that
+/// expires by itself proves nothing. Five components of the judge ask, subscribe, take control from
+/// one another and declare emergencies; --id moves the first of them, and the other four, 1 to 4,
+/// are on the node beside it. Every step is judged by the answers that the
+/// standard requires, within the time limit. Steps that need a service which the component does not
+/// list are skipped, and counted. What is said by multicast goes to all components of the node.
+///
+/// THE COMPONENT IS COMMANDED, AND A VEHICLE DRIVES: in task A6 some 9 metres along its X axis, and
+/// in part C, which sees to it that it stops, a few more.
+///
+/// Exit status 1 means that a step failed, that none applied, or that nobody answered.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus judge 101.1.1\n  \
+    jaus judge 101.1.1 --only B12-B26 --unicast\n  \
+    jaus judge 101.1.1 --peer 192.168.7.2 --junit judge.xml --record judge.pcapng\n  \
+    jaus judge 101.1.1 --json | jq 'select(.verdict == \"failed\") | .step, .reason'")]
+pub(crate) struct Judge {
+    /// Whom to judge: SUBSYSTEM.NODE.COMPONENT
+    #[arg(required_unless_present = "list")]
+    address: Option<JausId>,
+
+    /// How long an answer may take, in seconds
+    #[arg(long, default_value = "1.5", value_parser = seconds)]
+    limit: Duration,
+
+    /// Carry out only these steps, and those that they rest on, such as A1,B14-B19
+    #[arg(long, value_name = "STEPS", value_delimiter = ',')]
+    only: Vec<Span>,
+
+    /// Walk through this service instead of the contests' steps (repeatable): its URN or name
+    ///
+    /// From the service's definition: every query is asked, and its report read and checked; a
+    /// query that ends too early must be ignored; every command that only the controlling client
+    /// may give is given without control, must be ignored, and must leave the service's reports as
+    /// they were. Of Access Control and Management every transition is walked, too: in each state,
+    /// everything that can be said about control and state, by the client in control and by
+    /// another, with what must come, be ignored, and be the state afterwards. Services that inherit
+    /// from them share these states. The transitions of Events are in steps B3 to B10.
+    #[arg(long, value_name = "URN", value_parser = script::service::known, conflicts_with = "only")]
+    service: Vec<&'static str>,
+
+    /// Ask by multicast only [default: first by multicast, then by unicast]
+    #[arg(long, conflicts_with = "unicast")]
+    multicast: bool,
+
+    /// Ask by unicast only, where multicast does not reach
+    #[arg(long)]
+    unicast: bool,
+
+    /// Show what was said in the steps that passed, too
+    #[arg(long)]
+    all: bool,
+
+    /// Only list the steps
+    #[arg(long)]
+    list: bool,
+
+    /// Write JSON lines, one for each step, instead of the report; or, with a file, beside it
+    #[arg(
+        long,
+        value_name = "FILE",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "-",
+    )]
+    json: Option<PathBuf>,
+
+    /// Write the results as JUnit XML
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+
+    /// Record what is said into this file (pcapng, written over), with the step at each packet
+    ///
+    /// The packets are put together from the messages that the judge's components say and hear:
+    /// sequence numbers are not those on the wire.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+/// Steps of one part, from one to another: `B14-B19`, `A1`.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    first: Name,
+    last: Name,
+}
+
+impl FromStr for Span {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        let (first, last): (Name, Name) = (first.parse()?, last.parse()?);
+        let is_there = |name| script::steps().iter().any(|step| step.name == name);
+        for name in [first, last] {
+            if !is_there(name) {
+                return Err(format!(
+                    "there is no step {name}: A1 to A6, B1 to B36, C1 to C5"
+                ));
+            }
+        }
+        if first > last {
+            return Err(format!("{first} comes after {last}: write {last}-{first}"));
+        }
+        Ok(Self { first, last })
+    }
+}
+
+/// A number of seconds, with or without an s behind it.
+fn seconds(text: &str) -> Result<Duration, String> {
+    runtime::seconds(text.strip_suffix('s').unwrap_or(text))
+}
+
+impl Judge {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        if self.list {
+            return self.list();
+        }
+        let Some(address) = self.address.filter(|address| address.is_unicast()) else {
+            return Err(Failure::new(
+                "only one component can be judged at a time: `jaus discover` shows who is there",
+            ));
+        };
+        runtime::run(self.judge(address))
+    }
+
+    /// The steps that are to be carried out.
+    fn steps(&self, subject: Option<&Subject>) -> Vec<Step> {
+        if !self.service.is_empty() {
+            let version = |urn: &str| subject.and_then(|subject| subject.version(urn));
+            return script::service::steps(&self.service, version);
+        }
+        let spans = &self.only;
+        let in_span = |name: Name, span: &Span| (span.first..=span.last).contains(&name);
+        let chosen = |name| spans.is_empty() || spans.iter().any(|span| in_span(name, span));
+        script::selected(script::steps(), chosen)
+    }
+
+    /// What the steps are taken from, in words.
+    fn against(&self) -> String {
+        if self.service.is_empty() {
+            "the contests' script".to_owned()
+        } else {
+            self.service.join(", ")
+        }
+    }
+
+    fn forms(&self) -> Vec<Form> {
+        let both = [
+            (Form::Multicast, self.unicast),
+            (Form::Unicast, self.multicast),
+        ];
+        let wanted = both.into_iter().filter(|&(_, unwanted)| !unwanted);
+        wanted.map(|(form, _)| form).collect()
+    }
+
+    fn list(&self) -> Result<Outcome, Failure> {
+        let mut output = Output::new();
+        for step in self.steps(None) {
+            let names = step.needs.iter().filter_map(|urn| urn.rsplit(':').next());
+            let needs = names.collect::<Vec<_>>().join(", ");
+            output.line(format_args!("{:<3}  {}  ({needs})", step.name, step.title))?;
+        }
+        Ok(Outcome::Done)
+    }
+
+    async fn judge(&self, address: JausId) -> Result<Outcome, Failure> {
+        let (id, config) = self.network.for_own_node_as(MAIN, "jaus judge")?;
+        let recording = self.record.as_deref().map(Recording::create).transpose()?;
+        let dictionary = Dictionary::new();
+        let mut papers = Papers::open(self, &dictionary)?;
+        let mut panel = Panel::start(id, config, address, recording)?;
+        let Some(subject) = Subject::meet(&mut panel, address, self.limit).await? else {
+            panel.end().await?;
+            say(format_args!(
+                "{address} gave no sign of life, so nothing was judged. `jaus discover` shows who \
+                 is there; --interface chooses the network, --peer reaches where multicast does not"
+            ));
+            return Ok(Outcome::Incomplete);
+        };
+        papers.begin(&subject)?;
+        let mut runner = Runner::new(panel, &subject, self.limit);
+        let end = runtime::end(None);
+        tokio::pin!(end);
+        let finished = tokio::select! {
+            () = &mut end => false,
+            result = self.carry_out(&mut runner, &subject, &mut papers) => { result?; true }
+        };
+        if !finished {
+            runner.tidy().await?;
+        }
+        runner.end().await?;
+        let conforms = papers.end(&subject)?;
+        Ok(Outcome::complete_if(conforms && finished))
+    }
+
+    /// All steps in all forms.
+    async fn carry_out(
+        &self,
+        runner: &mut Runner,
+        subject: &Subject,
+        papers: &mut Papers<'_>,
+    ) -> Result<(), Failure> {
+        let steps = self.steps(Some(subject));
+        for form in self.forms() {
+            papers.form(form)?;
+            runner.begin(form);
+            for step in &steps {
+                if step.by_unicast_only && form == Form::Multicast {
+                    continue;
+                }
+                papers.step_begins(step)?;
+                let result = runner.carry_out(step, form, subject).await?;
+                papers.step_ends(result)?;
+            }
+            runner.tidy().await?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,146 @@
+//! Whom is judged: whether it is there, and what it offers.
+#![expect(clippy::disallowed_methods, reason = "the judge works in real time")]
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::messages::core::query_identification::QueryType;
+use jaus::messages::core::query_services::{ComponentId, ComponentRec, NodeId, NodeRec, NodeSeq};
+use jaus::messages::core::{
+    QueryHeartbeatPulse, QueryIdentification, QueryServices, ReportHeartbeatPulse,
+    ReportIdentification, ReportServices,
+};
+use jaus_cli::failure::Failure;
+use tokio::time::Instant;
+
+use super::panel::{Panel, SETTLING, code_of};
+use super::step::{Reach, Speaker};
+
+/// How often each question is put, because the first datagrams may be lost while addresses are
+/// learned.
+const TRIES: u32 = 3;
+/// What the recording calls this.
+const STEP: &str = "before the steps";
+
+/// The component that is judged.
+#[derive(Debug)]
+pub(super) struct Subject {
+    pub(super) id: JausId,
+    pub(super) name: Option<String>,
+    /// URNs with major and minor version; `None` if it does not say.
+    pub(super) services: Option<BTreeMap<String, (u8, u8)>>,
+}
+
+impl Subject {
+    /// Finds out about the subject. `None` if it answers nothing at all.
+    pub(super) async fn meet(
+        panel: &mut Panel,
+        id: JausId,
+        limit: Duration,
+    ) -> Result<Option<Self>, Failure> {
+        let identify = QueryIdentification {
+            query_type: QueryType::SUBSYSTEM_IDENTIFICATION,
+        };
+        let code = ReportIdentification::CODE;
+        let report = ask_again(panel, &identify, code, limit).await?;
+        let name = report.as_ref().and_then(|octets| {
+            let report = ReportIdentification::decode(octets).ok()?;
+            Some(report.identification.to_string_lossy().into_owned())
+        });
+        let mut is_there = report.is_some();
+        // Everybody asks, so that the address is known on both nodes.
+        for speaker in Speaker::ALL {
+            let answer = if is_there {
+                ask(panel, speaker, &identify, code, SETTLING).await?
+            } else {
+                let code = ReportHeartbeatPulse::CODE;
+                ask(panel, speaker, &QueryHeartbeatPulse, code, SETTLING).await?
+            };
+            is_there |= answer.is_some();
+        }
+        let code = ReportServices::CODE;
+        let report = ask_again(panel, &query_services(id), code, limit).await?;
+        is_there |= report.is_some();
+        let services = report.and_then(|octets| services(&octets, id));
+        Ok(is_there.then_some(Self { id, name, services }))
+    }
+
+    /// The version in which it offers a service.
+    pub(super) fn version(&self, urn: &str) -> Option<(u8, u8)> {
+        self.services.as_ref()?.get(urn).copied()
+    }
+
+    /// The first of these services that it does not offer.
+    pub(super) fn lacks(&self, urns: &[&'static str]) -> Option<&'static str> {
+        let services = self.services.as_ref()?;
+        let mut urns = urns.iter().copied();
+        urns.find(|urn| !services.contains_key(*urn))
+    }
+}
+
+async fn ask_again(
+    panel: &mut Panel,
+    query: &impl Message,
+    report: u16,
+    limit: Duration,
+) -> Result<Option<Bytes>, Failure> {
+    for _ in 0..TRIES {
+        let answer = ask(panel, Speaker::Main, query, report, limit).await?;
+        if answer.is_some() {
+            return Ok(answer);
+        }
+    }
+    Ok(None)
+}
+
+async fn ask(
+    panel: &mut Panel,
+    from: Speaker,
+    query: &impl Message,
+    report: u16,
+    limit: Duration,
+) -> Result<Option<Bytes>, Failure> {
+    let query = query.encode().map_err(Failure::of)?;
+    panel.say(from, Reach::Component, query, STEP)?;
+    let deadline = Instant::now() + limit;
+    while let Some(heard) = panel.hear(deadline, STEP).await? {
+        if code_of(&heard.octets) == Some(report) {
+            return Ok(Some(heard.octets));
+        }
+    }
+    Ok(None)
+}
+
+fn query_services(subject: JausId) -> QueryServices {
+    QueryServices {
+        node_list: vec![NodeSeq {
+            node_rec: NodeRec {
+                node_id: NodeId(subject.node()),
+            },
+            component_list: vec![ComponentRec {
+                component_id: ComponentId(subject.component()),
+            }],
+        }],
+    }
+}
+
+/// The services of the subject's component. Some peers list it under the number that means all.
+fn services(octets: &Bytes, subject: JausId) -> Option<BTreeMap<String, (u8, u8)>> {
+    let report = ReportServices::decode(octets).ok()?;
+    let nodes = report.node_list.iter();
+    let nodes = nodes.filter(|node| node.node_rec.node_id == subject.node());
+    let components = nodes.flat_map(|node| &node.component_list);
+    let wanted = [subject.component(), JausId::ANY_COMPONENT];
+    let component = components.filter(|one| wanted.contains(&one.component_rec.component_id));
+    let mut services = BTreeMap::new();
+    for service in component.flat_map(|component| &component.service_list) {
+        let uri = service.uri.to_string_lossy().into_owned();
+        let version = (service.major_version_number, service.minor_version_number);
+        let newest = services.entry(uri).or_insert(version);
+        *newest = version.max(*newest);
+    }
+    (!services.is_empty()).then_some(services)
+}

@@ -1,0 +1,118 @@
+//! The command line tool `jaus`: one file per subcommand, over the library's public API only.
+#![warn(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "they panic when the reader has gone; see `output`"
+)]
+
+mod decode;
+mod definitions;
+mod demo;
+mod discover;
+mod doctor;
+mod encode;
+mod jsidl;
+mod judge;
+mod monitor;
+mod node;
+mod ping;
+mod query;
+mod record;
+mod replay;
+#[cfg(target_os = "linux")]
+mod up;
+mod vehicle;
+mod watch;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use jaus_cli::failure::Failure;
+use jaus_cli::logging::Logging;
+use jaus_cli::output;
+
+/// Speak SAE JAUS: run nodes, find and query others, read and write messages.
+#[derive(Parser)]
+#[command(
+    name = "jaus",
+    version,
+    after_help = "Begin with `jaus demo`: it needs no network, no configuration and no second terminal.\n\n\
+        Exit status: 0 all went well; 1 it ran, but something could not be read or did not answer; \
+        2 it could not run (wrong flag, missing file, port in use …)."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    logging: Logging,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Demo(demo::Demo),
+    #[cfg(target_os = "linux")]
+    Up(up::Up),
+    #[cfg(target_os = "linux")]
+    #[command(name = up::leash::NAME, hide = true)]
+    Leash(up::leash::Leash),
+    #[cfg(target_os = "linux")]
+    #[command(name = up::warden::NAME, hide = true)]
+    Warden(up::warden::Warden),
+    Node(node::NodeCommand),
+    Vehicle(vehicle::VehicleCommand),
+    Monitor(monitor::Monitor),
+    Watch(watch::Watch),
+    Discover(discover::Discover),
+    Doctor(doctor::Doctor),
+    Ping(ping::Ping),
+    Judge(judge::Judge),
+    Query(query::Query),
+    Record(record::Record),
+    Replay(replay::Replay),
+    Decode(decode::Decode),
+    Encode(encode::Encode),
+    Jsidl(jsidl::Jsidl),
+}
+
+impl Command {
+    fn run(self) -> Result<ExitCode, Failure> {
+        let outcome = match self {
+            Self::Demo(demo) => demo.run(),
+            #[cfg(target_os = "linux")]
+            Self::Up(up) => up.run(),
+            #[cfg(target_os = "linux")]
+            Self::Leash(leash) => leash.run(),
+            #[cfg(target_os = "linux")]
+            Self::Warden(warden) => warden.run(),
+            Self::Node(node) => node.run(),
+            Self::Vehicle(vehicle) => vehicle.run(),
+            Self::Monitor(monitor) => monitor.run(),
+            Self::Watch(watch) => watch.run(),
+            Self::Discover(discover) => discover.run(),
+            Self::Doctor(doctor) => doctor.run(),
+            Self::Ping(ping) => ping.run(),
+            Self::Judge(judge) => judge.run(),
+            Self::Query(query) => query.run(),
+            Self::Record(record) => record.run(),
+            Self::Replay(replay) => replay.run(),
+            Self::Decode(decode) => decode.run(),
+            Self::Encode(encode) => encode.run(),
+            Self::Jsidl(jsidl) => return jsidl.run(),
+        };
+        outcome.map(ExitCode::from)
+    }
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let ended = cli.logging.start("warn").and_then(|()| cli.command.run());
+    match ended {
+        Ok(status) => status,
+        // Whoever read our output has seen enough, as `head` does.
+        Err(Failure::OutputClosed) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output::say(failure);
+            ExitCode::from(2)
+        }
+    }
+}

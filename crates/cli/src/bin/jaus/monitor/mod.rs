@@ -1,0 +1,197 @@
+//! `jaus monitor`: a table of peers, links and drops that stays up to date.
+
+mod sample;
+mod table;
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use clap::{Args, ValueEnum};
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::component::{Component, Kind};
+use jaus::endpoint::Outgoing;
+use jaus::messages::core::QueryHeartbeatPulse;
+use jaus::node::{Node, Sender};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::network::Network;
+use jaus_cli::runtime;
+use tokio::time::{MissedTickBehavior, interval};
+
+use self::sample::{Sample, View};
+use self::table::Screen;
+
+/// Watch peers, links and losses as they are
+///
+/// Runs a node of its own beside the others and shows whom it hears, where, how often, and how
+/// long answers take; its links; and what was dropped, with the reason. It hears what is sent to
+/// everybody and to itself, not what others send to each other: `jaus record` does that. On a
+/// terminal the table stays in place; otherwise it is printed anew each time.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus monitor\n  \
+    jaus monitor --sort received --interval 5\n  \
+    jaus monitor --probe                  measures round trips\n  \
+    jaus monitor --once --json | jq '.peers[].id'\n  \
+    jaus monitor --peer 192.168.7.2       where multicast does not reach\n\n\
+    Columns: messages and octets of payload a second from a peer; messages a second to it; \
+    lost (given up for want of an acknowledgement); rep (messages that came twice); round trip \
+    (--probe) in ms; seconds since it was heard.")]
+pub(crate) struct Monitor {
+    /// Seconds from one table to the next
+    #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
+    interval: Duration,
+
+    /// Print one table, after the first interval, and end; exit status 1 means that nobody is there
+    #[arg(long)]
+    once: bool,
+
+    /// Print each table as a JSON object
+    #[arg(long)]
+    json: bool,
+
+    /// What comes first in the table
+    #[arg(long, value_enum, default_value_t = Sort::Id)]
+    sort: Sort,
+
+    /// The most peers to show [default: as many as the terminal has room for, or 1000]
+    #[arg(long, value_name = "NUMBER")]
+    limit: Option<usize>,
+
+    /// Ask peers for a heartbeat, some in each interval, and measure how long answers take
+    #[arg(long)]
+    probe: bool,
+
+    /// End after this time [default: at Ctrl-C]
+    #[arg(long, value_parser = runtime::seconds)]
+    seconds: Option<Duration>,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+/// What peers are sorted by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Sort {
+    /// JAUS id
+    Id,
+    /// Messages a second from them, the most first
+    Received,
+    /// Messages a second to them, the most first
+    Sent,
+    /// Lost and repeated messages, the most first
+    Lost,
+    /// Round trip, the longest first
+    RoundTrip,
+    /// Silence, the longest first
+    Heard,
+}
+
+/// Peers that are probed in one interval, so that probing costs a network little however many
+/// there are.
+const PROBES: usize = 20;
+
+impl Monitor {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        runtime::run(async {
+            let (id, config) = self.network.for_own_node("jaus monitor")?;
+            let node = Node::start(config).map_err(Failure::of)?;
+            let port = node.attach(id.component()).map_err(Failure::of)?;
+            let mut probe = self.probe.then(|| Probe::new(port.sender())).transpose()?;
+            let component = Component::builder(Kind::OtherSubsystem, "jaus monitor")
+                .live_on(port)
+                .map_err(Failure::of)?;
+            let mut screen = Screen::open(self.json, self.once, self.limit);
+            let outcome = self.watch(&node, &component, &mut probe, &mut screen).await;
+            screen.close();
+            drop((component, probe));
+            node.shutdown().await;
+            outcome
+        })
+    }
+
+    async fn watch(
+        &self,
+        node: &Node,
+        component: &Component,
+        probe: &mut Option<Probe>,
+        screen: &mut Screen,
+    ) -> Result<Outcome, Failure> {
+        let end = runtime::end(self.seconds);
+        tokio::pin!(end);
+        let mut turns = interval(self.interval);
+        turns.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        turns.tick().await;
+        let mut before = Sample::take(node);
+        if !self.once {
+            screen.show(&self.view(&before, &before, component))?;
+        }
+        loop {
+            tokio::select! {
+                () = &mut end => return Ok(Outcome::Done),
+                _ = turns.tick() => {}
+            }
+            let sample = Sample::take(node);
+            if let Some(probe) = probe {
+                probe.ask(&sample, component.id());
+            }
+            let view = self.view(&before, &sample, component);
+            screen.show(&view)?;
+            if self.once {
+                return Ok(Outcome::complete_if(!view.peers.is_empty()));
+            }
+            before = sample;
+        }
+    }
+
+    fn view(&self, before: &Sample, now: &Sample, component: &Component) -> View {
+        let mut view = now.since(before, &component.directory(), component.id());
+        view.peers.sort_by(|a, b| {
+            let most = |one: f64, other: f64| other.total_cmp(&one);
+            match self.sort {
+                Sort::Id => a.id.cmp(&b.id),
+                Sort::Received => most(a.received, b.received),
+                Sort::Sent => most(a.sent, b.sent),
+                Sort::Lost => (b.lost + b.repeated).cmp(&(a.lost + a.repeated)),
+                Sort::RoundTrip => b.round_trip.cmp(&a.round_trip),
+                Sort::Heard => b.silent.cmp(&a.silent),
+            }
+        });
+        view
+    }
+}
+
+/// Asks peers for a heartbeat and an acknowledgement, by which the node measures round trips.
+struct Probe {
+    sender: Sender,
+    question: Bytes,
+    /// Who was asked last.
+    latest: Option<JausId>,
+}
+
+impl Probe {
+    fn new(sender: Sender) -> Result<Self, Failure> {
+        Ok(Self {
+            sender,
+            question: QueryHeartbeatPulse.encode().map_err(Failure::of)?,
+            latest: None,
+        })
+    }
+
+    /// Asks the next ones, all in their turn.
+    fn ask(&mut self, sample: &Sample, own: JausId) {
+        let ids: Vec<JausId> = sample.ids().filter(|&id| id != own).collect();
+        let begin = ids.partition_point(|&id| Some(id) <= self.latest);
+        let in_turn = ids.iter().cycle().skip(begin).take(PROBES.min(ids.len()));
+        for &id in in_turn {
+            self.latest = Some(id);
+            let question = Outgoing {
+                acknowledge: true,
+                ..Outgoing::new(own, id, self.question.clone())
+            };
+            if let Err(error) = self.sender.send(question) {
+                tracing::debug!(%id, %error, "not probed");
+            }
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The table, in place on a terminal or line after line elsewhere.
+
+use std::io::{IsTerminal, stdout};
+
+use terminal_size::{Height, Width, terminal_size};
+
+use super::sample::{DropRow, LinkRow, PeerRow, View};
+use jaus_cli::failure::Failure;
+use jaus_cli::output::Output;
+
+/// Rows where nobody said how many, and no terminal ends.
+const MOST: usize = 1000;
+/// The terminal that is thought of when none tells its size.
+const USUAL: (usize, usize) = (80, 24);
+/// The alternate screen, without a cursor; and back.
+const OPEN: &str = "\x1b[?1049h\x1b[?25l";
+const CLOSE: &str = "\x1b[?25h\x1b[?1049l";
+const HOME: &str = "\x1b[H";
+const REST_OF_LINE: &str = "\x1b[K";
+const REST_OF_SCREEN: &str = "\x1b[J";
+
+/// Where tables go.
+pub(super) struct Screen {
+    output: Output,
+    style: Style,
+    limit: Option<usize>,
+    shown: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Style {
+    /// In place.
+    Live,
+    /// One after the other.
+    Lines,
+    Json,
+}
+
+impl Screen {
+    pub(super) fn open(json: bool, once: bool, limit: Option<usize>) -> Self {
+        let style = match json {
+            true => Style::Json,
+            false if !once && stdout().is_terminal() => Style::Live,
+            false => Style::Lines,
+        };
+        Self {
+            output: Output::new(),
+            style,
+            limit,
+            shown: false,
+        }
+    }
+
+    pub(super) fn show(&mut self, view: &View) -> Result<(), Failure> {
+        let first = !std::mem::replace(&mut self.shown, true);
+        match self.style {
+            Style::Json => self.output.line(view.to_json()),
+            Style::Lines => {
+                let lines = lines(view, self.limit.unwrap_or(MOST));
+                let gap = if first { "" } else { "\n" };
+                self.output.line(format_args!("{gap}{}", lines.join("\n")))
+            }
+            Style::Live => {
+                let (width, height) = size();
+                let (links, drops) = (view.links.len(), view.drops.len());
+                // Headings, blank lines and the last row, on which the cursor waits.
+                let others = 6 + links + drops;
+                let room = height.saturating_sub(others).max(1);
+                let mut screen = String::from(if first { OPEN } else { "" });
+                screen.push_str(HOME);
+                let lines = lines(view, self.limit.unwrap_or(MOST).min(room));
+                for line in lines.iter().take(height.saturating_sub(1)) {
+                    screen.extend(line.chars().take(width));
+                    screen.push_str(REST_OF_LINE);
+                    screen.push_str("\r\n");
+                }
+                screen.push_str(REST_OF_SCREEN);
+                screen.push_str("Ctrl-C ends it");
+                self.output.part(&screen)
+            }
+        }
+    }
+
+    /// Gives the terminal back as it was.
+    pub(super) fn close(&mut self) {
+        if self.style == Style::Live && self.shown {
+            // Nobody is left to be told if that fails.
+            let _ = self.output.part(CLOSE);
+        }
+    }
+}
+
+fn size() -> (usize, usize) {
+    match terminal_size() {
+        Some((Width(width), Height(height))) => (width.into(), height.into()),
+        None => USUAL,
+    }
+}
+
+/// The whole table, with at most `most` peers.
+fn lines(view: &View, most: usize) -> Vec<String> {
+    let mut lines = vec![format!(
+        "{:12} {:8} {:20} {:>5} {:>6} {:>5} {:>4} {:>3} {:>5} {:>3}",
+        "ID", "NAME", "ADDRESS", "in/s", "oct/s", "out/s", "lost", "rep", "ms", "ago"
+    )];
+    lines.extend(view.peers.iter().take(most).map(peer_line));
+    match view.peers.len() {
+        0 => lines.push("nobody was heard so far".to_owned()),
+        number if number > most => lines.push(format!("… and {} more", number - most)),
+        _ => {}
+    }
+    lines.push(String::new());
+    lines.push(format!(
+        "{:34} {:>9} {:>9} {:>9} {:>9}  {}",
+        "LINK", "in/s", "oct/s", "out/s", "oct/s", "err"
+    ));
+    lines.extend(view.links.iter().map(link_line));
+    if !view.drops.is_empty() {
+        lines.push(String::new());
+        lines.push(format!("{:36} {:>9} {:>9}", "DROPPED", "per s", "in all"));
+        lines.extend(view.drops.iter().map(drop_line));
+    }
+    lines
+}
+
+fn peer_line(peer: &PeerRow) -> String {
+    let name = match (&*peer.name, &*peer.kind) {
+        ("", kind) => kind,
+        (name, _) => name,
+    };
+    let round_trip = peer.round_trip.map_or_else(
+        || "-".to_owned(),
+        |time| format!("{:.2}", time.as_secs_f64() * 1e3),
+    );
+    format!(
+        "{:12} {:8} {:20} {:>5} {:>6} {:>5} {:>4} {:>3} {:>5} {:>3}",
+        peer.id.to_string(),
+        clipped(name, 8),
+        clipped(&peer.address, 20),
+        short(peer.received),
+        short(peer.received_octets),
+        short(peer.sent),
+        short(peer.lost as f64),
+        short(peer.repeated as f64),
+        clipped(&round_trip, 5),
+        short(peer.silent.as_secs() as f64),
+    )
+}
+
+fn link_line(link: &LinkRow) -> String {
+    format!(
+        "{:34} {:>9} {:>9} {:>9} {:>9}  {}",
+        clipped(&link.name, 34),
+        short(link.received),
+        short(link.received_octets),
+        short(link.sent),
+        short(link.sent_octets),
+        link.errors,
+    )
+}
+
+fn drop_line(drop: &DropRow) -> String {
+    format!(
+        "{:36} {:>9} {:>9}",
+        clipped(drop.reason, 36),
+        short(drop.rate),
+        drop.total
+    )
+}
+
+/// A number in at most five characters: `0`, `0.3`, `12`, `1.5k`, `250M`.
+fn short(number: f64) -> String {
+    let mut number = number;
+    for unit in ["", "k", "M"] {
+        if number < 999.5 {
+            return match number {
+                _ if number == 0.0 => "0".to_owned(),
+                _ if number < 9.95 && number.fract() != 0.0 => format!("{number:.1}{unit}"),
+                _ => format!("{number:.0}{unit}"),
+            };
+        }
+        number /= 1000.0;
+    }
+    format!("{number:.0}G")
+}
+
+/// The beginning of a text that is too long, with a sign of that; control characters, which would
+/// wreak havoc on a terminal, are left out: peers choose their names.
+fn clipped(text: &str, width: usize) -> String {
+    let mut visible = text.chars().filter(|c| !c.is_control());
+    let mut clipped: String = visible.by_ref().take(width).collect();
+    if visible.next().is_some() {
+        clipped.pop();
+        clipped.push('…');
+    }
+    clipped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_stay_short_and_names_harmless() {
+        for (number, text) in [
+            (0.0, "0"),
+            (0.25, "0.2"),
+            (3.0, "3"),
+            (12.34, "12"),
+            (999.0, "999"),
+            (1500.0, "1.5k"),
+            (250_000_000.0, "250M"),
+            (3e12, "3000G"),
+        ] {
+            assert_eq!(short(number), text);
+        }
+        assert_eq!(clipped("Rover", 10), "Rover");
+        assert_eq!(clipped("a very long name", 10), "a very lo…");
+        assert_eq!(clipped("\x1b[2Jevil", 10), "[2Jevil");
+    }
+}

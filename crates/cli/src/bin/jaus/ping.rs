@@ -1,0 +1,281 @@
+//! `jaus ping`: asks a component for a sign of life, again and again, and measures the round trip.
+#![expect(clippy::disallowed_methods, reason = "a round trip has its time")]
+
+use std::fmt;
+use std::future::Future;
+use std::time::Duration;
+
+use bytes::Bytes;
+use clap::{Args, ValueEnum};
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::endpoint::{Outgoing, Path, Received};
+use jaus::messages::core::{
+    QueryHeartbeatPulse, QueryIdentification, ReportHeartbeatPulse, ReportIdentification,
+    query_identification::QueryType,
+};
+use jaus::node::Port;
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::network::Network;
+use jaus_cli::output::{Output, say};
+use jaus_cli::runtime;
+use tokio::time::{Instant, sleep_until, timeout_at};
+
+/// The code of the padded message of `--size`: user-defined (AS5710 leaves D000h and above to
+/// users), so that no service acts on it.
+const PADDING: u16 = 0xD7F0;
+
+/// Ask a component for a sign of life, and measure the round trip
+///
+/// Asks for a heartbeat, which the Liveness service answers; a component that does not is asked
+/// for its identification; and if it does not answer that either, its transport is asked to
+/// acknowledge a message. What answered first is what goes on to be asked. Exit status 1 means
+/// that nothing answered.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus ping 101.1.33\n  \
+    jaus ping 101.1.33 --count 10 --interval 0.1\n  \
+    jaus ping 101.1.33 --with acknowledgement --size 65536\n  \
+    jaus ping 101.1.33 --peer 192.168.7.2      where multicast does not reach")]
+pub(crate) struct Ping {
+    /// Whom to ask: SUBSYSTEM.NODE.COMPONENT
+    address: JausId,
+
+    /// How often to ask [default: until Ctrl-C]
+    #[arg(long, short, value_parser = clap::value_parser!(u64).range(1..))]
+    count: Option<u64>,
+
+    /// Seconds from one question to the next
+    #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
+    interval: Duration,
+
+    /// Seconds to wait for an answer
+    #[arg(long, short, default_value = "1", value_parser = runtime::seconds)]
+    timeout: Duration,
+
+    /// What to ask for [default: what the component answers]
+    #[arg(long, value_enum)]
+    with: Option<Question>,
+
+    /// Octets of the message that is to be acknowledged, 2 to 16777216; implies --with
+    /// acknowledgement
+    #[arg(long, value_parser = clap::value_parser!(u32).range(2..=16 << 20))]
+    size: Option<u32>,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+/// A question that shows whether somebody is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Question {
+    /// Query Heartbeat Pulse, which Liveness answers
+    Heartbeat,
+    /// Query Identification, which Discovery answers
+    Identification,
+    /// A message that wants an acknowledgement, which every transport gives
+    Acknowledgement,
+}
+
+impl Question {
+    const ALL: [Self; 3] = [Self::Heartbeat, Self::Identification, Self::Acknowledgement];
+}
+
+impl fmt::Display for Question {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Heartbeat => "heartbeat",
+            Self::Identification => "identification",
+            Self::Acknowledgement => "acknowledgement",
+        })
+    }
+}
+
+/// What came back, and how long it took.
+struct Answer {
+    time: Duration,
+    path: Option<Path>,
+}
+
+/// What has been asked and answered so far.
+#[derive(Default)]
+struct Tally {
+    asked: u64,
+    times: Vec<Duration>,
+}
+
+impl Ping {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        if !self.address.is_unicast() {
+            return Err(Failure::new(format!(
+                "{} is not one component: `jaus discover` shows who is there",
+                self.address
+            )));
+        }
+        if self.size.is_some()
+            && self
+                .with
+                .is_some_and(|with| with != Question::Acknowledgement)
+        {
+            return Err(Failure::new(
+                "--size makes a message that is only acknowledged: leave --with out, or make it \
+                 `--with acknowledgement`",
+            ));
+        }
+        runtime::run(async {
+            let (mut port, stay) = self.network.join_for_a_moment().await?;
+            let outcome = self.go_on(&mut port).await;
+            drop(port);
+            stay.end().await;
+            outcome
+        })
+    }
+
+    /// Asks until the count is reached or the user has seen enough, and sums up.
+    async fn go_on(&self, port: &mut Port) -> Result<Outcome, Failure> {
+        let mut output = Output::new();
+        let mut tally = Tally::default();
+        let end = runtime::end(None);
+        tokio::pin!(end);
+        tokio::select! {
+            () = &mut end => {}
+            result = self.ask_again_and_again(port, &mut tally, &mut output) => result?,
+        }
+        output.line(format_args!("\n{}: {tally}", self.address))?;
+        if tally.times.is_empty() && tally.asked > 0 {
+            say(format_args!(
+                "{} gave no sign of life. `jaus discover` shows who is there; --interface chooses \
+                 the network, --peer reaches where multicast does not",
+                self.address
+            ));
+        }
+        Ok(Outcome::complete_if(!tally.times.is_empty()))
+    }
+
+    async fn ask_again_and_again(
+        &self,
+        port: &mut Port,
+        tally: &mut Tally,
+        output: &mut Output,
+    ) -> Result<(), Failure> {
+        let chosen = self.size.map(|_| Question::Acknowledgement).or(self.with);
+        let mut usual = chosen;
+        while self.count.is_none_or(|count| tally.asked < count) {
+            let next = Instant::now() + self.interval;
+            tally.asked += 1;
+            let questions = usual.map_or(Question::ALL.to_vec(), |usual| vec![usual]);
+            let answer = self.ask_in_turn(port, &questions).await?;
+            let number = tally.asked;
+            match answer {
+                Some((question, answer)) => {
+                    usual = Some(question);
+                    tally.times.push(answer.time);
+                    let whence = answer.path.map(|path| format!(" from {}", path.peer));
+                    let (whence, time) = (whence.unwrap_or_default(), millis(answer.time));
+                    output.line(format_args!("{number:>4}  {question}{whence}: {time} ms"))?;
+                }
+                None => output.line(format_args!("{number:>4}  no answer"))?,
+            }
+            if self.count.is_none_or(|count| tally.asked < count) {
+                sleep_until(next).await;
+            }
+        }
+        Ok(())
+    }
+
+    /// The first question that is answered.
+    async fn ask_in_turn(
+        &self,
+        port: &mut Port,
+        questions: &[Question],
+    ) -> Result<Option<(Question, Answer)>, Failure> {
+        for &question in questions {
+            let answer = match question {
+                Question::Heartbeat => {
+                    let query = QueryHeartbeatPulse.encode().map_err(Failure::of)?;
+                    self.ask(port, query, ReportHeartbeatPulse::CODE).await?
+                }
+                Question::Identification => {
+                    let query = QueryIdentification {
+                        query_type: QueryType::COMPONENT_IDENTIFICATION,
+                    };
+                    let query = query.encode().map_err(Failure::of)?;
+                    self.ask(port, query, ReportIdentification::CODE).await?
+                }
+                Question::Acknowledgement => self.have_acknowledged(port).await?,
+            };
+            if let Some(answer) = answer {
+                return Ok(Some((question, answer)));
+            }
+        }
+        Ok(None)
+    }
+
+    async fn ask(
+        &self,
+        port: &mut Port,
+        query: Bytes,
+        report: u16,
+    ) -> Result<Option<Answer>, Failure> {
+        // What came too late for the question before is none to this one.
+        while port.try_recv().is_some() {}
+        let start = Instant::now();
+        let outgoing = Outgoing::new(port.id(), self.address, query);
+        port.send(outgoing).map_err(Failure::of)?;
+        while let Some(received) = self.in_time(start, port.recv()).await.flatten() {
+            if self.is_answer(&received, report) {
+                return Ok(Some(Answer {
+                    time: start.elapsed(),
+                    path: received.path,
+                }));
+            }
+        }
+        Ok(None)
+    }
+
+    async fn have_acknowledged(&self, port: &Port) -> Result<Option<Answer>, Failure> {
+        let mut message = vec![0; self.size.unwrap_or(2) as usize];
+        message[..2].copy_from_slice(&PADDING.to_le_bytes());
+        let start = Instant::now();
+        let outgoing = Outgoing::new(port.id(), self.address, message.into());
+        match self.in_time(start, port.deliver(outgoing)).await {
+            Some(Ok(())) => Ok(Some(Answer {
+                time: start.elapsed(),
+                path: None,
+            })),
+            Some(Err(jaus::node::Undelivered::NotSent(error))) => Err(Failure::of(error)),
+            Some(Err(_)) | None => Ok(None),
+        }
+    }
+
+    async fn in_time<T>(&self, start: Instant, what: impl Future<Output = T>) -> Option<T> {
+        timeout_at(start + self.timeout, what).await.ok()
+    }
+
+    fn is_answer(&self, received: &Received, report: u16) -> bool {
+        received.source == self.address && received.payload.starts_with(&report.to_le_bytes())
+    }
+}
+
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (asked, answered) = (self.asked, self.times.len());
+        let lost = 100.0 * (asked as f64 - answered as f64) / (asked.max(1) as f64);
+        write!(
+            f,
+            "asked {asked} times, {answered} answers, {lost:.0} % lost"
+        )?;
+        let mut times = self.times.clone();
+        times.sort_unstable();
+        let (Some(&least), Some(&most)) = (times.first(), times.last()) else {
+            return Ok(());
+        };
+        let (least, median, most) = (millis(least), millis(times[times.len() / 2]), millis(most));
+        write!(f, "; least {least}, median {median}, most {most} ms")
+    }
+}
+
+/// Milliseconds, to the microsecond.
+fn millis(time: Duration) -> String {
+    format!("{:.3}", time.as_secs_f64() * 1e3)
+}

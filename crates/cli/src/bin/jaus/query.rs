@@ -1,0 +1,162 @@
+//! `jaus query`: asks a component, and prints what it answers.
+#![expect(clippy::disallowed_methods, reason = "a question has its time")]
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use bytes::Bytes;
+use clap::Args;
+use jaus::address::JausId;
+use jaus::codec::report_code;
+use jaus::endpoint::{Outgoing, Received};
+use jaus::node::Port;
+use jaus::view::{Dictionary, Line, Request};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::network::Network;
+use jaus_cli::output::{Output, say};
+use jaus_cli::runtime;
+use serde::Serialize;
+use tokio::time::{Instant, timeout_at};
+
+use crate::definitions::Definitions;
+
+/// How often a question is asked while no answer comes.
+const AGAIN: Duration = Duration::from_millis(500);
+
+/// Ask a component, and print its report as JSON
+///
+/// With a wildcard in the address (65535 or 255) every component that answers in time is printed.
+/// Exit status 1 means that nobody answered.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus query 101.1.1 QueryIdentification '{\"QueryType\":2}'\n  \
+    jaus query 101.1.1 QueryHeartbeatPulse\n  \
+    jaus query 65535.255.255 QueryIdentification '{\"QueryType\":2}' --seconds 1\n  \
+    jaus query 101.1.1 QueryHeartbeatPulse --peer 192.168.7.2")]
+pub(crate) struct Query {
+    /// Whom to ask: SUBSYSTEM.NODE.COMPONENT
+    address: JausId,
+
+    /// The query's name
+    message: String,
+
+    /// The query's fields, as `jaus decode` prints a body
+    json: Option<String>,
+
+    /// How long to wait for an answer
+    #[arg(long, default_value = "2", value_parser = runtime::seconds)]
+    seconds: Duration,
+
+    #[command(flatten)]
+    definitions: Definitions,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+impl Query {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let dictionary = self.definitions.load()?;
+        let query = self.octets(&dictionary)?;
+        let report = report_to(&query).ok_or_else(|| {
+            Failure::new(format!(
+                "{} is not a query: nobody reports on it. Queries have codes from 2000h to 2FFFh",
+                self.message
+            ))
+        })?;
+        runtime::run(async {
+            let (port, stay) = self.network.join_for_a_moment().await?;
+            let outcome = self.ask(port, &query, report, &dictionary).await;
+            stay.end().await;
+            outcome
+        })
+    }
+
+    fn octets(&self, dictionary: &Dictionary) -> Result<Bytes, Failure> {
+        let json = self.json.as_deref().unwrap_or("{}");
+        let body = serde_json::from_str(json).map_err(|error| {
+            Failure::new(format!("the query's fields are not JSON: {error}: {json}"))
+        })?;
+        let written = dictionary.write(&Request::new(&self.message, body));
+        written.map_err(|error| {
+            if self.json.is_none() && dictionary.defines(&self.message) {
+                return Failure::new(format!(
+                    "{error}. Give the fields as JSON behind the name, \
+                     as in QueryIdentification '{{\"QueryType\":2}}'"
+                ));
+            }
+            Failure::of(error)
+        })
+    }
+
+    /// Asks until there is an answer; with wildcards until the time is over.
+    async fn ask(
+        &self,
+        mut port: Port,
+        query: &Bytes,
+        report: u16,
+        dictionary: &Dictionary,
+    ) -> Result<Outcome, Failure> {
+        let mut output = Output::new();
+        let mut answered = BTreeSet::new();
+        let mut complete = true;
+        let end = Instant::now() + self.seconds;
+        while Instant::now() < end {
+            let outgoing = Outgoing::new(port.id(), self.address, query.clone());
+            port.send(outgoing).map_err(Failure::of)?;
+            let again = end.min(Instant::now() + AGAIN);
+            while let Ok(Some(received)) = timeout_at(again, port.recv()).await {
+                if !self.is_answer(&received, report) || !answered.insert(received.source) {
+                    continue;
+                }
+                let line = dictionary.line(&received.payload);
+                complete &= !line.is_error();
+                output.line(answer(received.source, line)?)?;
+                if !self.address.has_wildcard() {
+                    return Ok(Outcome::complete_if(complete));
+                }
+            }
+        }
+        if answered.is_empty() {
+            say(self.silence());
+        }
+        Ok(Outcome::complete_if(complete && !answered.is_empty()))
+    }
+
+    fn is_answer(&self, received: &Received, report: u16) -> bool {
+        self.address.matches(received.source) && received.payload.starts_with(&report.to_le_bytes())
+    }
+
+    /// What to say when nobody answered.
+    fn silence(&self) -> String {
+        let (address, message) = (self.address, &self.message);
+        let seconds = self.seconds.as_secs_f64();
+        let who = if address.has_wildcard() {
+            format!("nobody in {address} answered")
+        } else {
+            format!("{address} did not answer")
+        };
+        format!(
+            "{who} {message} within {seconds} s. `jaus discover` shows who is there; \
+             --interface chooses the network, --peer reaches where multicast does not"
+        )
+    }
+}
+
+/// A report, with who sent it.
+#[derive(Serialize)]
+struct Answer<'d> {
+    source: String,
+    #[serde(flatten)]
+    line: Line<'d>,
+}
+
+fn answer(source: JausId, line: Line<'_>) -> Result<String, Failure> {
+    let source = source.to_string();
+    serde_json::to_string(&Answer { source, line }).map_err(Failure::of)
+}
+
+/// The code of the report that answers a message, if it is a query.
+fn report_to(query: &[u8]) -> Option<u16> {
+    report_code(u16::from_le_bytes(*query.first_chunk()?))
+}

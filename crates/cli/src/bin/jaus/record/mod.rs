@@ -1,0 +1,242 @@
+//! `jaus record`: writes what JAUS peers say to each other into a capture file.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "a recording has the time of day, and a pace"
+)]
+
+mod filter;
+mod group;
+#[cfg(target_os = "linux")]
+mod packets;
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use bytes::Bytes;
+use clap::Args;
+use jaus::link::{Group, Interfaces};
+use jaus::view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType, Timestamp};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::output::say;
+use jaus_cli::runtime;
+use tokio::time::{MissedTickBehavior, interval};
+
+use filter::Filter;
+
+/// Record JAUS traffic into a capture file, for `jaus decode`, `jaus replay` and Wireshark
+///
+/// With the right to open packet sockets (root, or `setcap cap_net_raw+ep jaus`) everything is
+/// recorded that this host sends and receives: UDP and TCP of the chosen ports, and datagrams of
+/// other ports that are JAUS by their content. Without it only the multicast group is heard, which
+/// is said. Ctrl-C ends the recording; what was recorded is on disk within a second.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus record drive.pcapng\n  \
+    jaus record drive.pcapng --interface eth0 --seconds 60\n  \
+    jaus record drive.pcapng --megabytes 500 --quiet &\n  \
+    jaus decode drive.pcapng")]
+pub(crate) struct Record {
+    /// The file to write (pcapng); it must not exist yet, unless --overwrite is given
+    file: PathBuf,
+
+    /// Write over an existing file
+    #[arg(long)]
+    overwrite: bool,
+
+    /// Record only this interface, by name or address (repeatable) [default: all, loopback too]
+    #[arg(long, value_name = "INTERFACE")]
+    interface: Vec<String>,
+
+    /// Record this UDP and TCP port (repeatable)
+    #[arg(long, default_values_t = [JAUS_PORT])]
+    port: Vec<u16>,
+
+    /// The multicast group that is heard where packet sockets are not allowed
+    #[arg(long, value_name = "ADDRESS", default_value_t)]
+    group: Group,
+
+    /// End after this time [default: at Ctrl-C]
+    #[arg(long, value_parser = runtime::seconds)]
+    seconds: Option<Duration>,
+
+    /// End when the file has so many megabytes
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    megabytes: Option<u64>,
+
+    /// Do not tell how it goes
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// An IP packet that was heard.
+struct Packet {
+    interface: String,
+    octets: Bytes,
+}
+
+/// Where packets come from.
+enum Source {
+    #[cfg(target_os = "linux")]
+    Packets(packets::PacketSocket),
+    Group(group::Listeners),
+}
+
+impl Source {
+    /// Waits for packets.
+    async fn next(&mut self) -> Result<Vec<Packet>, Failure> {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Packets(socket) => socket.next().await,
+            Self::Group(listeners) => Ok(listeners.next().await),
+        }
+    }
+}
+
+impl Record {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        runtime::run(async {
+            let mut source = self.source()?;
+            let mut recording = Recording::create(&self.file, self.overwrite, &self.port)?;
+            let result = self.record(&mut source, &mut recording).await;
+            recording.flush()?;
+            if !self.quiet {
+                say(format_args!(
+                    "{} in {}",
+                    recording.tally(),
+                    self.file.display()
+                ));
+            }
+            result.map(|()| Outcome::complete_if(recording.packets > 0))
+        })
+    }
+
+    fn source(&self) -> Result<Source, Failure> {
+        #[cfg(target_os = "linux")]
+        match packets::PacketSocket::open(&self.interface) {
+            Ok(socket) => return Ok(Source::Packets(socket)),
+            Err(packets::OpenError::NotAllowed) => say(
+                "packet sockets are not allowed to this process (run as root, or give the program \
+                 the right once: `sudo setcap cap_net_raw+ep $(which jaus)`). Only what goes to \
+                 the multicast group is recorded, not what others say to each other by unicast",
+            ),
+            Err(packets::OpenError::Other(failure)) => return Err(failure),
+        }
+        let interfaces = if self.interface.is_empty() {
+            Interfaces::All
+        } else {
+            Interfaces::Only(self.interface.clone())
+        };
+        Ok(Source::Group(group::Listeners::open(
+            &interfaces,
+            self.group,
+        )?))
+    }
+
+    async fn record(&self, source: &mut Source, recording: &mut Recording) -> Result<(), Failure> {
+        let end = runtime::end(self.seconds);
+        tokio::pin!(end);
+        let mut second = interval(Duration::from_secs(1));
+        second.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut told = 0;
+        loop {
+            tokio::select! {
+                () = &mut end => return Ok(()),
+                _ = second.tick() => {
+                    recording.flush()?;
+                    if !self.quiet && recording.packets > told {
+                        told = recording.packets;
+                        say(recording.tally());
+                    }
+                }
+                packets = source.next() => {
+                    packets?.iter().try_for_each(|packet| recording.take(packet))?;
+                }
+            }
+            let limit = self.megabytes.map(|megabytes| megabytes * 1_000_000);
+            if limit.is_some_and(|limit| recording.writer.written() >= limit) {
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// The file, and what is in it.
+struct Recording {
+    file: PathBuf,
+    writer: CaptureWriter<BufWriter<File>>,
+    interfaces: BTreeMap<String, InterfaceNumber>,
+    filter: Filter,
+    packets: u64,
+}
+
+impl Recording {
+    fn create(path: &Path, overwrite: bool, ports: &[u16]) -> Result<Self, Failure> {
+        let mut options = OpenOptions::new();
+        options.write(true).truncate(true);
+        let options = if overwrite {
+            options.create(true)
+        } else {
+            options.create_new(true)
+        };
+        let file = options.open(path).map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => Failure::new(format!(
+                "{} exists already: choose another name, or say --overwrite",
+                path.display()
+            )),
+            _ => Failure::file(path, &error),
+        })?;
+        let program = concat!("jaus ", env!("CARGO_PKG_VERSION"));
+        let writer = CaptureWriter::new(BufWriter::new(file), program)
+            .map_err(|error| Failure::file(path, &error))?;
+        Ok(Self {
+            file: path.to_owned(),
+            writer,
+            interfaces: BTreeMap::new(),
+            filter: Filter::new(ports),
+            packets: 0,
+        })
+    }
+
+    /// Writes a packet down, if it is one of those that are wanted.
+    fn take(&mut self, packet: &Packet) -> Result<(), Failure> {
+        if !self.filter.wants(&packet.octets) {
+            return Ok(());
+        }
+        let failed = |error| Failure::file(&self.file, &error);
+        let known = self.interfaces.get(&packet.interface).copied();
+        let on = match known {
+            Some(on) => on,
+            None => {
+                let name = &packet.interface;
+                let on = self.writer.add_interface(name, LinkType::RAW);
+                let on = on.map_err(failed)?;
+                self.interfaces.insert(name.clone(), on);
+                on
+            }
+        };
+        self.packets += 1;
+        self.writer.write(on, now(), &packet.octets).map_err(failed)
+    }
+
+    fn flush(&mut self) -> Result<(), Failure> {
+        let flushed = self.writer.flush();
+        flushed.map_err(|error| Failure::file(&self.file, &error))
+    }
+
+    fn tally(&self) -> String {
+        let (packets, octets) = (self.packets, self.writer.written() as f64);
+        format!("{packets} packets recorded, {:.1} kB", octets / 1e3)
+    }
+}
+
+/// The time of day, as the kernel's clock has it.
+fn now() -> Timestamp {
+    // A clock before 1970 is nobody's.
+    let time = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    Timestamp::new(time.as_secs() as i64, time.subsec_nanos(), 9)
+}

@@ -1,0 +1,282 @@
+//! `jaus replay`: sends the datagrams of a capture again.
+#![expect(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    reason = "datagrams go out as they were recorded, at their times, past every link of ours"
+)]
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::File;
+use std::io::BufReader;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use bytes::Bytes;
+use clap::Args;
+use jaus::address::JausId;
+use jaus::link::STANDARD_PORT;
+use jaus::view::{Capture, Datagram, JAUS_PORT, Network, Timestamp};
+use jaus::wire::judp;
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::output::{Output, say};
+use jaus_cli::runtime;
+use socket2::SockRef;
+use tokio::net::UdpSocket;
+use tokio::time::{Instant, sleep_until};
+
+/// Send the UDP datagrams of a capture again, at the pace at which they were recorded
+///
+/// Where they go must be said: a recording that is let loose on a network commands the vehicles in
+/// it. They leave from one socket, so whoever answers answers there, and is not heard.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus replay drive.pcapng --dry-run\n  \
+    jaus replay drive.pcapng --to 127.0.0.1:3794\n  \
+    jaus replay drive.pcapng --to group --interface 127.0.0.1 --speed 10\n  \
+    jaus replay drive.pcapng --to 10.0.0.7 --from 101.255.255 --loop 0")]
+pub(crate) struct Replay {
+    /// The capture: pcap or pcapng, of `jaus record`, tcpdump, Wireshark …
+    file: PathBuf,
+
+    /// Send everything there: ADDRESS, ADDRESS:PORT, or `group` for 239.255.0.1:3794
+    #[arg(long, value_name = "ADDRESS", required_unless_present = "dry_run")]
+    to: Option<Target>,
+
+    /// Send from this address of this host; chooses the network that multicast goes to
+    #[arg(long, value_name = "ADDRESS")]
+    interface: Option<IpAddr>,
+
+    /// How many times as fast as recorded; 0: without any pause
+    #[arg(long, default_value = "1", value_parser = speed)]
+    speed: f64,
+
+    /// How often to send the whole capture; 0: again and again until Ctrl-C
+    #[arg(long = "loop", value_name = "TIMES", default_value = "1")]
+    times: u64,
+
+    /// Only datagrams whose first message comes from this id; wildcards 65535 and 255 match all
+    #[arg(long, value_name = "ID")]
+    from: Option<JausId>,
+
+    /// Only datagrams that were sent to or from this UDP port (repeatable)
+    #[arg(long, default_values_t = [JAUS_PORT])]
+    port: Vec<u16>,
+
+    /// Only say what would be sent
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// A capture whose times are further apart is damaged, or nothing to wait for.
+const LONGEST: Duration = Duration::from_secs(366 * 86_400);
+
+/// Where a replay goes.
+#[derive(Clone, Copy, Debug)]
+struct Target(SocketAddr);
+
+impl std::str::FromStr for Target {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "group" {
+            return Ok(Self(jaus::link::STANDARD_GROUP.into()));
+        }
+        let standard = |ip: IpAddr| SocketAddr::new(ip, STANDARD_PORT);
+        let address = text.parse().or_else(|_| text.parse().map(standard));
+        address
+            .map(Self)
+            .map_err(|_| format!("`{text}` is no address: write 10.0.0.7, 10.0.0.7:3795 or group"))
+    }
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let speed: f64 = text
+        .parse()
+        .map_err(|_| "write a number such as 1, 0.5 or 10")?;
+    if speed == 0.0 || (0.01..=1000.0).contains(&speed) {
+        Ok(speed)
+    } else {
+        Err("from 0.01 to 1000, or 0 for no pauses at all".to_owned())
+    }
+}
+
+/// A datagram to send, and when, counted from the first.
+struct Recorded {
+    after: Duration,
+    payload: Bytes,
+}
+
+/// What was found in a capture.
+#[derive(Default)]
+struct Found {
+    recorded: Vec<Recorded>,
+    /// By the source id of the first message.
+    senders: BTreeMap<String, u64>,
+    not_jaus: u64,
+    others: u64,
+    cut: u64,
+}
+
+impl Replay {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let found = self.read()?;
+        let mut output = Output::new();
+        output.line(format_args!("{found}"))?;
+        let Some(Target(to)) = self.to.filter(|_| !self.dry_run) else {
+            return Ok(Outcome::complete_if(!found.recorded.is_empty()));
+        };
+        if found.recorded.is_empty() {
+            return Ok(Outcome::Incomplete);
+        }
+        runtime::run(async {
+            let socket = self.socket(to).await?;
+            let end = runtime::end(None);
+            let mut sent = 0;
+            let result = tokio::select! {
+                () = end => Ok(()),
+                result = self.send(&socket, to, &found.recorded, &mut sent) => result,
+            };
+            output.line(format_args!("{sent} datagrams sent to {to}"))?;
+            result.map(|()| Outcome::Done)
+        })
+    }
+
+    /// Reads the whole capture: what is wrong with it is said before anything is sent.
+    fn read(&self) -> Result<Found, Failure> {
+        let in_file =
+            |error: &dyn fmt::Display| Failure::new(format!("{}: {error}", self.file.display()));
+        let file = File::open(&self.file).map_err(|error| Failure::file(&self.file, &error))?;
+        let mut capture = Capture::new(BufReader::new(file)).map_err(|error| in_file(&error))?;
+        let mut network = Network::new(self.port.iter().copied());
+        let (mut found, mut first) = (Found::default(), None);
+        while let Some(frame) = capture.next_frame() {
+            let frame = match frame {
+                Ok(frame) => frame,
+                Err(error) => {
+                    say(format_args!(
+                        "{}: {error}; what came before is used",
+                        self.file.display()
+                    ));
+                    break;
+                }
+            };
+            if let Some(datagram) = network.handle_frame(&frame) {
+                let time = frame.time.map_or(Duration::ZERO, since_1970);
+                let after = time.saturating_sub(*first.get_or_insert(time)).min(LONGEST);
+                self.sort(&datagram, after, &mut found);
+            }
+        }
+        let counts = network.counts();
+        found.cut += counts.incomplete_datagrams;
+        if counts.tcp_segments > 0 {
+            say(format_args!(
+                "note: {} TCP segments are not sent: a replay is UDP alone",
+                counts.tcp_segments
+            ));
+        }
+        Ok(found)
+    }
+
+    /// Takes a datagram in, or counts why not.
+    fn sort(&self, datagram: &Datagram<'_>, after: Duration, found: &mut Found) {
+        if datagram.missing > 0 {
+            found.cut += 1;
+            return;
+        }
+        let payload = Bytes::copy_from_slice(&datagram.payload);
+        let first = judp::frames(payload.clone())
+            .ok()
+            .and_then(|mut frames| frames.next());
+        let Some(Ok(frame)) = first else {
+            found.not_jaus += 1;
+            return;
+        };
+        if self.from.is_some_and(|from| !from.matches(frame.source)) {
+            found.others += 1;
+            return;
+        }
+        *found.senders.entry(frame.source.to_string()).or_default() += 1;
+        found.recorded.push(Recorded { after, payload });
+    }
+
+    async fn socket(&self, to: SocketAddr) -> Result<UdpSocket, Failure> {
+        let any: IpAddr = match to {
+            SocketAddr::V4(_) => Ipv4Addr::UNSPECIFIED.into(),
+            SocketAddr::V6(_) => std::net::Ipv6Addr::UNSPECIFIED.into(),
+        };
+        let from = self.interface.unwrap_or(any);
+        let socket = UdpSocket::bind((from, 0)).await.map_err(|error| {
+            Failure::new(format!(
+                "cannot send from {from}: {error}; --interface takes an address of this host"
+            ))
+        })?;
+        let set_up = || {
+            let options = SockRef::from(&socket);
+            if let IpAddr::V4(address) = from
+                && !address.is_unspecified()
+            {
+                options.set_multicast_if_v4(&address)?;
+            }
+            options.set_broadcast(true)
+        };
+        set_up().map_err(|error| Failure::new(format!("setting up the socket failed: {error}")))?;
+        Ok(socket)
+    }
+
+    async fn send(
+        &self,
+        socket: &UdpSocket,
+        to: SocketAddr,
+        recorded: &[Recorded],
+        sent: &mut u64,
+    ) -> Result<(), Failure> {
+        let mut round = 0;
+        while self.times == 0 || round < self.times {
+            round += 1;
+            let start = Instant::now();
+            for datagram in recorded {
+                if self.speed > 0.0 {
+                    sleep_until(start + datagram.after.div_f64(self.speed)).await;
+                }
+                socket
+                    .send_to(&datagram.payload, to)
+                    .await
+                    .map_err(|error| Failure::new(format!("sending to {to} failed: {error}")))?;
+                *sent += 1;
+                if self.speed == 0.0 && sent.is_multiple_of(32) {
+                    // As fast as is kind: the receiver, perhaps on this processor, has its turn.
+                    tokio::time::sleep(Duration::from_micros(200)).await;
+                }
+            }
+            // However short the capture: it is not to be a busy loop.
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let last = self.recorded.last().map(|last| last.after);
+        let seconds = last.unwrap_or_default().as_secs_f64();
+        write!(f, "{} datagrams over {seconds:.1} s", self.recorded.len())?;
+        for (sender, count) in &self.senders {
+            write!(f, "\n  {count:>7} from {sender}")?;
+        }
+        let left_out = [
+            (self.not_jaus, "that are not JAUS"),
+            (self.others, "from other ids"),
+            (self.cut, "of which the capture lacks a part"),
+        ];
+        for (count, what) in left_out.into_iter().filter(|(count, _)| *count > 0) {
+            write!(f, "\nleft out: {count} {what}")?;
+        }
+        Ok(())
+    }
+}
+
+fn since_1970(time: Timestamp) -> Duration {
+    Duration::new(time.seconds().try_into().unwrap_or(0), time.subsec_nanos())
+}

@@ -1,0 +1,156 @@
+//! A process that outlives `jaus up` for a moment if that is killed: it knows the process group of
+//! every part, and ends what is left when the pipe from `jaus up` breaks.
+//!
+//! The kernel has told the parts themselves by then ([`leash`](super::leash)); the warden sees to
+//! what they have started, and to what does not end when it is asked to.
+
+use std::collections::BTreeSet;
+use std::io::{self, BufRead, PipeWriter, Write};
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use clap::Args;
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::runtime;
+use nix::sys::signal::{SigSet, Signal, killpg};
+use nix::unistd::Pid;
+
+use super::leash;
+
+/// The subcommand's name.
+pub(crate) const NAME: &str = "up-warden";
+
+/// End process groups when standard input ends (for `jaus up` itself)
+#[derive(Args)]
+pub(crate) struct Warden {
+    /// How long they may take
+    #[arg(value_parser = runtime::seconds)]
+    grace: Duration,
+}
+
+/// Between two looks at what is left.
+const LOOK: Duration = Duration::from_millis(50);
+
+impl Warden {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        // Who ends `jaus up` with a signal to everybody around must not end us first.
+        let deaf = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP]);
+        deaf.thread_block().map_err(Failure::of)?;
+        let mut groups = BTreeSet::new();
+        for line in io::stdin().lock().lines().map_while(Result::ok) {
+            note(&mut groups, &line);
+        }
+        signal_all(&groups, Signal::SIGTERM);
+        let mut left = self.grace;
+        while !left.is_zero() && groups.iter().any(|&group| exists(group)) {
+            let pause = left.min(LOOK);
+            #[expect(clippy::disallowed_methods, reason = "this process has one thread")]
+            std::thread::sleep(pause);
+            left -= pause;
+        }
+        signal_all(&groups, Signal::SIGKILL);
+        Ok(Outcome::Done)
+    }
+}
+
+/// Reads `+1234` or `-1234`.
+fn note(groups: &mut BTreeSet<i32>, line: &str) {
+    let Ok(number) = line.parse::<i32>() else {
+        return;
+    };
+    // 0 would be our own group, and 1 everybody.
+    match number {
+        2.. => _ = groups.insert(number),
+        _ => _ = groups.remove(&number.saturating_neg()),
+    }
+}
+
+fn signal_all(groups: &BTreeSet<i32>, signal: Signal) {
+    for &group in groups {
+        // An error means that it has ended.
+        let _ = killpg(Pid::from_raw(group), signal);
+    }
+}
+
+fn exists(group: i32) -> bool {
+    killpg(Pid::from_raw(group), None).is_ok()
+}
+
+/// The warden, as `jaus up` sees it.
+pub(super) struct Guard {
+    process: Child,
+    pipe: PipeWriter,
+}
+
+impl Guard {
+    /// Starts one.
+    ///
+    /// # Errors
+    /// What the operating system has against it.
+    pub(super) fn start(grace: Duration) -> io::Result<Self> {
+        let (reader, pipe) = io::pipe()?;
+        let process = Command::new(leash::PROGRAM)
+            .arg0("jaus")
+            .args([NAME, &grace.as_secs_f64().to_string()])
+            .stdin(reader)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            // Ctrl-C is not for it.
+            .process_group(0)
+            .spawn()?;
+        Ok(Self { process, pipe })
+    }
+
+    /// Tells it of a group that begins.
+    pub(super) fn guard(&mut self, group: Pid) {
+        self.tell(format_args!("+{group}\n"));
+    }
+
+    /// Tells it of a group that has ended.
+    pub(super) fn release(&mut self, group: Pid) {
+        self.tell(format_args!("-{group}\n"));
+    }
+
+    fn tell(&mut self, line: std::fmt::Arguments<'_>) {
+        // A warden that has ended is noticed, and replaced by one that is told of all.
+        let _ = self.pipe.write_all(line.to_string().as_bytes());
+    }
+
+    /// Whether it is there no more.
+    pub(super) fn has_ended(&mut self) -> bool {
+        !matches!(self.process.try_wait(), Ok(None))
+    }
+
+    /// Sends it home.
+    pub(super) fn dismiss(self) {
+        let Self { mut process, pipe } = self;
+        drop(pipe);
+        // It ends by itself, because nothing is left to guard.
+        let _ = process.wait();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_come_and_go_and_nothing_else_is_taken_for_one() {
+        let mut groups = BTreeSet::new();
+        for line in [
+            "+12",
+            "+13",
+            "-12",
+            "+1",
+            "+0",
+            "-1",
+            "",
+            "x",
+            "+99999999999",
+        ] {
+            note(&mut groups, line);
+        }
+        assert_eq!(groups, BTreeSet::from([13]));
+    }
+}

@@ -1,0 +1,332 @@
+//! `jaus vehicle`: the reference vehicle, a simulated platform behind the services that vehicles
+//! are asked for.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the simulation runs in real time and knows the time of day"
+)]
+
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use clap::{Args, ValueEnum};
+use jaus::address::JausId;
+use jaus::component::{
+    AccessControl, Builder, Component, Condition, Kind, Management, Standing, State, Time,
+    TimeOfDay,
+};
+use jaus::node::Node;
+use jaus::service::mobility::Vehicle;
+use jaus::service::{MotionPolicy, StopCause};
+use jaus::vehicle::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::network::Network;
+use jaus_cli::output::Output;
+use jaus_cli::runtime::{self, Clock, between};
+use jaus_cli::tree;
+use tokio::time::{MissedTickBehavior, interval};
+
+use crate::node;
+
+/// Run a simulated vehicle that can be controlled and driven
+///
+/// It offers the core services and those of mobility, prints who comes and goes, who controls it
+/// and where it drives.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus vehicle --loopback               for trying things out on one computer\n  \
+    jaus vehicle --id 105.1.1 --interface eth0\n  \
+    jaus vehicle --profile contest        for clients that send once and never renew control\n  \
+    jaus vehicle --split                  Platform Management and Navigation as two components\n  \
+    jaus vehicle --noise 0.1 --seed 7     with wheels that slip\n  \
+    jaus -v vehicle                       also tells what clients want of it")]
+pub(crate) struct VehicleCommand {
+    /// End after this time [default: at Ctrl-C]
+    #[arg(long, value_parser = runtime::seconds)]
+    seconds: Option<Duration>,
+
+    /// What the vehicle is called [default: Rover]
+    #[arg(long)]
+    name: Option<String>,
+
+    /// Two components instead of one: Platform Management with the chosen id, and Navigation with
+    /// the next one, which alone can be controlled and driven
+    #[arg(long)]
+    split: bool,
+
+    /// The least authority that a client needs to control the vehicle
+    #[arg(long, value_name = "CODE", default_value = "1")]
+    authority: u8,
+
+    /// What clients are expected: `standard` ones renew control and repeat their efforts; those of
+    /// the public contests do neither, so that `contest` means --timeout 0 and --hold
+    #[arg(long, value_enum, default_value_t)]
+    profile: Profile,
+
+    /// After how many seconds control ends unless its client requests it again, a quarter of it late;
+    /// 0 for never [default: 4]
+    #[arg(long, value_name = "SECONDS")]
+    timeout: Option<u8>,
+
+    /// Keep an effort or a velocity as long as its client shows life within a second, instead of half
+    /// a second
+    #[arg(long)]
+    hold: bool,
+
+    #[command(flatten)]
+    simulation: Simulation,
+
+    #[command(flatten)]
+    network: Network,
+}
+
+/// What clients are expected to do.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum Profile {
+    #[default]
+    Standard,
+    Contest,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Simulation")]
+struct Simulation {
+    /// Where the vehicle starts on the globe, LATITUDE,LONGITUDE in degrees; it looks north
+    #[arg(long, value_name = "PLACE", default_value = "52.5,13.4", value_parser = place, allow_hyphen_values = true)]
+    at: Frame,
+
+    /// The greatest speed in m/s, from 0.1 to 50; half of it backwards
+    #[arg(long, value_name = "M/S", default_value = "2", value_parser = |text: &str| between(text, 0.1, 50.0))]
+    speed: f64,
+
+    /// The greatest acceleration in m/s², from 0.1 to 20; the brakes are twice as good
+    #[arg(long, value_name = "M/S²", default_value = "1", value_parser = |text: &str| between(text, 0.1, 20.0))]
+    acceleration: f64,
+
+    /// The greatest turn rate in rad/s, from 0.1 to 10
+    #[arg(long, value_name = "RAD/S", default_value = "1.5", value_parser = |text: &str| between(text, 0.1, 10.0))]
+    yaw_rate: f64,
+
+    /// How much the wheels slip, as a share of the velocity from 0 to 0.5
+    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = |text: &str| between(text, 0.0, 0.5))]
+    noise: f64,
+
+    /// Which slip it is: the same number gives the same one
+    #[arg(long, default_value = "1")]
+    seed: u64,
+}
+
+/// The id of whoever does not choose one.
+const ID: JausId = JausId::new(101, 1, 1);
+/// Between two lines about the motion.
+const LOOK: Duration = Duration::from_secs(1);
+
+impl VehicleCommand {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let (id, identity, config) = self.network.for_node(ID)?;
+        let name = self.name.clone().or(identity.name);
+        let name = name.unwrap_or_else(|| "Rover".to_owned());
+        let navigation = self.navigation(id)?;
+        runtime::run(async {
+            let node = Node::start(config).map_err(Failure::of)?;
+            let time = TimeOfDay::new(time_of_day);
+            let vehicle = self.simulation.vehicle().with_clock(time.clone());
+            let vehicle = vehicle.motion_policy(self.motion_policy());
+            let control = AccessControl::new()
+                .authority(self.authority)
+                .timeout(self.timeout());
+            let manager = Component::builder(Kind::Vehicle, name.clone()).access_control(control);
+            let driver = Component::builder(Kind::Vehicle, name).component_name("Navigation");
+            let driver = drivable(driver, &vehicle, control, time);
+            let attach = |builder: Builder, id: JausId| {
+                builder.attach(&node, id.component()).map_err(Failure::of)
+            };
+            let manager = if self.split {
+                let manager = manager.component_name("Platform Management");
+                Some(attach(manager, id)?)
+            } else {
+                None
+            };
+            let driver = attach(driver, navigation)?;
+            let mut output = Output::new();
+            if self.split {
+                output.line(format_args!(
+                    "{id} is Platform Management, {navigation} Navigation"
+                ))?;
+            }
+            node::introduce(&node, &driver, &mut output)?;
+            let outcome = self.watch(&driver, &vehicle, &mut output).await;
+            drop((manager, driver));
+            node.shutdown().await;
+            if let Some(cause @ StopCause::Ended) = vehicle.last_stop() {
+                output.line(format_args!("stopped: {cause}"))?;
+            }
+            outcome
+        })
+    }
+
+    fn timeout(&self) -> u8 {
+        self.timeout.unwrap_or(match self.profile {
+            Profile::Standard => AccessControl::TIMEOUT,
+            Profile::Contest => 0,
+        })
+    }
+
+    fn motion_policy(&self) -> MotionPolicy {
+        match self.hold || self.profile == Profile::Contest {
+            true => MotionPolicy::Hold,
+            false => MotionPolicy::default(),
+        }
+    }
+
+    /// The id of the component that drives.
+    fn navigation(&self, id: JausId) -> Result<JausId, Failure> {
+        let component = id.component().saturating_add(u8::from(self.split));
+        let navigation = JausId::new(id.subsystem(), id.node(), component);
+        if navigation.is_unicast() {
+            return Ok(navigation);
+        }
+        Err(Failure::new(format!(
+            "--split needs two components, and there is none after {id}: choose a component from 1 \
+             to 253 (--id)"
+        )))
+    }
+
+    /// Prints what happens, until the end.
+    async fn watch(
+        &self,
+        component: &Component,
+        vehicle: &Vehicle,
+        output: &mut Output,
+    ) -> Result<Outcome, Failure> {
+        let mut changes = component.watch();
+        let mut standings = component.watch_standing();
+        let mut standing = Standing::default();
+        standings.mark_changed();
+        let end = runtime::end(self.seconds);
+        tokio::pin!(end);
+        let clock = Clock::start();
+        let mut looks = interval(LOOK);
+        looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut told = vehicle.motion();
+        loop {
+            let words = tokio::select! {
+                () = &mut end => return Ok(Outcome::Done),
+                Some(change) = changes.next() => tree::in_words(change, &component.directory()),
+                Ok(()) = standings.changed() => {
+                    let now = *standings.borrow_and_update();
+                    if now.state == State::Initialize {
+                        component.set_condition(Condition::Initialized).await;
+                    }
+                    let before = std::mem::replace(&mut standing, now);
+                    standing_in_words(&before, &now)
+                }
+                _ = looks.tick() => {
+                    let motion = vehicle.motion();
+                    let is_news = motion.pose != told.pose;
+                    told = motion;
+                    is_news.then(|| in_words(&motion))
+                }
+                else => return Err(Failure::new("the node has stopped")),
+            };
+            if let Some(words) = words {
+                output.line(format_args!("{clock}  {words}"))?;
+            }
+        }
+    }
+}
+
+impl Simulation {
+    fn vehicle(&self) -> Vehicle {
+        let limits = Limits {
+            speed: self.speed,
+            reverse: self.speed / 2.0,
+            acceleration: self.acceleration,
+            deceleration: 2.0 * self.acceleration,
+            yaw_rate: self.yaw_rate,
+            yaw_acceleration: 2.0 * self.yaw_rate,
+        };
+        let platform = SkidSteer::new(SkidSteerConfig {
+            limits,
+            noise: self.noise,
+            seed: self.seed,
+        });
+        Vehicle::new(Pilot::new(platform, self.at))
+    }
+}
+
+/// A component with all that it takes to be driven.
+fn drivable(
+    builder: Builder,
+    vehicle: &Vehicle,
+    control: AccessControl,
+    time: TimeOfDay,
+) -> Builder {
+    builder
+        .management(Management::new().access_control(control).initializes())
+        .offer(Time::new(time))
+        .offer(vehicle.list_manager())
+        .offer(vehicle.velocity_state_sensor())
+        .offer(vehicle.local_pose_sensor())
+        .offer(vehicle.primitive_driver())
+        .offer(vehicle.local_waypoint_driver())
+        .offer(vehicle.local_waypoint_list_driver())
+        // The others in their newest version only, so that the list fits into one packet.
+        .offer(vehicle.acceleration_state_sensor().only_newest())
+        .offer(vehicle.global_pose_sensor().only_newest())
+        .offer(vehicle.velocity_state_driver().only_newest())
+        .offer(vehicle.local_vector_driver().only_newest())
+        .offer(vehicle.local_path_segment_driver().only_newest())
+        .offer(vehicle.global_vector_driver().only_newest())
+        .offer(vehicle.global_waypoint_driver().only_newest())
+        .offer(vehicle.global_waypoint_list_driver().only_newest())
+        .offer(vehicle.global_path_segment_driver().only_newest())
+}
+
+/// The time since the beginning of 1970; 0 on a computer whose clock is before that.
+fn time_of_day() -> Duration {
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+    since_1970.unwrap_or_default()
+}
+
+/// What is new about the component's state and who controls it.
+fn standing_in_words(before: &Standing, now: &Standing) -> Option<String> {
+    let client = (now.controller != before.controller).then(|| match now.controller {
+        Some(client) => format!(
+            "{} is in control, authority {}",
+            client.id, client.authority
+        ),
+        None => "nobody is in control".to_owned(),
+    });
+    let state = (now.state != before.state).then(|| format!("the state is {}", now.state));
+    match (client, state) {
+        (Some(client), Some(state)) => Some(format!("{client}; {state}")),
+        (client, state) => client.or(state),
+    }
+}
+
+fn in_words(motion: &Motion) -> String {
+    let (pose, velocity) = (&motion.pose, &motion.velocity);
+    format!(
+        "at x {:.1} m, y {:.1} m, heading {:.0}°, {:.1} m/s",
+        pose.x,
+        pose.y,
+        pose.yaw.to_degrees().round().rem_euclid(360.0),
+        velocity.x
+    )
+}
+
+/// A flag's place on the globe: `52.5,13.4`.
+fn place(text: &str) -> Result<Frame, String> {
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    let pair = text
+        .split_once(',')
+        .and_then(|(latitude, longitude)| Some((number(latitude)?, number(longitude)?)));
+    match pair {
+        Some((latitude, longitude)) if latitude.abs() <= 85.0 && longitude.abs() <= 180.0 => {
+            Ok(Frame::at(latitude, longitude))
+        }
+        _ => Err(
+            "write latitude and longitude in degrees such as 52.5,13.4, the latitude from -85 to 85"
+                .to_owned(),
+        ),
+    }
+}

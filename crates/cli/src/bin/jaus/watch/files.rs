@@ -1,0 +1,147 @@
+//! Reading messages back: captures, lines of JSON, and the directories of logs.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use jaus::view::{Capture, Dictionary, Entry, Filter, MessageStream, Network};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::output::say;
+
+use super::{Printer, lost_in};
+
+/// Longer lines of JSON than this are nobody's messages.
+const LONGEST: u64 = 64 << 20;
+
+pub(super) fn watch(
+    places: &[PathBuf],
+    filter: &Filter,
+    dictionary: &Dictionary,
+    printer: &mut Printer,
+) -> Result<Outcome, Failure> {
+    let mut files = Vec::new();
+    for place in places {
+        if place.is_dir() {
+            files.append(&mut logs_in(place)?);
+        } else {
+            files.push(place.clone());
+        }
+    }
+    let mut stream = MessageStream::new(dictionary, filter.clone());
+    let mut complete = true;
+    for path in &files {
+        let failed = |error| Failure::file(path, &error);
+        let mut file = BufReader::new(File::open(path).map_err(failed)?);
+        let begin = file.fill_buf().map_err(failed)?;
+        complete &= match begin.first() {
+            // A log of which nothing came to the disk before the power went.
+            None => true,
+            Some(b'{') => read_lines(path, file, &stream, printer)?,
+            Some(_) => read_capture(path, file, &mut stream, printer)?,
+        };
+    }
+    match stream.incomplete_messages() {
+        0 => {}
+        count => say(format_args!(
+            "note: {count} large messages not shown: some of their parts are missing"
+        )),
+    }
+    Ok(Outcome::complete_if(complete))
+}
+
+/// The files of a log in their order, which is that of their names.
+fn logs_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let failed = |error| Failure::file(directory, &error);
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(directory).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let extension = path.extension().unwrap_or_default();
+        if extension == "pcapng" || extension == "jsonl" {
+            files.push(path);
+        }
+    }
+    files.sort();
+    if files.is_empty() {
+        return Err(Failure::new(format!(
+            "{} holds no log: there are no files .pcapng or .jsonl in it",
+            directory.display()
+        )));
+    }
+    Ok(files)
+}
+
+/// Whether all of it could be read.
+fn read_capture(
+    path: &Path,
+    file: impl Read,
+    stream: &mut MessageStream<'_>,
+    printer: &mut Printer,
+) -> Result<bool, Failure> {
+    let name = path.display();
+    let mut capture = match Capture::new(file) {
+        Ok(capture) => capture,
+        Err(error) => return Err(Failure::new(format!("{name}: {error}"))),
+    };
+    let mut network = Network::of_any_port();
+    let mut complete = true;
+    while let Some(frame) = capture.next_frame() {
+        let frame = match frame {
+            Ok(frame) => frame,
+            Err(error) => {
+                say(format_args!("{name}: {error}; what came before is shown"));
+                complete = false;
+                continue;
+            }
+        };
+        if frame.lost > 0 {
+            printer.lost(frame.lost)?;
+        }
+        if let Some(datagram) = network.handle_frame(&frame) {
+            for entry in stream.read_datagram(frame.time, &datagram) {
+                printer.entry(&entry)?;
+            }
+        }
+    }
+    Ok(complete)
+}
+
+/// Whether all of them could be read.
+fn read_lines(
+    path: &Path,
+    mut file: impl BufRead,
+    stream: &MessageStream<'_>,
+    printer: &mut Printer,
+) -> Result<bool, Failure> {
+    let name = path.display();
+    let mut complete = true;
+    let mut number = 0;
+    loop {
+        let mut line = Vec::new();
+        let read = file.by_ref().take(LONGEST).read_until(b'\n', &mut line);
+        if read.map_err(|error| Failure::file(path, &error))? == 0 {
+            return Ok(complete);
+        }
+        number += 1;
+        let text = String::from_utf8_lossy(&line);
+        if text.trim().is_empty() {
+            continue;
+        }
+        match stream.read_json(&text) {
+            Ok(Some(entry)) => printer.object(&entry)?,
+            Ok(None) => tell_lost(&text, printer)?,
+            Err(error) => {
+                say(format_args!("{name}:{number}: {error}"));
+                complete = false;
+            }
+        }
+    }
+}
+
+/// What was lost is told whatever the filter says.
+fn tell_lost(line: &str, printer: &mut Printer) -> Result<(), Failure> {
+    let object = serde_json::from_str(line).ok();
+    match object.map(Entry::of_object).as_ref().and_then(lost_in) {
+        Some(count) => printer.lost(count),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,88 @@
+//! Looking on through the debug view of a running node.
+
+use std::time::Duration;
+
+use futures_util::StreamExt;
+use jaus::view::{Entry, Filter};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::output::say;
+use jaus_cli::runtime;
+use serde_json::Value as Json;
+use tokio_tungstenite::tungstenite::{Error, Message};
+
+use super::Printer;
+
+pub(super) fn watch(
+    address: &str,
+    filter: &Filter,
+    limit: Option<Duration>,
+    printer: &mut Printer,
+) -> Result<Outcome, Failure> {
+    let url = url(address, filter);
+    runtime::run(async {
+        let (mut socket, _) = tokio_tungstenite::connect_async(&url)
+            .await
+            .map_err(|error| no_view(address, &error))?;
+        let end = runtime::end(limit);
+        tokio::pin!(end);
+        loop {
+            let message = tokio::select! {
+                () = &mut end => return Ok(Outcome::Done),
+                message = socket.next() => message,
+            };
+            match message {
+                Some(Ok(Message::Text(text))) => match serde_json::from_str(&text) {
+                    Ok(Json::Object(object)) => printer.object(&Entry::of_object(object))?,
+                    _ => return Err(Failure::new(format!("{address} sends no JSON objects"))),
+                },
+                Some(Ok(Message::Close(_))) | None => break,
+                Some(Ok(_)) => {}
+                Some(Err(error)) => {
+                    say(format_args!("{address}: {error}"));
+                    break;
+                }
+            }
+        }
+        say(format_args!("{address} has ended"));
+        Ok(Outcome::Incomplete)
+    })
+}
+
+/// The address of the messages, with the filter in it.
+fn url(address: &str, filter: &Filter) -> String {
+    let place = address.trim_end_matches('/');
+    let place = place.strip_suffix("/messages").unwrap_or(place);
+    let place = place.strip_prefix("ws://").unwrap_or(place);
+    let mut url = format!("ws://{place}/messages");
+    if !filter.is_empty() {
+        url.push_str("?filter=");
+        for octet in filter.to_string().bytes() {
+            match octet {
+                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'.' | b'-' | b'_' => {
+                    url.push(char::from(octet));
+                }
+                other => url.push_str(&format!("%{other:02X}")),
+            }
+        }
+    }
+    url
+}
+
+fn no_view(address: &str, error: &Error) -> Failure {
+    let words = match error {
+        Error::Http(response) => {
+            let body = response.body().as_deref().unwrap_or_default();
+            let said = String::from_utf8_lossy(body);
+            format!("{address} refuses: {} {said}", response.status())
+        }
+        Error::Url(_) | Error::HttpFormat(_) => {
+            format!("`{address}` is no address of a debug view: write for example 127.0.0.1:8794")
+        }
+        other => format!(
+            "there is no debug view at {address}: {other}. A communicator has one \
+             (jaus-communicator, --debug ADDRESS); another address is chosen with --at, a log is read \
+             with `jaus watch FILE`"
+        ),
+    };
+    Failure::new(words)
+}

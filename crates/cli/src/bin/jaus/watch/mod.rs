@@ -1,0 +1,199 @@
+//! `jaus watch`: what passes a node, live or from its log, one line a message.
+
+mod files;
+mod live;
+mod tally;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use jaus::view::{Dictionary, Entry, Filter};
+use jaus_cli::failure::{Failure, Outcome};
+use jaus_cli::output::{Output, colours_wanted};
+use jaus_cli::runtime;
+
+use tally::Tally;
+
+/// Show the messages that pass a node, live or from files, whole and each once
+///
+/// Live they come from the debug view of a communicator, which is only looked at: whoever is too slow
+/// loses lines and is told how many. Files are captures (of a communicator's --log, of `jaus record`,
+/// of Wireshark …), lines of JSON, or directories with a communicator's log.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    jaus watch\n  \
+    jaus watch --component 101.2.33 --message Velocity\n  \
+    jaus watch --message ReportVelocityState --field 'velocity_x>1.0'\n  \
+    jaus watch --at 127.0.0.1:9000 --json | grep 4404\n  \
+    jaus watch /var/log/jaus --stats\n  \
+    jaus watch drive.pcapng --filter 'from=101 to=42 service=Pose state!=ready'\n\n\
+    In a filter a message must meet all terms: component=, from=, to= (101.2.33, 101.2, 101 or \
+    101.*.33), service=, message= (a part of the name, with * all of it, or the code), direction= \
+    (received, sent, local, passing), text=, and fields by name with = != < <= > >= or ~ \
+    (contains). Commas separate alternatives; neither case nor underscores matter in names.")]
+pub(crate) struct Watch {
+    /// Files or directories to read instead of looking on live
+    #[arg(value_name = "FILE")]
+    files: Vec<PathBuf>,
+
+    /// Where to look on: the address of a debug view
+    #[arg(
+        long,
+        value_name = "ADDRESS",
+        default_value = "127.0.0.1:8794",
+        conflicts_with = "files"
+    )]
+    at: String,
+
+    /// From or to this component, node or subsystem: 101.2.33, 101.2, 101 (this and the following
+    /// are repeatable, and all must hold)
+    #[arg(long, value_name = "ID")]
+    component: Vec<String>,
+
+    /// From this component, node or subsystem
+    #[arg(long, value_name = "ID")]
+    from: Vec<String>,
+
+    /// To this component, node or subsystem
+    #[arg(long, value_name = "ID")]
+    to: Vec<String>,
+
+    /// Of a service whose URN contains this
+    #[arg(long, value_name = "NAME")]
+    service: Vec<String>,
+
+    /// Whose name contains this (or is like it, with *), or whose code it is
+    #[arg(long, value_name = "NAME")]
+    message: Vec<String>,
+
+    /// Received, sent, local (within the node) or passing (on to others); known when live, and in
+    /// lines of JSON
+    #[arg(long, value_name = "WAY")]
+    direction: Vec<String>,
+
+    /// With a field that compares so: 'velocity_x>1.0', state=ready, 'pose.x!=0', name~bat
+    #[arg(long, value_name = "COMPARISON")]
+    field: Vec<String>,
+
+    /// Whose line of JSON contains this
+    #[arg(long, value_name = "TEXT")]
+    text: Vec<String>,
+
+    /// Terms of a filter in one text; see below
+    #[arg(long, value_name = "TERMS")]
+    filter: Vec<String>,
+
+    /// Print each message as a JSON object
+    #[arg(long)]
+    json: bool,
+
+    /// Print no messages, but how many there were of each kind, at the end
+    #[arg(long)]
+    stats: bool,
+
+    /// End after this time [default: at Ctrl-C, or at the end of the files]
+    #[arg(long, value_parser = runtime::seconds)]
+    seconds: Option<Duration>,
+}
+
+impl Watch {
+    pub(crate) fn run(&self) -> Result<Outcome, Failure> {
+        let filter = self.filter()?;
+        let mut printer = Printer {
+            output: Output::new(),
+            form: match (self.stats, self.json) {
+                (true, _) => Form::Tally(Tally::default()),
+                (false, true) => Form::Json,
+                (false, false) => Form::Words {
+                    colours: colours_wanted(&std::io::stdout()),
+                },
+            },
+        };
+        let outcome = if self.files.is_empty() {
+            live::watch(&self.at, &filter, self.seconds, &mut printer)?
+        } else {
+            let dictionary = Dictionary::complete();
+            files::watch(&self.files, &filter, &dictionary, &mut printer)?
+        };
+        if let Form::Tally(tally) = &printer.form {
+            for line in tally.lines() {
+                printer.output.line(line)?;
+            }
+        }
+        Ok(outcome)
+    }
+
+    fn filter(&self) -> Result<Filter, Failure> {
+        let mut filter = Filter::default();
+        for (key, values) in [
+            ("component", &self.component),
+            ("from", &self.from),
+            ("to", &self.to),
+            ("service", &self.service),
+            ("message", &self.message),
+            ("direction", &self.direction),
+            ("field", &self.field),
+            ("text", &self.text),
+            ("filter", &self.filter),
+        ] {
+            for value in values {
+                let added = filter.add(key, value);
+                added.map_err(|error| Failure::new(format!("--{key} {value}: {error}")))?;
+            }
+        }
+        Ok(filter)
+    }
+}
+
+/// What becomes of messages.
+struct Printer {
+    output: Output,
+    form: Form,
+}
+
+enum Form {
+    Words { colours: bool },
+    Json,
+    Tally(Tally),
+}
+
+impl Printer {
+    fn entry(&mut self, entry: &Entry) -> Result<(), Failure> {
+        match &mut self.form {
+            Form::Words { colours } => self.output.line(entry.in_words(*colours)),
+            Form::Json => self.output.line(entry.to_json()),
+            Form::Tally(tally) => {
+                tally.add(entry);
+                Ok(())
+            }
+        }
+    }
+
+    /// Tells what is missing here.
+    fn lost(&mut self, count: u64) -> Result<(), Failure> {
+        match &mut self.form {
+            Form::Words { .. } => self
+                .output
+                .line(format_args!("… {count} lost here: too slow")),
+            Form::Json => self.output.line(format_args!("{{\"lost\":{count}}}")),
+            Form::Tally(tally) => {
+                tally.lose(count);
+                Ok(())
+            }
+        }
+    }
+
+    /// An object that was written for people: a message, or how many were lost.
+    fn object(&mut self, entry: &Entry) -> Result<(), Failure> {
+        match lost_in(entry) {
+            Some(count) => self.lost(count),
+            None => self.entry(entry),
+        }
+    }
+}
+
+/// How many were lost, if that is what an object tells.
+fn lost_in(entry: &Entry) -> Option<u64> {
+    entry.json().get("lost")?.as_u64()
+}

@@ -1,0 +1,73 @@
+//! Who a node is, as flags and settings files say it.
+
+use std::str::FromStr;
+
+use clap::ValueEnum;
+use serde::Deserialize;
+
+use jaus::address::JausId;
+use jaus::component::Kind;
+
+/// Who a node is, as far as a settings file or flags say.
+#[derive(Debug, Default, Deserialize)]
+pub struct Identity {
+    pub(super) id: Option<OwnId>,
+    /// What the subsystem is called.
+    pub name: Option<String>,
+    /// What the subsystem is.
+    pub kind: Option<SubsystemKind>,
+}
+
+/// Our own id: one component, so no wildcards.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub(super) struct OwnId(pub(super) JausId);
+
+impl FromStr for OwnId {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let whole = match text.matches('.').count() {
+            1 => format!("{text}.1"),
+            _ => text.to_owned(),
+        };
+        let id: JausId = whole.parse().map_err(|error| format!("{error}"))?;
+        if id.is_unicast() {
+            return Ok(Self(id));
+        }
+        Err(format!(
+            "{id} is not one component: choose a subsystem from 1 to 65534, a node and a component \
+             from 1 to 254"
+        ))
+    }
+}
+
+impl TryFrom<String> for OwnId {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+/// The kinds of subsystems, as flags and files name them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SubsystemKind {
+    /// Something that moves or acts
+    Vehicle,
+    /// An operator control unit
+    Ocu,
+    /// Anything else
+    Other,
+}
+
+impl From<SubsystemKind> for Kind {
+    fn from(kind: SubsystemKind) -> Self {
+        match kind {
+            SubsystemKind::Vehicle => Self::Vehicle,
+            SubsystemKind::Ocu => Self::OperatorControlUnit,
+            SubsystemKind::Other => Self::OtherSubsystem,
+        }
+    }
+}

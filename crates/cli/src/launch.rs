@@ -1,0 +1,266 @@
+//! The launch of a program that is one ready component: flags, settings file, node, and the end.
+
+use std::convert::Infallible;
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{ArgMatches, Args, Command, CommandFactory, FromArgMatches, Parser};
+
+use super::failure::{Failure, Outcome};
+use super::logging::Logging;
+use super::network::Network;
+use super::systemd::Systemd;
+use super::{output, runtime, settings};
+use jaus::address::JausId;
+use jaus::component::Kind;
+use jaus::node::{Config, Node};
+use jaus::parts::{Part, PartError, Seat};
+
+/// The flags of a program that is one [`Part`].
+pub trait Ready: Args {
+    /// What the program is called, for example `jaus-planner`.
+    const PROGRAM: &'static str;
+    /// What it does, in one line.
+    const ABOUT: &'static str;
+    /// Text below the help: examples.
+    const EXAMPLES: &'static str;
+    /// The id of whoever does not choose one.
+    const ID: JausId;
+    /// What its subsystem is.
+    const KIND: Kind = Kind::Vehicle;
+    /// What its subsystem is called unless a flag or the settings file says.
+    const SUBSYSTEM: &'static str = "G-Bat";
+
+    /// What the flags say about the node, if we run one: it is laid over the node's settings.
+    fn for_node(&self) -> impl FnOnce(&mut Config) + 'static {
+        |_: &mut Config| {}
+    }
+
+    /// The component that the flags ask for.
+    ///
+    /// # Errors
+    /// If a flag is mistaken: what is wrong and what to do.
+    fn part(self) -> Result<impl Part, Failure>;
+}
+
+#[derive(Parser)]
+#[command(version)]
+struct Program<F: Args> {
+    #[command(flatten)]
+    flags: F,
+
+    /// What the subsystem is called, the same for all its components
+    #[arg(long)]
+    name: Option<String>,
+
+    /// End after this time [default: at Ctrl-C]
+    #[arg(long, value_parser = runtime::seconds)]
+    seconds: Option<Duration>,
+
+    #[command(flatten)]
+    network: Network,
+
+    #[command(flatten)]
+    logging: Logging,
+}
+
+/// What is logged without `-v`: warnings of every module, such as an emergency or a log that cannot be
+/// written, and what parts report of themselves.
+const USUAL: &str = "warn,jaus::parts=info,jaus::ocu=info,jaus::gateway=info,jaus_cli=info";
+
+/// Runs a program to its end: reads flags and settings, takes a place on a node, lets the part run
+/// until Ctrl-C or SIGTERM, and takes leave.
+///
+/// Exit status: 0 it was told to end, by a signal or by Management's Shutdown; 1 it could not go on; 2 it could not begin.
+#[must_use]
+pub fn launch<F: Ready>() -> ExitCode {
+    let program = match read::<F>() {
+        Ok(program) => program,
+        Err(failure) => return end::<F>(Err(failure)),
+    };
+    let outcome = program.logging.start(USUAL);
+    end::<F>(outcome.and_then(|()| program.run()))
+}
+
+fn end<F: Ready>(outcome: Result<Outcome, Failure>) -> ExitCode {
+    match outcome {
+        Ok(Outcome::Done) | Err(Failure::OutputClosed) => ExitCode::SUCCESS,
+        Ok(Outcome::Incomplete) => ExitCode::from(1),
+        Ok(Outcome::Broken) => ExitCode::from(2),
+        Err(failure) => {
+            output::say_as(F::PROGRAM, failure);
+            ExitCode::from(2)
+        }
+    }
+}
+
+impl<F: Ready> Program<F> {
+    fn run(self) -> Result<Outcome, Failure> {
+        let for_node = self.flags.for_node();
+        let part = self.flags.part()?;
+        runtime::run(async {
+            let place = self.network.join(F::ID, for_node);
+            let until = runtime::end(self.seconds);
+            tokio::pin!(until);
+            let place = tokio::select! {
+                place = place => place?,
+                () = &mut until => return Ok(Outcome::Done),
+            };
+            let node = place.stay.node();
+            let port = place.port;
+            tell_place(port.id(), node.as_ref());
+            let kind = place.identity.kind.map_or(F::KIND, Kind::from);
+            let name = self.name.or(place.identity.name);
+            let name = name.unwrap_or_else(|| F::SUBSYSTEM.to_owned());
+            let seat = Seat {
+                port,
+                node,
+                kind,
+                name,
+            };
+            let systemd = Systemd::from_environment();
+            let outcome = tokio::select! {
+                result = part.run(seat) => {
+                    let Err(error): Result<Infallible, _> = result;
+                    let outcome = match error {
+                        PartError::ShutDown => Outcome::Done,
+                        _ => Outcome::Incomplete,
+                    };
+                    output::say_as(F::PROGRAM, error);
+                    outcome
+                }
+                () = systemd.watch() => Outcome::Done,
+                () = &mut until => Outcome::Done,
+            };
+            systemd.stopping();
+            place.stay.end().await;
+            Ok(outcome)
+        })
+    }
+}
+
+/// Tells who and where we are.
+fn tell_place(id: JausId, node: Option<&Node>) {
+    let Some(node) = node else {
+        tracing::info!("{id} on the node of this host");
+        return;
+    };
+    for link in node.links() {
+        tracing::info!("{id} on {}, UDP {}", link.interface.name, link.local);
+    }
+}
+
+/// The program as flags and settings file say; help, version and mistakes end the process here.
+fn read<F: Ready>() -> Result<Program<F>, Failure> {
+    let given: Vec<OsString> = std::env::args_os().collect();
+    let matches = command::<F>().get_matches_from(&given);
+    let program = parse::<F>(&matches);
+    let Some(file) = program.network.file() else {
+        return Ok(program);
+    };
+    let from_file = settings::flags(file)?;
+    if from_file.is_empty() {
+        return Ok(program);
+    }
+    // What the command line says comes later and therefore wins.
+    let (name, rest) = given
+        .split_first()
+        .map_or((None, &[][..]), |(n, r)| (Some(n), r));
+    let all = name
+        .cloned()
+        .into_iter()
+        .chain(from_file.into_iter().map(OsString::from));
+    let all = all.chain(rest.iter().cloned());
+    let matches = command::<F>()
+        .try_get_matches_from(all)
+        .map_err(|error| in_file(file, &error))?;
+    Ok(parse::<F>(&matches))
+}
+
+fn command<F: Ready>() -> Command {
+    Program::<F>::command()
+        .name(F::PROGRAM)
+        .about(F::ABOUT)
+        .long_about(None)
+        .after_help(F::EXAMPLES)
+        .args_override_self(true)
+        .mut_arg("id", |id| id.help(id_help(F::ID)))
+        .mut_arg("config", |config| {
+            config
+                .help(FILE_HELP)
+                .long_help(format!("{FILE_HELP}\n\n{FILE_EXAMPLE}"))
+        })
+}
+
+fn id_help(usual: JausId) -> String {
+    format!(
+        "Our id, SUBSYSTEM.NODE.COMPONENT; on the node of the host (--attach) its subsystem and node \
+         are ours [default: {usual}; on the node of the host component {}]",
+        usual.component()
+    )
+}
+
+const FILE_HELP: &str = "Take the settings from a TOML file; flags come on top";
+
+const FILE_EXAMPLE: &str = r#"For example:
+  id = "101.1.1"                  # who we are
+  name = "Rover"                  # what the subsystem is called
+  interfaces = ["eth0"]           # or "all", or "loopback"
+  port = 3794
+  group = "239.255.0.1:3794"      # or "off"
+  peers = ["192.168.7.2", "102.255.255@192.168.7.3:3795"]
+
+  [component]                     # the flags above, by their long names
+  attach = true
+  seconds = 60"#;
+
+fn parse<F: Ready>(matches: &ArgMatches) -> Program<F> {
+    // The matches are those of this very command, so that only a mistake in its definition can fail.
+    Program::from_arg_matches(matches).unwrap_or_else(|error| error.exit())
+}
+
+/// A mistake in the file's table `[component]`, which is told like one on the command line.
+fn in_file(file: &Path, error: &clap::Error) -> Failure {
+    let text = error.to_string();
+    let text = text.strip_prefix("error: ").unwrap_or(&text);
+    let told: Vec<_> = text
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:"))
+        .filter(|line| !line.is_empty())
+        .collect();
+    Failure::new(format!(
+        "{}: in [component], which holds flags by their long names: {}",
+        file.display(),
+        told.join("; ")
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use tracing_subscriber::filter::Targets;
+
+    use super::*;
+
+    #[test]
+    fn warnings_of_every_module_are_logged_without_a_flag() {
+        let usual: Targets = USUAL.parse().unwrap();
+        for target in [
+            "jaus::service::control",
+            "jaus::view::log",
+            "jaus::endpoint",
+        ] {
+            assert!(
+                usual.would_enable(target, &tracing::Level::WARN),
+                "{target}"
+            );
+            assert!(
+                !usual.would_enable(target, &tracing::Level::INFO),
+                "{target}"
+            );
+        }
+        assert!(usual.would_enable("jaus::parts::planner", &tracing::Level::INFO));
+    }
+}

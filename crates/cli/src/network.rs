@@ -1,0 +1,372 @@
+//! The flags of every command that goes on the network: who we are, and where.
+
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use jaus::address::JausId;
+#[cfg(unix)]
+use jaus::link::junior::DEFAULT_FOLDER;
+use jaus::link::local::record::Reason;
+use jaus::link::udp::PortTaken;
+use jaus::link::{Group, Interfaces};
+use jaus::node::{Address, Config, Host, HostError, Node, Peer, Port, Sender};
+
+use super::failure::Failure;
+use super::identity::OwnId;
+pub use super::identity::{Identity, SubsystemKind};
+use super::settings;
+
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Network")]
+#[expect(
+    missing_docs,
+    reason = "it would become the help text of whoever flattens it"
+)]
+pub struct Network {
+    /// Our id, SUBSYSTEM.NODE.COMPONENT or SUBSYSTEM.NODE (then component 1) [default: 101.1.1 for
+    /// `jaus node`, 42.1.1 for `jaus judge`; the other commands take one from subsystem 60000 on]
+    #[arg(long, value_name = "ID")]
+    id: Option<OwnId>,
+
+    /// Use only this interface, by name or IPv4 address (repeatable) [default: all that are up]
+    #[arg(long, value_name = "INTERFACE", conflicts_with = "loopback")]
+    interface: Vec<String>,
+
+    /// Stay on this host: no network is needed, and nothing leaves. Without --port, any free port
+    #[arg(long)]
+    loopback: bool,
+
+    /// Our UDP port; 0 takes any free one [default: 3794; if that is taken, `jaus node` says so and
+    /// the other commands take any free one]
+    #[arg(long)]
+    port: Option<u16>,
+
+    /// The multicast group by which nodes find each other, or off [default: 239.255.0.1:3794]
+    #[arg(long, value_name = "ADDRESS")]
+    group: Option<Group>,
+
+    /// How many routers multicast may pass [default: 16]
+    #[arg(long)]
+    ttl: Option<u8>,
+
+    /// Speak to this address by unicast too, where multicast does not reach (repeatable)
+    ///
+    /// ADDRESS, ADDRESS:PORT or ID@ADDRESS:PORT, for example 192.168.7.2 or 102.255.255@192.168.7.2
+    #[arg(long, value_name = "PEER")]
+    peer: Vec<Peer>,
+
+    /// Use the node of this host that serves components (`jaus node --local`) instead of a node of
+    /// our own; ADDRESS is where it does [default: the usual place]
+    #[arg(
+        long,
+        value_name = "ADDRESS",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "default",
+        conflicts_with_all = ["interface", "loopback", "port", "group", "ttl", "peer"],
+    )]
+    attach: Option<Address>,
+
+    /// Go through the node manager of a Junior on this host, in the place of UDP of our own; FOLDER
+    /// is where Junior has its sockets [default: /tmp]
+    #[cfg(unix)]
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = DEFAULT_FOLDER,
+        conflicts_with_all = ["loopback", "attach"],
+    )]
+    junior: Option<PathBuf>,
+
+    /// Take the settings from a TOML file; flags come on top
+    ///
+    /// For example:
+    ///   id = "101.1.1"                  # who we are: for `jaus node` only
+    ///   name = "Rover"
+    ///   kind = "vehicle"
+    ///   interfaces = ["eth0"]           # or "all", or "loopback"
+    ///   port = 3794
+    ///   port_taken = "refuse"           # or "use-free"
+    ///   group = "239.255.0.1:3794"      # or "off"
+    ///   ttl = 16
+    ///   peers = ["192.168.7.2", "102.255.255@192.168.7.3:3795"]
+    #[arg(long, value_name = "FILE", verbatim_doc_comment)]
+    config: Option<PathBuf>,
+}
+
+impl Network {
+    /// For a node that is meant to be found: its component's id, what the file says about it, and
+    /// the settings. `default` is the id of whoever chooses none.
+    pub fn for_node(&self, default: JausId) -> Result<(JausId, Identity, Config), Failure> {
+        let (identity, node) = self.settings()?;
+        let id = self.chosen_id(&identity, &node).unwrap_or(default);
+        Ok((id, identity, self.with_flags(node, id)?))
+    }
+
+    /// For a look at a node that is to be: the id that it is to have, if one is chosen, and its
+    /// settings, but with a passing id.
+    pub fn for_examination(&self) -> Result<(Option<JausId>, Config), Failure> {
+        let (identity, node) = self.settings()?;
+        let id = self.chosen_id(&identity, &node);
+        Ok((id, self.with_flags(node, passing_id())?))
+    }
+
+    /// Whether settings come from a file.
+    pub const fn has_file(&self) -> bool {
+        self.config.is_some()
+    }
+
+    /// The id that a flag or the file names.
+    fn chosen_id(&self, identity: &Identity, node: &Config) -> Option<JausId> {
+        // A file may also have the node's own keys for its id.
+        let of_node = (node.subsystem, node.node) != (0, 0);
+        let of_node = of_node.then(|| OwnId(JausId::new(node.subsystem, node.node, 1)));
+        let id = self.id.or(identity.id).or(of_node);
+        id.map(|OwnId(id)| id)
+    }
+
+    /// For a command that runs for a moment beside other nodes: a passing id, whatever the file
+    /// says, and any free port unless a flag names one.
+    fn for_a_moment(&self) -> Result<(JausId, Config), Failure> {
+        self.for_a_moment_as(passing_id())
+    }
+
+    /// The same for a command that has a usual id.
+    fn for_a_moment_as(&self, usual: JausId) -> Result<(JausId, Config), Failure> {
+        let (_, node) = self.settings()?;
+        let id = self.id.map_or(usual, |OwnId(id)| id);
+        let node = self.with_flags(node.or_any_free_port(), id)?;
+        Ok((id, node))
+    }
+
+    /// The same for a command that looks at the numbers of its node, so that it needs one of its
+    /// own.
+    pub fn for_own_node(&self, command: &str) -> Result<(JausId, Config), Failure> {
+        self.for_own_node_as(passing_id(), command)
+    }
+
+    /// The same for a command that has a usual id.
+    pub fn for_own_node_as(
+        &self,
+        usual: JausId,
+        command: &str,
+    ) -> Result<(JausId, Config), Failure> {
+        if self.attach.is_some() {
+            return Err(Failure::new(format!(
+                "`{command}` runs a node of its own: leave --attach out"
+            )));
+        }
+        self.for_a_moment_as(usual)
+    }
+
+    /// The settings file, if one is chosen.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        self.config.as_deref()
+    }
+
+    /// A place for a component that stays: on the host's node, or on one of its own. `usual` is the
+    /// id of whoever chooses none; on the host's node its component number alone counts.
+    ///
+    /// `for_node` lays its wishes over the settings of a node of our own.
+    ///
+    /// Where the host's node is not there yet, it is waited for, for ever: components may be started
+    /// in any order.
+    ///
+    /// # Errors
+    /// If a flag or the file is mistaken, or a node cannot be started, or will not have us.
+    pub async fn join(
+        &self,
+        usual: JausId,
+        for_node: impl FnOnce(&mut Config),
+    ) -> Result<Place, Failure> {
+        let Some(address) = &self.attach else {
+            let (id, identity, mut config) = self.for_node(usual)?;
+            for_node(&mut config);
+            config.validate().map_err(Failure::of)?;
+            let config = config.or_any_free_port();
+            let node = Node::start(config).map_err(Failure::of)?;
+            let port = node.attach(id.component()).map_err(Failure::of)?;
+            return Ok(Place {
+                port,
+                identity,
+                stay: Stay::OnOurs(node),
+            });
+        };
+        let (identity, node) = self.settings()?;
+        let id = self.chosen_id(&identity, &node);
+        let host = Host::at(address.clone());
+        let port = wait_for_host(&host, id, usual.component()).await?;
+        let stay = Stay::AtHost(port.sender());
+        Ok(Place {
+            port,
+            identity,
+            stay,
+        })
+    }
+
+    /// A component for a command that runs for a moment, on the host's node or on one of its own.
+    pub async fn join_for_a_moment(&self) -> Result<(Port, Stay), Failure> {
+        let Some(address) = &self.attach else {
+            let (id, config) = self.for_a_moment()?;
+            let node = Node::start(config).map_err(Failure::of)?;
+            let port = node.attach(id.component()).map_err(Failure::of)?;
+            return Ok((port, Stay::OnOurs(node)));
+        };
+        let host = Host::at(address.clone());
+        let port = match self.id {
+            Some(OwnId(id)) => host.attach_as(id).await,
+            None => attach_somewhere(&host).await,
+        };
+        let port = port.map_err(Failure::of)?;
+        let stay = Stay::AtHost(port.sender());
+        Ok((port, stay))
+    }
+
+    /// What the file says; without one, the usual settings.
+    fn settings(&self) -> Result<(Identity, Config), Failure> {
+        match &self.config {
+            Some(path) => settings::read(path),
+            None => Ok((Identity::default(), Config::new(0, 0))),
+        }
+    }
+
+    /// Lays id and flags over the settings.
+    fn with_flags(&self, mut node: Config, id: JausId) -> Result<Config, Failure> {
+        (node.subsystem, node.node) = (id.subsystem(), id.node());
+        if self.loopback {
+            node.interfaces = Interfaces::Loopback;
+            node.port = 0;
+        } else if !self.interface.is_empty() {
+            node.interfaces = Interfaces::Only(self.interface.clone());
+        }
+        if let Some(port) = self.port {
+            // Who names a port wants that one.
+            node.port = port;
+            node.port_taken = PortTaken::Refuse;
+        }
+        node.group = self.group.unwrap_or(node.group);
+        node.ttl = self.ttl.unwrap_or(node.ttl);
+        node.peers.extend(&self.peer);
+        #[cfg(unix)]
+        if self.junior.is_some() {
+            node.junior.clone_from(&self.junior);
+        }
+        node.validate().map_err(Failure::of)?;
+        Ok(node)
+    }
+}
+
+/// A place that a component has taken.
+pub struct Place {
+    /// Its door to the node.
+    pub port: Port,
+    /// Who its subsystem is, as far as the settings file says.
+    pub identity: Identity,
+    /// Whose node it is.
+    pub stay: Stay,
+}
+
+/// Attaches to the host's node as soon as there is one, and the place is free: a component that has
+/// crashed may still be there for a moment.
+#[expect(clippy::disallowed_methods, reason = "processes start in real time")]
+async fn wait_for_host(host: &Host, id: Option<JausId>, usual: u8) -> Result<Port, Failure> {
+    const PAUSE: Duration = Duration::from_millis(100);
+    const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+    const TAKEN: u32 = 10;
+    let mut pause = PAUSE;
+    let (mut taken, mut told) = (0, false);
+    loop {
+        let attached = match id {
+            Some(id) => host.attach_as(id).await,
+            None => host.attach(usual).await,
+        };
+        let error = match attached {
+            Ok(port) => return Ok(port),
+            Err(error) => error,
+        };
+        match &error {
+            HostError::Link(_) => {}
+            HostError::Refused {
+                reason: Reason::Taken,
+                ..
+            } if taken < TAKEN => taken += 1,
+            _ => return Err(Failure::of(error)),
+        }
+        if !std::mem::replace(&mut told, true) {
+            tracing::info!("waiting for the node of this host: {error}");
+        }
+        tokio::time::sleep(pause).await;
+        pause = (2 * pause).min(LONGEST_PAUSE);
+    }
+}
+
+/// Where the component of a passing command lives.
+pub enum Stay {
+    /// A node of our own.
+    OnOurs(Node),
+    /// The node of the host.
+    AtHost(Sender),
+}
+
+impl Stay {
+    /// The node, if it is in this process.
+    #[must_use]
+    pub fn node(&self) -> Option<Node> {
+        match self {
+            Self::OnOurs(node) => Some(node.clone()),
+            Self::AtHost(_) => None,
+        }
+    }
+
+    /// Whether it is a node that somebody else runs.
+    pub const fn is_guest(&self) -> bool {
+        matches!(self, Self::AtHost(_))
+    }
+
+    /// Ends it, once nobody holds the component any more.
+    #[expect(clippy::disallowed_methods, reason = "a farewell in real time")]
+    pub async fn end(self) {
+        match self {
+            Self::OnOurs(node) => node.shutdown().await,
+            Self::AtHost(sender) => {
+                // A node that does not listen need not be told.
+                let _ = tokio::time::timeout(FAREWELL, sender.disconnected()).await;
+            }
+        }
+    }
+}
+
+const FAREWELL: Duration = Duration::from_millis(250);
+
+/// Any number that is free on the host's node, for a command to which it does not matter.
+async fn attach_somewhere(host: &Host) -> Result<Port, HostError> {
+    const TRIES: usize = 5;
+    for _ in 1..TRIES {
+        match host.attach(passing_id().component()).await {
+            Err(HostError::Refused {
+                reason: Reason::Taken,
+                ..
+            }) => {}
+            result => return result,
+        }
+    }
+    host.attach(passing_id().component()).await
+}
+
+/// An id for a command that needs none of its own choice: subsystems from 60000 on, where nobody
+/// numbers vehicles. It differs from run to run, so that two people who use the tool at the same
+/// time do not meet.
+fn passing_id() -> JausId {
+    let random = RandomState::new().build_hasher().finish();
+    let [subsystem, node, component, ..] = random.to_le_bytes();
+    JausId::new(
+        60_000 + u16::from(subsystem),
+        node % 254 + 1,
+        component % 254 + 1,
+    )
+}

@@ -1,0 +1,55 @@
+//! Attacks on `jaus vehicle`, on real hosts: the vehicle with its defaults in one network namespace,
+//! an attacker in another, and clients that behave in two more.
+//!
+//! The rows of the table in docs/safety.md are printed:
+//! `cargo test --test attack_hosts -- --nocapture | grep '^|'`
+//!
+//! Every attack is bounded in time and in packets. Making namespaces needs rights, see
+//! `jaus_test_kit::hosts`.
+#![cfg(target_os = "linux")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test with processes"
+)]
+
+mod attacker;
+mod attacks;
+mod bed;
+mod clients;
+mod connections;
+mod floods;
+mod forgeries;
+mod gateway;
+mod ip6;
+#[path = "../gateway_hosts/operator.rs"]
+mod operator;
+#[path = "../gateway_hosts/ra_vehicle.rs"]
+mod ra_vehicle;
+mod routers;
+mod scene;
+mod soak;
+mod streams;
+mod talkers;
+#[path = "../safety_hosts/testbed.rs"]
+#[allow(dead_code, reason = "shared with tests that do more")]
+mod testbed;
+
+/// Not a test of its own: does nothing unless another test starts it in a role.
+#[test]
+fn a_process_that_plays_a_node() {
+    jaus_test_kit::hosts::play(async |role| match role {
+        "client" => clients::client().await,
+        "newcomer" => clients::newcomer().await,
+        "subscriber" => clients::subscriber().await,
+        "echo" => clients::echo(),
+        "talker" => talkers::talk().await,
+        "connections" => connections::run().await,
+        "ra-vehicle" => ra_vehicle::play(testbed::Host::Controller.cable()).await,
+        "operator" => operator::play().await,
+        attack => attacks::run(attack).await,
+    });
+}

@@ -1,0 +1,158 @@
+//! The whole system through the operator's page: real programs as processes on four hosts with two
+//! networks, and a real browser that is used as people use it. Pictures of the page are kept in
+//! `target/e2e-screenshots`.
+//!
+//! It needs Chromium and network namespaces. Where they lack, the tests say so loudly and pass, but
+//! fail if the environment says `CI`.
+#![cfg(target_os = "linux")]
+#![allow(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test with processes"
+)]
+
+mod browser;
+mod by_hand;
+mod steps;
+mod system;
+
+use std::time::Duration;
+
+use browser::{Browser, SCREENS};
+use jaus_test_kit::evidence::not_tested;
+use jaus_test_kit::hosts::on_hosts;
+use steps::{emergency, look_from_all_screens, take_control};
+use system::{PAGE, System};
+
+#[test]
+fn a_mission_through_the_page_survives_the_death_of_every_part() {
+    let test = "a_mission_through_the_page_survives_the_death_of_every_part";
+    if let Some(reason) = browser::missing() {
+        return not_tested(test, &reason);
+    }
+    let missing = system::missing();
+    if !missing.is_empty() {
+        return not_tested(test, &format!("not built: {}", missing.join(", ")));
+    }
+    on_hosts(test, System::new, run);
+}
+
+#[test]
+fn a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once() {
+    let test = "a_vehicle_is_driven_by_hand_through_the_page_and_stopped_at_once";
+    if let Some(reason) = browser::missing() {
+        return not_tested(test, &reason);
+    }
+    if !system::program("jaus-ocu").exists() {
+        return not_tested(test, "not built: jaus-ocu");
+    }
+    by_hand::run();
+}
+
+fn run(system: &System) {
+    system.start_all();
+    let mut page = Browser::start(Some(system.operator()));
+    page.look_on(SCREENS[0]);
+    page.open(PAGE);
+    comes_alive(&mut page);
+    look_from_all_screens(&mut page, "1-start");
+
+    take_control(&mut page);
+    plan(&mut page, 4.5, 1.5);
+    look_from_all_screens(&mut page, "2-approval");
+    approve(&mut page);
+    page.wait("+document.querySelector('#progress').ariaValueNow > 5");
+    look_from_all_screens(&mut page, "3-driving");
+
+    says_that_the_planner_is_gone(system, &mut page);
+    take_control(&mut page);
+    plan(&mut page, 4.5, 1.5);
+    approve(&mut page);
+
+    take_over_by_keyboard(&mut page);
+    emergency(&mut page);
+
+    for program in system.programs() {
+        system.kill(program);
+        if program != "jaus-ocu" {
+            page.wait("!document.querySelector('#missing').hidden");
+        }
+        page.screenshot(&format!("5-without-{program}"));
+        system.start(program);
+        comes_alive(&mut page);
+    }
+    arrive(&mut page);
+    look_from_all_screens(&mut page, "6-arrived");
+    assert!(page.complaints().is_empty(), "{:?}", page.complaints());
+}
+
+/// Waits until the page is connected, by itself, and shows a vehicle that is all there.
+fn comes_alive(page: &mut Browser) {
+    page.wait("document.body.dataset.link === 'live'");
+    page.wait("document.querySelectorAll('#parts .part').length >= 4");
+    page.wait("document.querySelector('#north').textContent !== '–'");
+    page.wait("document.querySelector('#map-empty').hidden");
+    page.wait("document.querySelector('#missing').hidden");
+}
+
+/// Touches the map, corrects the place by hand, and waits for a route.
+fn plan(page: &mut Browser, north: f64, east: f64) {
+    page.press("[data-show=mission]");
+    page.press("#map");
+    page.wait("document.querySelector('#destination-x').value !== ''");
+    page.write("#destination-x", &north.to_string());
+    page.write("#destination-y", &east.to_string());
+    // Right after control was taken the planner may not be ready yet; then the page says so, and
+    // whoever wants a route presses again.
+    let planned = "!document.querySelector('#approve').disabled";
+    page.press("#plan");
+    if !page.holds_within(Duration::from_secs(5), planned) {
+        page.press("#plan");
+    }
+    page.wait(planned);
+}
+
+fn approve(page: &mut Browser) {
+    page.press("#approve");
+    page.wait(
+        "document.querySelector('#stages [aria-current] .stage-name')?.textContent === 'Driving'",
+    );
+}
+
+/// A planner that dies while it drives is named, and the station stops the vehicle.
+fn says_that_the_planner_is_gone(system: &System, page: &mut Browser) {
+    system.kill("jaus-planner");
+    let line = "document.querySelector('#mission-line').textContent";
+    page.wait(&format!("/planner [0-9.]+ is (gone|silent)/.test({line})"));
+    page.wait(&format!("{line}.includes('was told to stop')"));
+    page.wait("document.querySelector('#missing').textContent.includes('Planner')");
+    look_from_all_screens(page, "3-planner-gone");
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
+    system.start("jaus-planner");
+    comes_alive(page);
+}
+
+/// Holding a key drives the vehicle, mission or not; letting go stops it.
+fn take_over_by_keyboard(page: &mut Browser) {
+    page.press("[data-show=drive]");
+    page.key_down("KeyW", "w");
+    page.wait(
+        "document.querySelector('#drive-line').textContent.includes('the vehicle is driven')",
+    );
+    page.wait("parseFloat(document.querySelector('#speed').textContent) > 0.1");
+    page.screenshot("4-keyboard");
+    page.wait("document.body.dataset.mission === 'over'");
+    page.key_up("KeyW", "w");
+    page.wait("document.querySelector('#drive-source').textContent === 'Idle'");
+    page.wait("Math.abs(parseFloat(document.querySelector('#speed').textContent)) < 0.05");
+}
+
+/// A mission to its end.
+fn arrive(page: &mut Browser) {
+    take_control(page);
+    plan(page, -4.5, -1.5);
+    approve(page);
+    page.wait("document.querySelector('#mission-line').dataset.state === 'arrived'");
+}

@@ -1,0 +1,30 @@
+//! The interoperability suite: a subject and its peers, each on a host of its own, in the same
+//! scenarios for all of them. It knows nothing of either but what goes over the network and what
+//! their settings say; the result is a table in `target/interop`. `README.md` beside this file
+//! tells how to have it try another peer.
+//!
+//! Making hosts needs rights, as in `jaus_test_kit::hosts`. Without them the suite prints `NOT TESTED`.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test with processes"
+)]
+
+#[cfg(target_os = "linux")]
+mod suite;
+
+use std::process::ExitCode;
+
+#[cfg(target_os = "linux")]
+fn main() -> ExitCode {
+    suite::main()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn main() -> ExitCode {
+    eprintln!("*** SKIPPED interop: it needs the network namespaces of Linux");
+    ExitCode::SUCCESS
+}

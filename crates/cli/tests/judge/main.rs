@@ -1,0 +1,18 @@
+//! `jaus judge` against peers that are right, wrong, slow and silent.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests with sockets"
+)]
+
+mod papers;
+mod peer;
+mod right;
+mod safety;
+#[path = "../support/mod.rs"]
+mod support;
+mod vehicle;
+mod wrong;

@@ -1,0 +1,109 @@
+//! What is shipped fits together: programs, settings, units, and the system for one machine.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use jaus_test_kit::tools::workspace;
+
+use crate::support::run;
+
+fn packaging(path: &str) -> PathBuf {
+    workspace("packaging").join(path)
+}
+
+/// The names of files or folders, up to a suffix.
+fn named(folder: &Path, prefix: &str, suffix: &str) -> BTreeSet<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let middle = |name: String| {
+        let name = name.strip_prefix(prefix)?.strip_suffix(suffix)?;
+        Some(name.to_owned())
+    };
+    names.filter_map(middle).collect()
+}
+
+/// The service that joins two networks, and so belongs to no machine that is a whole system.
+const BETWEEN_NETWORKS: &str = "ra-gateway";
+
+/// What follows `jaus-` in the names of our programs.
+fn programs() -> BTreeSet<String> {
+    named(&workspace("crates/cli/src/bin"), "jaus-", ".rs")
+}
+
+#[test]
+fn every_settings_file_and_every_unit_is_of_a_program_that_exists() {
+    let (programs, settings) = (programs(), named(&packaging("etc"), "", ".toml"));
+    assert!(settings.is_subset(&programs), "{settings:?}");
+    let special = named(&packaging("systemd"), "jaus@", ".service.d");
+    assert!(special.is_subset(&settings), "{special:?}");
+    let manifest = include_str!("../../Cargo.toml");
+    for part in special {
+        let packed = format!("\"../../packaging/systemd/jaus@{part}.service.d/*\"");
+        assert!(manifest.contains(&packed), "{packed} is not in the package");
+    }
+}
+
+#[test]
+fn the_system_for_one_machine_has_nothing_wrong_and_every_part_that_is_a_service() {
+    let system = packaging("system.toml");
+    let run = run(&["up", system.to_str().unwrap(), "--check"], b"");
+    assert_eq!(run.status, 0, "{}", run.stderr);
+    let parts = named(&packaging("etc"), "", ".toml");
+    for part in parts.into_iter().filter(|part| part != BETWEEN_NETWORKS) {
+        let begin = format!("{part}: ");
+        let mut lines = run.stdout.lines();
+        let line = lines.find(|line| line.starts_with(&begin));
+        let line = line.unwrap_or_else(|| panic!("{part} is not in system.toml"));
+        assert!(line.contains(&format!("/jaus-{part} ")), "{line}");
+    }
+}
+
+#[test]
+fn every_settings_file_is_understood_by_its_program() {
+    for part in named(&packaging("etc"), "", ".toml") {
+        let file = packaging(&format!("etc/{part}.toml"));
+        let settings = jaus_cli::settings::read(&file);
+        assert!(settings.is_ok(), "{}", settings.unwrap_err());
+        // The flags of the file, as the program sees them, and then its help instead of a start.
+        let tool = Path::new(env!("CARGO_BIN_EXE_jaus"));
+        let mut program = Command::new(tool.with_file_name(format!("jaus-{part}")));
+        let flags = jaus_cli::settings::flags(&file).unwrap();
+        let shown = program.args(flags).arg("--help").output().unwrap();
+        let told = String::from_utf8_lossy(&shown.stderr).into_owned();
+        assert!(shown.status.success(), "{}: {told}", file.display());
+    }
+}
+
+#[test]
+fn no_unit_may_do_more_than_it_must() {
+    let unit = std::fs::read_to_string(packaging("systemd/jaus@.service")).unwrap();
+    for setting in [
+        "CapabilityBoundingSet=\n",
+        "NoNewPrivileges=yes",
+        "ProtectSystem=strict",
+        "PrivateDevices=yes",
+        "MemoryDenyWriteExecute=yes",
+        "RestartPreventExitStatus=2",
+        "User=jaus",
+    ] {
+        assert!(unit.contains(setting), "{setting}");
+    }
+    for part in named(&packaging("systemd"), "jaus@", ".service.d") {
+        let folder = packaging(&format!("systemd/jaus@{part}.service.d"));
+        for file in std::fs::read_dir(folder).unwrap() {
+            let text = std::fs::read_to_string(file.unwrap().path()).unwrap();
+            // Who sees devices sees those that are named, and no others.
+            let opened = text.contains("PrivateDevices=no");
+            assert_eq!(opened, text.contains("DevicePolicy=closed"), "{text}");
+            for rights in [
+                "CapabilityBoundingSet",
+                "ProtectSystem",
+                "NoNewPrivileges",
+                "User=",
+            ] {
+                assert!(!text.contains(rights), "{part} takes rights: {rights}");
+            }
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The programs of parts as processes: what they log without a flag, what they report to systemd, and
+//! that their stop input works.
+
+use std::io::{BufRead, BufReader};
+use std::os::unix::net::UnixDatagram;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::component::{Component, Kind};
+use jaus::link::Group;
+use jaus::messages::mobility::primitive_driver;
+use jaus::node::{Config, Node};
+use jaus_test_kit::group::own_group;
+
+/// Longer than anything takes; reached only when a test fails.
+const LIMIT: Duration = Duration::from_secs(60);
+const DRIVER: JausId = JausId::new(101, 33, 33);
+
+/// A running program, and what it says on standard error.
+struct Program {
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Program {
+    fn start(flags: &[&str], environment: &[(&str, &str)]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_jaus-primitive-driver"));
+        command.arg("--loopback").args(flags).stderr(Stdio::piped());
+        command.env_remove("JAUS_LOG");
+        command.envs(environment.iter().copied());
+        let mut child = command.spawn().unwrap();
+        let errors = BufReader::new(child.stderr.take().unwrap());
+        let (tell, lines) = channel();
+        std::thread::spawn(move || {
+            for line in errors.lines().map_while(Result::ok) {
+                let _ = tell.send(line);
+            }
+        });
+        Self { child, lines }
+    }
+
+    fn signal(&self, name: &str) {
+        let id = self.child.id().to_string();
+        let sent = Command::new("kill").args(["-s", name, &id]).status();
+        assert!(sent.unwrap().success());
+    }
+
+    /// Waits for a line with this text.
+    fn says(&self, text: &str) {
+        let start = Instant::now();
+        while start.elapsed() < LIMIT {
+            if let Ok(line) = self.lines.recv_timeout(LIMIT)
+                && line.contains(text)
+            {
+                return;
+            }
+        }
+        panic!("it does not say \"{text}\"");
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn group_flag(group: Group) -> String {
+    match group {
+        Group::At(address) => address.to_string(),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn scratch(name: &str) -> PathBuf {
+    let directory = std::env::temp_dir().join(format!("jaus-{name}-{}", std::process::id()));
+    std::fs::create_dir_all(&directory).unwrap();
+    directory
+}
+
+#[test]
+fn a_program_reports_to_systemd_that_it_is_ready_alive_and_stopping() {
+    let directory = scratch("notify");
+    let name = directory.join("socket");
+    let socket = UnixDatagram::bind(&name).unwrap();
+    let hear = |limit: Duration| {
+        let mut state = [0; 64];
+        socket.set_read_timeout(Some(limit)).unwrap();
+        let length = socket.recv(&mut state).ok()?;
+        Some(String::from_utf8_lossy(&state[..length]).into_owned())
+    };
+    let group = group_flag(own_group());
+    let program = Program::start(
+        &["--group", &group],
+        &[
+            ("NOTIFY_SOCKET", name.to_str().unwrap()),
+            ("WATCHDOG_USEC", "200000"),
+        ],
+    );
+    assert_eq!(hear(LIMIT).as_deref(), Some("READY=1"));
+    for _ in 0..5 {
+        assert_eq!(hear(LIMIT).as_deref(), Some("WATCHDOG=1"));
+    }
+    // A program that hangs says nothing any more.
+    program.signal("STOP");
+    while hear(Duration::from_secs(2)).is_some() {}
+    program.signal("CONT");
+    assert_eq!(hear(LIMIT).as_deref(), Some("WATCHDOG=1"));
+    program.signal("TERM");
+    let last = std::iter::from_fn(|| hear(LIMIT)).find(|state| state != "WATCHDOG=1");
+    assert_eq!(last.as_deref(), Some("STOPPING=1"));
+    drop(program);
+    std::fs::remove_dir_all(directory).unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn emergencies_and_the_stop_input_are_logged_without_a_flag() {
+    let directory = scratch("stop");
+    let pressed = directory.join("pressed");
+    let group = own_group();
+    let flags = ["--group", &group_flag(group), "--stop-file"];
+    let flags = [&flags[..], &[pressed.to_str().unwrap()]].concat();
+    let program = Program::start(&flags, &[]);
+    let node = Node::start(Config::loopback(42, 1).group(group)).unwrap();
+    let operator = Component::builder(Kind::OperatorControlUnit, "Operator");
+    let operator = operator.attach(&node, 1).unwrap();
+    operator.find(primitive_driver::URN).await.unwrap();
+    operator.set_emergency(DRIVER).await.unwrap();
+    program.says("emergency");
+    operator.clear_emergency(DRIVER).await.unwrap();
+    std::fs::write(&pressed, "").unwrap();
+    program.says("emergency: the stop input is pressed");
+    std::fs::remove_file(&pressed).unwrap();
+    program.says("the stop input is closed again");
+    program.signal("TERM");
+    let mut program = program;
+    assert!(program.child.wait().unwrap().success());
+    std::fs::remove_dir_all(directory).unwrap();
+}

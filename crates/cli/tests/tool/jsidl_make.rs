@@ -1,0 +1,113 @@
+//! `jaus jsidl lua` and `jaus jsidl rust`: what is written where, and what mistakes lead to.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use jaus_test_kit::tools::workspace;
+
+use crate::support::{Run, run};
+
+/// The definition of the example crate.
+const LAMP: &str = "examples/own-service/services/Lamp.xml";
+
+/// An empty directory of one test's own.
+fn directory(test: &str) -> PathBuf {
+    let directory = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("jsidl_make")
+        .join(test);
+    let _ = fs::remove_dir_all(&directory);
+    fs::create_dir_all(&directory).unwrap();
+    directory
+}
+
+/// Runs `jaus jsidl` with these arguments.
+fn jsidl(arguments: &[&str]) -> Run {
+    run(&[&["jsidl"], arguments].concat(), b"")
+}
+
+fn lamp() -> String {
+    let path = workspace(LAMP);
+    path.to_str().unwrap().to_owned()
+}
+
+/// A definition that refers to a type which does not exist.
+fn broken(directory: &Path) -> String {
+    let path = directory.join("Broken.xml");
+    let text = fs::read_to_string(lamp()).unwrap();
+    fs::write(&path, text.replacen("types.Header", "types.Haeder", 1)).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn a_dissector_has_the_users_messages_and_the_built_in_ones_unless_only_theirs_are_wanted() {
+    let directory = directory("lua");
+    let (all, only) = (directory.join("all"), directory.join("only.lua"));
+    let [all_path, only_path] = [&all, &only].map(|path| path.to_str().unwrap());
+    let ran = jsidl(&["lua", &lamp(), "-o", all_path]);
+    assert_eq!(ran.status, 0);
+    let begins = format!("{all_path}/jaus.lua: ");
+    assert!(ran.stdout.starts_with(&begins), "{ran:?}");
+    let ran = jsidl(&["lua", &lamp(), "--only", "-o", only_path]);
+    assert_eq!(ran.status, 0);
+    assert_eq!(
+        ran.stdout,
+        format!("{only_path}: 1 service with 3 messages\n")
+    );
+    let all = fs::read_to_string(all.join("jaus.lua")).unwrap();
+    let only = fs::read_to_string(only).unwrap();
+    for script in [&all, &only] {
+        assert!(script.contains("\"jaus.setlamp.brightness\""));
+    }
+    let built_in = "\"jaus.reportidentification.identification\"";
+    assert!(all.contains(built_in) && !only.contains(built_in));
+}
+
+#[test]
+fn a_dissector_leaves_out_what_has_errors_and_a_rust_module_is_not_written() {
+    let directory = directory("broken");
+    let (path, out) = (broken(&directory), directory.to_str().unwrap());
+    let ran = jsidl(&["lua", &path]);
+    assert_eq!(ran.status, 1);
+    assert!(ran.stderr.contains("Haeder"), "{ran:?}");
+    assert!(ran.stdout.contains("jaus.reportidentification"));
+
+    let ran = jsidl(&["rust", &path, "-o", out]);
+    assert_eq!(ran.status, 1);
+    assert!(
+        ran.stderr.contains("Haeder") && ran.stderr.contains("nothing was written"),
+        "{ran:?}"
+    );
+    assert!(!directory.join("messages.rs").exists());
+}
+
+#[test]
+fn a_rust_module_has_the_users_messages_alone() {
+    let directory = directory("rust");
+    let arguments = [
+        "rust",
+        &lamp(),
+        "-o",
+        directory.to_str().unwrap(),
+        "--module",
+        "lamps",
+    ];
+    let ran = jsidl(&arguments);
+    assert_eq!(ran.status, 0);
+    assert!(
+        ran.stdout
+            .ends_with("lamps.rs: 1 service with 3 messages\n"),
+        "{ran:?}"
+    );
+    let text = fs::read_to_string(directory.join("lamps.rs")).unwrap();
+    assert!(text.contains("pub struct SetLamp") && !text.contains("QueryIdentification"));
+}
+
+#[test]
+fn paths_that_are_not_there_are_named() {
+    for command in ["lua", "rust"] {
+        let ran = jsidl(&[command, "nowhere.xml", "-o", "nowhere"]);
+        assert_eq!(ran.status, 2);
+        assert!(ran.stderr.contains("nowhere.xml: No such file"), "{ran:?}");
+    }
+    assert!(!Path::new("nowhere").exists());
+}

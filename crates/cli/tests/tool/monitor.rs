@@ -1,0 +1,93 @@
+//! `jaus monitor` and the statistics of `jaus node`, on the loopback interface.
+
+use crate::support::{Running, own_group, run};
+
+#[test]
+fn a_neighbour_is_shown_with_its_name_rates_and_round_trip() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let mut node = Running::node(&[&["--id", "111.1.9", "--name", "Mule"], &*network].concat());
+    node.read_until("Ctrl-C");
+    let flags = [
+        "monitor",
+        "--json",
+        "--probe",
+        "--seconds",
+        "3",
+        "--interval",
+        "0.5",
+    ];
+    let watched = run(&[&flags, &*network].concat(), b"");
+    let views = watched.json();
+    let last = views.last().unwrap();
+    let peer = &last["peers"][0];
+    assert_eq!(
+        (&peer["id"], &peer["name"], &peer["header"]),
+        (&"111.1.9".into(), &"Mule".into(), &"judp2".into()),
+        "{last}"
+    );
+    assert!(peer["round_trip_ms"].as_f64().unwrap() > 0.0, "{last}");
+    assert!(
+        last["links"][0]["link"]
+            .as_str()
+            .unwrap()
+            .contains("127.0.0.1:")
+    );
+    let heard = |view: &serde_json::Value| view["peers"][0]["received_per_s"].as_f64();
+    assert!(
+        views.iter().filter_map(heard).any(|rate| rate > 0.0),
+        "{views:?}"
+    );
+    assert_eq!((watched.status, &*watched.stderr), (0, ""));
+}
+
+#[test]
+fn one_table_fits_a_terminal_and_says_whether_somebody_is_there() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let once = [&["monitor", "--once", "--interval", "0.3"], &*network].concat();
+    let alone = run(&once, b"");
+    assert!(
+        alone.stdout.contains("nobody was heard so far"),
+        "{alone:?}"
+    );
+    assert_eq!(alone.status, 1);
+
+    let mut node = Running::node(
+        &[
+            &["--id", "112.1.1", "--name", "A very long name"],
+            &*network,
+        ]
+        .concat(),
+    );
+    node.read_until("Ctrl-C");
+    let once = [&["monitor", "--once", "--interval", "2"], &*network].concat();
+    let seen = run(&once, b"");
+    assert!(
+        seen.stdout.contains("112.1.1      A very … 127.0.0.1:"),
+        "{}",
+        seen.stdout
+    );
+    assert!(
+        seen.stdout.lines().all(|line| line.chars().count() <= 80),
+        "{}",
+        seen.stdout
+    );
+    assert!(!seen.stdout.contains('\x1b'), "{}", seen.stdout);
+    assert_eq!(seen.status, 0);
+}
+
+#[test]
+fn a_node_tells_its_statistics_now_and_then() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let mut node = Running::node(&[&["--id", "113.1.1", "--stats=200ms"], &*network].concat());
+    node.read_until("Ctrl-C");
+    for _ in 0..2 {
+        let told = node.read_until("component 113.1.1: ");
+        assert!(told.contains("datagrams sent"), "{told}");
+        assert!(told.contains("link lo 127.0.0.1:"), "{told}");
+    }
+    let wrong = run(&[&["node", "--stats=5"], &*network].concat(), b"");
+    assert!(wrong.stderr.contains("`5` is no time"), "{wrong:?}");
+}

@@ -1,0 +1,240 @@
+//! `jaus demo`, `node`, `discover` and `query` over the loopback interface of this computer.
+
+use std::fs;
+
+use crate::support::{Running, jaus, own_group, run};
+
+#[test]
+fn the_demo_drives_a_mission_to_its_end_or_says_why_it_can_not() {
+    let demo = |to| run(&["demo", "--headless", "--seconds", "60", "--to", to], b"");
+    let run = demo("0,2");
+    let mut rest = &*run.stdout;
+    for part in [
+        "system    starts 101.1.35, the communicator",
+        "starts 101.3.36, the planner",
+        "operator  takes control of the planner 101.3.36 with authority 150",
+        "operator  wants the vehicle at x 0 m, y 2 m",
+        "planner   all stages obey: under way",
+        "planner   arrived",
+        "vehicle   at x",
+        "the vehicle has arrived",
+    ] {
+        let place = rest
+            .find(part)
+            .unwrap_or_else(|| panic!("no `{part}` in {}", run.stdout));
+        rest = &rest[place + part.len()..];
+    }
+    assert!(!run.stdout.contains('\x1b'), "colours are for terminals");
+    assert_eq!((run.status, &*run.stderr), (0, ""));
+
+    // Afterwards, because both have the same ids on the same loopback interface.
+    let outside = demo("200,0");
+    let said = &outside.stdout;
+    assert!(said.contains("planner   gives up ("), "{said}");
+    assert!(said.contains("has not arrived"), "{said}");
+    assert_eq!(outside.status, 1);
+}
+
+#[test]
+fn a_node_is_discovered_queried_and_ends_cleanly() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let flags = [
+        "--id", "103.1.7", "--name", "Mule", "--kind", "vehicle", "--stats",
+    ];
+    let mut node = Running::node(&[&flags, &*network].concat());
+    let introduction = node.read_until("Ctrl-C");
+    assert!(
+        introduction.contains("subsystem 103  vehicle \"Mule\""),
+        "{introduction}"
+    );
+    assert!(introduction.contains("UDP 127.0.0.1:"), "{introduction}");
+
+    let found = run(&[&["discover", "--seconds", "2"], &*network].concat(), b"");
+    assert!(
+        found.stdout.contains("    103.1.7  \"Mule\"\n"),
+        "{found:?}"
+    );
+    assert!(
+        found.stdout.contains("urn:jaus:jss:core:Liveness"),
+        "{found:?}"
+    );
+    assert_eq!(found.status, 0);
+
+    let found = run(
+        &[&["discover", "--json", "--seconds", "2"], &*network].concat(),
+        b"",
+    );
+    let tree = &found.only_line()["subsystems"][0];
+    assert_eq!(
+        (&tree["subsystem"], &tree["name"]),
+        (&103.into(), &"Mule".into())
+    );
+    assert_eq!(tree["nodes"][0]["components"][0]["component"], "103.1.7");
+
+    let query = [
+        "query",
+        "103.1.7",
+        "QueryIdentification",
+        "{\"QueryType\":2}",
+    ];
+    let answer = run(&[&query, &*network].concat(), b"");
+    let line = answer.only_line();
+    assert_eq!(
+        (&line["source"], &line["message"]),
+        (&"103.1.7".into(), &"ReportIdentification".into())
+    );
+    assert_eq!(line["body"]["Identification"], "Mule");
+    assert_eq!((answer.status, &*answer.stderr), (0, ""));
+
+    assert_eq!(node.terminate(), Some(0));
+}
+
+#[test]
+fn whoever_comes_is_watched() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let mut watcher = Running::node(&[&["--id", "104.1.1"], &*network].concat());
+    watcher.read_until("Ctrl-C");
+    let _comer = Running::node(&[&["--id", "105.1.1", "--name", "Latecomer"], &*network].concat());
+    let seen = watcher.read_until("105.1.1 offers");
+    assert!(seen.contains("105.1.1 has come"), "{seen}");
+    assert!(seen.contains("Latecomer"), "{seen}");
+}
+
+#[test]
+fn silence_is_told_with_who_did_not_answer_and_what_to_do() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let query = ["query", "9.1.1", "QueryHeartbeatPulse", "--seconds", "0.2"];
+    let asked = run(&[&query, &*network].concat(), b"");
+    assert!(
+        asked
+            .stderr
+            .contains("9.1.1 did not answer QueryHeartbeatPulse within 0.2 s"),
+        "{asked:?}"
+    );
+    assert!(asked.stderr.contains("--peer"), "{asked:?}");
+    assert_eq!(asked.status, 1);
+
+    let found = run(
+        &[&["discover", "--seconds", "0.2"], &*network].concat(),
+        b"",
+    );
+    assert!(
+        found.stderr.contains("nobody answered within 0.2 s"),
+        "{found:?}"
+    );
+    assert_eq!((found.status, &*found.stdout), (1, ""));
+}
+
+#[test]
+fn a_wrong_flag_is_refused_with_what_would_be_right() {
+    let config = std::env::temp_dir().join(format!("jaus-cli-{}.toml", std::process::id()));
+    fs::write(&config, "id = \"103.1.7\"\nprot = 3794\n").unwrap();
+    let config_path = config.to_str().unwrap();
+    for (arguments, advice) in [
+        (&["node", "--id", "103"][..], "subsystem.node.component"),
+        (&["node", "--id", "103.1.255"], "1 to 254"),
+        (&["node", "--id", "0.1.1"], "1 to 65534"),
+        (
+            &["node", "--interface", "nosuch0"],
+            "there is no network interface `nosuch0`",
+        ),
+        (
+            &["node", "--group", "10.0.0.1"],
+            "224.0.0.0 to 239.255.255.255",
+        ),
+        (
+            &["node", "--peer", "nobody"],
+            "write an address of one host",
+        ),
+        (&["node", "--kind", "ship"], "vehicle, ocu, other"),
+        (&["node", "--config", "no/such.toml"], "no/such.toml"),
+        (&["node", "--config", config_path], "prot"),
+        (&["demo", "--seconds", "soon"], "number of seconds"),
+        (
+            &["query", "103.1", "QueryStatus"],
+            "subsystem.node.component",
+        ),
+        (
+            &["query", "103.1.1", "QueryStatsu"],
+            "there is no message QueryStatsu",
+        ),
+        (
+            &["query", "103.1.1", "QueryStatsu"],
+            "perhaps QueryStatus is meant",
+        ),
+        (&["query", "103.1.1", "QueryFoo"], "must be loaded"),
+        (
+            &["query", "103.1.1", "QueryIdentification"],
+            "'{\"QueryType\":2}'",
+        ),
+        (&["query", "103.1.1", "Resume"], "is not a query"),
+        (&["query", "103.1.1", "QueryStatus", "{"], "not JSON"),
+        (&["decode"], "FILE"),
+        (&["frobnicate"], "frobnicate"),
+        (&[], "Usage"),
+    ] {
+        let run = run(arguments, b"");
+        assert!(run.stderr.contains(advice), "{arguments:?}: {}", run.stderr);
+        assert_eq!((run.status, &*run.stdout), (2, ""), "{arguments:?}");
+    }
+    fs::remove_file(config).unwrap();
+}
+
+#[test]
+fn a_settings_file_does_what_the_flags_do_and_flags_come_on_top() {
+    let group = own_group();
+    let config = std::env::temp_dir().join(format!("jaus-cli-own-{}.toml", std::process::id()));
+    let text = format!(
+        "id = \"106.1.1\"\nname = \"File\"\nkind = \"vehicle\"\ninterfaces = \"loopback\"\nport = 0\ngroup = \"{}\"\n",
+        group[4]
+    );
+    fs::write(&config, text).unwrap();
+    let mut node = Running::node(&["--config", config.to_str().unwrap(), "--name", "Flag"]);
+    let introduction = node.read_until("Ctrl-C");
+    fs::remove_file(config).unwrap();
+    assert!(
+        introduction.contains("subsystem 106  vehicle \"Flag\""),
+        "{introduction}"
+    );
+    assert!(introduction.contains(&group[4]), "{introduction}");
+}
+
+#[test]
+fn a_log_filter_that_makes_no_sense_is_refused() {
+    let output = jaus()
+        .arg("encode")
+        .env("JAUS_LOG", "jaus=loud")
+        .output()
+        .unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("JAUS_LOG=jaus=loud"), "{message}");
+    assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn the_help_leads_from_the_demo_to_every_command() {
+    let help = run(&["--help"], b"");
+    for word in [
+        "demo",
+        "node",
+        "discover",
+        "query",
+        "decode",
+        "encode",
+        "Exit status",
+    ] {
+        assert!(help.stdout.contains(word), "no {word} in {}", help.stdout);
+    }
+    assert_eq!(help.status, 0);
+    for command in ["node", "discover", "query", "decode", "encode"] {
+        let help = run(&[command, "--help"], b"");
+        assert!(
+            help.stdout.contains("Examples:"),
+            "{command}: {}",
+            help.stdout
+        );
+    }
+}

@@ -1,0 +1,71 @@
+//! `jaus ping` over the loopback interface of this computer.
+
+use crate::support::{Running, own_group, run};
+
+#[test]
+fn a_component_that_is_there_answers_and_its_round_trips_are_summed_up() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let mut node = Running::node(&[&["--id", "103.1.7"], &*network].concat());
+    node.read_until("Ctrl-C");
+    let ping = |flags: &[&str]| {
+        let fixed = [
+            "ping",
+            "103.1.7",
+            "--count",
+            "3",
+            "--interval",
+            "0.01",
+            "--timeout",
+            "5",
+        ];
+        run(&[&fixed, flags, &*network].concat(), b"")
+    };
+    let asked = ping(&[]);
+    assert!(
+        asked.stdout.contains("   3  heartbeat from 127.0.0.1:"),
+        "{asked:?}"
+    );
+    assert!(
+        asked
+            .stdout
+            .contains("asked 3 times, 3 answers, 0 % lost; least "),
+        "{asked:?}"
+    );
+    assert_eq!((asked.status, &*asked.stderr), (0, ""));
+    let large = ping(&["--size", "100000"]);
+    assert!(
+        large.stdout.contains("   3  acknowledgement: "),
+        "{large:?}"
+    );
+    let named = ping(&["--with", "identification"]);
+    assert!(
+        named.stdout.contains("   1  identification from "),
+        "{named:?}"
+    );
+}
+
+#[test]
+fn silence_is_told_with_what_to_do_about_it() {
+    let group = own_group();
+    let network: Vec<&str> = group.iter().map(String::as_str).collect();
+    let flags = ["ping", "103.1.99", "--count", "1", "--timeout", "0.05"];
+    let asked = run(&[&flags, &*network].concat(), b"");
+    assert!(
+        asked
+            .stdout
+            .contains("asked 1 times, 0 answers, 100 % lost"),
+        "{asked:?}"
+    );
+    assert!(
+        asked.stderr.contains("103.1.99 gave no sign of life"),
+        "{asked:?}"
+    );
+    assert_eq!(asked.status, 1);
+    let everybody = run(&["ping", "103.1.255"], b"");
+    assert!(
+        everybody.stderr.contains("103.1.255 is not one component"),
+        "{everybody:?}"
+    );
+    assert_eq!(everybody.status, 2);
+}

@@ -1,0 +1,17 @@
+//! A multicast group for one test, so that what runs beside it is not heard: discovery asks
+//! strangers, too.
+#![allow(
+    clippy::disallowed_types,
+    reason = "the operating system knows which ports are free"
+)]
+
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+
+use jaus::link::Group;
+
+/// A group at a port that nobody has.
+pub fn own_group() -> Group {
+    let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
+    let port = socket.local_addr().unwrap().port();
+    Group::At(SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), port))
+}
