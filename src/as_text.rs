@@ -2,6 +2,8 @@
 
 /// Derives `Serialize` from [`Display`](std::fmt::Display) and `Deserialize` from
 /// [`FromStr`](std::str::FromStr), whose error becomes serde's.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! serde_as_text {
     ($($type:ty),+) => {$(
         #[cfg(feature = "serde")]

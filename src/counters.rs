@@ -3,6 +3,8 @@
 
 /// Makes `Counter`, what is counted, each with a few words for people, and `Counters`, the numbers,
 /// whose documentation stands first.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! counters {
     (
         $(#[doc = $numbers:literal])+

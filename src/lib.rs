@@ -24,8 +24,6 @@ pub mod codec;
 pub mod component;
 mod counters;
 pub mod endpoint;
-#[cfg(feature = "ra-gateway")]
-pub mod gateway;
 #[cfg(feature = "node")]
 pub mod link;
 pub mod messages;
@@ -33,13 +31,9 @@ pub mod messages;
 pub mod mission;
 #[cfg(feature = "node")]
 pub mod node;
-#[cfg(feature = "web")]
-pub mod ocu;
 #[cfg(feature = "parts")]
 pub mod parts;
 pub mod peer;
-#[cfg(feature = "ra33")]
-pub mod ra;
 pub mod service;
 #[cfg(feature = "mobility")]
 pub mod vehicle;

@@ -69,10 +69,8 @@ pub use link::{LinkId, LinkProfile, Path, Remote, To, Transmit};
 pub use local::AttachError;
 pub use occupancy::Occupancy;
 pub use peers::{Peer, RouteState, Traffic};
-#[cfg(feature = "ra33")]
-pub(crate) use rate::Buckets;
 pub(crate) use rate::quota_address;
-pub use rate::{Rate, Rates};
+pub use rate::{Buckets, Rate, Rates};
 pub use send::SendError;
 pub use sink::{Ingress, Sink};
 

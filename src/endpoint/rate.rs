@@ -109,7 +109,7 @@ impl Bucket {
 
 /// A bucket for each source, as far as there is room.
 #[derive(Debug)]
-pub(crate) struct Buckets<K> {
+pub struct Buckets<K> {
     rate: Rate,
     limit: usize,
     own: HashMap<K, Bucket>,
@@ -122,7 +122,8 @@ impl<K: Eq + Hash> Buckets<K> {
     const SWEEP: Duration = Duration::from_secs(1);
 
     /// Buckets of that rate for at most `limit` sources.
-    pub(crate) fn new(rate: Rate, limit: usize) -> Self {
+    #[must_use]
+    pub fn new(rate: Rate, limit: usize) -> Self {
         Self {
             rate,
             limit: limit.max(1),
@@ -133,7 +134,7 @@ impl<K: Eq + Hash> Buckets<K> {
     }
 
     /// Takes a token of a source, if there is one.
-    pub(crate) fn take(&mut self, now: Instant, source: K) -> bool {
+    pub fn take(&mut self, now: Instant, source: K) -> bool {
         self.take_many(now, source, 1)
     }
 

@@ -25,7 +25,7 @@ use crate::wire::Priority;
 
 /// Why a peer is watched. The client in control is probed always, the others within a budget.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Rank {
+pub enum Rank {
     /// It holds subscriptions.
     Subscriber,
     /// It has set an emergency and not cleared it.
@@ -38,7 +38,7 @@ pub(crate) enum Rank {
 
 /// The peers whose life matters to one component.
 #[derive(Debug)]
-pub(crate) struct Life {
+pub struct Life {
     peers: BTreeMap<JausId, Peer>,
     /// One entry for each peer: when to look at it again.
     due: BTreeSet<(Instant, JausId)>,
@@ -62,19 +62,8 @@ struct Peer {
     look: Instant,
 }
 
-impl Life {
-    /// A peer that has been silent for so long is probed, and again in such intervals.
-    pub(crate) const SILENCE: Duration = Duration::from_secs(1);
-    /// The same while something moves on its word.
-    pub(crate) const MOVING: Duration = Duration::from_millis(250);
-    /// A peer that answers probes and has been silent for so long is dead.
-    pub(crate) const DEATH: Duration = Duration::from_secs(4);
-    /// Probes to subscribers, and those to setters of emergencies: a burst of so many, then one in this
-    /// time. Their ids may be forged.
-    const BURST: u32 = 32;
-    const REFILL: Duration = Duration::from_millis(50);
-
-    pub(crate) const fn new() -> Self {
+impl Default for Life {
+    fn default() -> Self {
         Self {
             peers: BTreeMap::new(),
             due: BTreeSet::new(),
@@ -83,10 +72,23 @@ impl Life {
             dead: VecDeque::new(),
         }
     }
+}
+
+impl Life {
+    /// A peer that has been silent for so long is probed, and again in such intervals.
+    pub const SILENCE: Duration = Duration::from_secs(1);
+    /// The same while something moves on its word.
+    pub const MOVING: Duration = Duration::from_millis(250);
+    /// A peer that answers probes and has been silent for so long is dead.
+    pub const DEATH: Duration = Duration::from_secs(4);
+    /// Probes to subscribers, and those to setters of emergencies: a burst of so many, then one in this
+    /// time. Their ids may be forged.
+    const BURST: u32 = 32;
+    const REFILL: Duration = Duration::from_millis(50);
 
     /// Watches a peer that has just been heard. One that is watched already is looked at no later
     /// than its rank demands.
-    pub(crate) fn watch(&mut self, now: Instant, id: JausId, rank: Rank) {
+    pub fn watch(&mut self, now: Instant, id: JausId, rank: Rank) {
         let peer = self.peers.entry(id).or_insert_with(|| {
             self.due.insert((now + rank.patience(), id));
             Peer {
@@ -107,7 +109,7 @@ impl Life {
     }
 
     /// A message with this code has come from a peer.
-    pub(crate) fn hear(&mut self, now: Instant, id: JausId, code: Option<u16>) {
+    pub fn hear(&mut self, now: Instant, id: JausId, code: Option<u16>) {
         if let Some(peer) = self.peers.get_mut(&id) {
             peer.alive = now;
             peer.probes = 0;
@@ -116,7 +118,7 @@ impl Life {
     }
 
     /// A peer's transport has acknowledged a probe.
-    pub(crate) fn acknowledged(&mut self, now: Instant, id: JausId) {
+    pub fn acknowledged(&mut self, now: Instant, id: JausId) {
         if let Some(peer) = self.peers.get_mut(&id).filter(|peer| !peer.answers) {
             peer.acknowledges = true;
             peer.alive = now;
@@ -125,25 +127,25 @@ impl Life {
     }
 
     /// When the last sign of life of a watched peer came.
-    pub(crate) fn last_sign(&self, id: JausId) -> Option<Instant> {
+    pub fn last_sign(&self, id: JausId) -> Option<Instant> {
         self.peers.get(&id).map(|peer| peer.alive)
     }
 
     /// Whether a peer has shown life within [`DEATH`](Self::DEATH).
-    pub(crate) fn is_alive(&self, now: Instant, id: JausId) -> bool {
+    pub fn is_alive(&self, now: Instant, id: JausId) -> bool {
         self.last_sign(id)
             .is_some_and(|alive| now.saturating_duration_since(alive) < Self::DEATH)
     }
 
     /// Whether a peer was probed until [`DEATH`](Self::DEATH) and has never answered a probe, so
     /// that its death would go unnoticed.
-    pub(crate) fn is_mute(&self, now: Instant, id: JausId) -> bool {
+    pub fn is_mute(&self, now: Instant, id: JausId) -> bool {
         let peer = self.peers.get(&id);
         peer.is_some_and(|peer| !peer.answers && !peer.acknowledges) && !self.is_alive(now, id)
     }
 
     /// Probes the silent. `rank` says why a peer is still watched; `None` ends that.
-    pub(crate) fn handle_timeout(
+    pub fn handle_timeout(
         &mut self,
         now: Instant,
         rank: impl Fn(JausId) -> Option<Rank>,
@@ -181,12 +183,12 @@ impl Life {
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout).
-    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+    pub fn poll_timeout(&self) -> Option<Instant> {
         self.due.first().map(|&(look, _)| look)
     }
 
     /// The next peer that has died. It is watched no more.
-    pub(crate) fn poll_dead(&mut self) -> Option<JausId> {
+    pub fn poll_dead(&mut self) -> Option<JausId> {
         self.dead.pop_front()
     }
 }
@@ -272,13 +274,16 @@ mod tests {
     fn a_client_that_is_not_silent_is_probed_once() {
         let mut now = Instant::now();
         let time = Duration::from_secs(3);
-        assert_eq!(pass(&mut Life::new(), &mut now, time, Client::Lively), 1);
-        assert_eq!(pass(&mut Life::new(), &mut now, time, Client::Mute), 1);
+        assert_eq!(
+            pass(&mut Life::default(), &mut now, time, Client::Lively),
+            1
+        );
+        assert_eq!(pass(&mut Life::default(), &mut now, time, Client::Mute), 1);
     }
 
     #[test]
     fn a_node_does_not_vouch_for_a_suspended_client_that_was_never_silent_before() {
-        let (mut life, mut now) = (Life::new(), Instant::now());
+        let (mut life, mut now) = (Life::default(), Instant::now());
         pass(&mut life, &mut now, Life::SILENCE, Client::Lively);
         let last = now;
         assert_ne!(

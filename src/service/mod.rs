@@ -70,8 +70,7 @@ pub use events::EventSettings;
 pub use guard::{MotionGuard, MotionPolicy, StopCause, Validity};
 pub use handlers::Handlers;
 pub use inquiries::{Inquiry, NoAnswer, Patience};
-#[cfg(feature = "ra-gateway")]
-pub(crate) use life::{Life, Rank};
+pub use life::{Life, Rank};
 pub use list::{ElementList, Elements, ListManager};
 pub use liveness::Liveness;
 pub use outbox::Outbox;
@@ -153,7 +152,8 @@ pub enum Handled {
 }
 
 /// The message code at the head of a payload.
-pub(crate) fn code_of(payload: &[u8]) -> Option<u16> {
+#[must_use]
+pub fn code_of(payload: &[u8]) -> Option<u16> {
     payload.first_chunk().map(|&code| u16::from_le_bytes(code))
 }
 

@@ -39,7 +39,7 @@ impl Rig {
             now: Instant::now(),
             news: News::default(),
             client_lives: true,
-            life: Life::new(),
+            life: Life::default(),
             standing: Standing::default(),
             out: Outbox::new(JausId::new(101, 1, 1)),
         };

@@ -78,7 +78,7 @@ impl Stack {
             subscribers: Events::new(EventSettings::default()),
             control: Control::default(),
             standing: Standing::default(),
-            life: Life::new(),
+            life: Life::default(),
             mute: None,
             faults: Faults::default(),
             called: None,

@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::gateway::{Action, Gateway, Settings};
-use jaus::ra::carrier::To;
-use jaus::ra::convert::to_ra;
-use jaus::ra::node::{self, RaNode, Subsystem};
-use jaus::ra::{Message, RaId};
+use jaus_ra::carrier::To;
+use jaus_ra::convert::to_ra;
+use jaus_ra::gateway::{Action, Gateway, Settings};
+use jaus_ra::node::{self, RaNode, Subsystem};
+use jaus_ra::{Message, RaId};
 
 use crate::sim::{Event as EndpointEvent, OwnedEndpoint};
 

@@ -68,7 +68,7 @@ struct Program<F: Args> {
 
 /// What is logged without `-v`: warnings of every module, such as an emergency or a log that cannot be
 /// written, and what parts report of themselves.
-const USUAL: &str = "warn,jaus::parts=info,jaus::ocu=info,jaus::gateway=info,jaus_cli=info";
+const USUAL: &str = "warn,jaus::parts=info,jaus_ocu=info,jaus_ra=info,jaus_cli=info";
 
 /// Runs a program to its end: reads flags and settings, takes a place on a node, lets the part run
 /// until Ctrl-C or SIGTERM, and takes leave.

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use bytes::{BufMut, Bytes, BytesMut};
-use jaus::ra::{Message, RaId};
+use jaus_ra::{Message, RaId};
 
 /// The vehicle's subsystem.
 pub const SUBSYSTEM: u8 = 20;

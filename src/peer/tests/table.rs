@@ -19,7 +19,7 @@ fn sources(directory: &Path, found: &mut Vec<PathBuf>) {
 fn each_departure_names_a_file_and_a_test_that_are_there() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut files = Vec::new();
-    for directory in ["src", "tests"] {
+    for directory in ["src", "tests", "crates"] {
         sources(&root.join(directory), &mut files);
     }
     let code: String = files

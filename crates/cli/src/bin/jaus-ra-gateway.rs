@@ -9,16 +9,16 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use jaus::address::JausId;
 use jaus::component::Kind;
-use jaus::gateway::{Gateway, RaGateway, Report, Settings, Show};
 use jaus::link::{Group, STANDARD_PORT};
 use jaus::node::{Config, units};
 use jaus::parts::Part;
-use jaus::ra::RaId;
-use jaus::ra::carrier::Dialect;
-use jaus::ra::ids::{self, ComponentEntry, SubsystemEntry};
 use jaus_cli::output::Output;
 use jaus_cli::runtime::seconds;
 use jaus_cli::{Failure, Ready, launch};
+use jaus_ra::RaId;
+use jaus_ra::carrier::Dialect;
+use jaus_ra::gateway::{Gateway, RaGateway, Report, Settings, Show};
+use jaus_ra::ids::{self, ComponentEntry, SubsystemEntry};
 
 #[derive(Args)]
 struct Flags {

@@ -17,8 +17,8 @@ use jaus::messages::core::{
 };
 use jaus::messages::mobility::{QueryLocalPose, SetWrenchEffort};
 use jaus::node::{Config, Node};
-use jaus::ra::RaId;
 use jaus::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, judp};
+use jaus_ra::RaId;
 
 use crate::attacker::Attacker;
 use crate::bed::TO_STRANGERS6;

@@ -5,13 +5,13 @@ use std::future::poll_fn;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use jaus::gateway::RaGateway;
 use jaus::link::udp::{Settings, UdpLink};
 use jaus::link::{Interfaces, Ip, Slab};
-use jaus::ra::carrier::To;
-use jaus::ra::node::{self, RaNode, Subsystem};
-use jaus::ra::{Message, RaId};
 use jaus::wire::Priority;
+use jaus_ra::carrier::To;
+use jaus_ra::gateway::RaGateway;
+use jaus_ra::node::{self, RaNode, Subsystem};
+use jaus_ra::{Message, RaId};
 
 use jaus_test_kit::rover::Rover;
 

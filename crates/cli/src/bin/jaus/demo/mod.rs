@@ -10,13 +10,13 @@ use std::time::Duration;
 use clap::Args;
 use jaus::component::{Component, Kind};
 use jaus::node::Node;
-use jaus::ocu::Station;
 use jaus::parts::{
     Communicator, DEBUG_ADDRESS, PathDriver, Planner, PoseSensor, PrimitiveDriver, VectorDriver,
     VelocitySensor,
 };
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::runtime;
+use jaus_ocu::Station;
 
 use operator::{Ending, Operator};
 use story::{Story, Who};

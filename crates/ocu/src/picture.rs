@@ -1,0 +1,543 @@
+//! What the operator's station knows of its vehicle: reports come in, snapshots for the pages go
+//! out. Knows no network and no clock.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::missing::{Absence, GonePart, GoneParts};
+use super::report::{Mission, Report};
+use super::role::{self, Role};
+use super::sample_clock::{SampleClock, Stamp};
+use super::state;
+use jaus::address::JausId;
+use jaus::service::{Component, Directory, Kind, State};
+
+/// The vehicle as it is known.
+#[derive(Debug)]
+pub(super) struct Picture {
+    own: JausId,
+    directory: Arc<Directory>,
+    vehicle: Option<u16>,
+    /// What the vehicle is called, also when Discovery has lost it.
+    name: String,
+    parts: BTreeMap<JausId, Part>,
+    gone: GoneParts,
+    pose: Option<Told<state::Pose>>,
+    velocity: Option<Told<state::Velocity>>,
+    mission: Option<Told<Mission>>,
+    path: Vec<[f64; 2]>,
+    maps: Vec<state::Map>,
+    store: Option<JausId>,
+}
+
+/// A component of the vehicle.
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    pub(super) role: Role,
+    /// Whether it offers Management.
+    pub(super) managed: bool,
+    status: Option<Told<u8>>,
+    /// Who controls it, with which authority.
+    controller: Option<Told<Option<(JausId, u8)>>>,
+    stage: Option<state::Stage>,
+    /// What it is called.
+    name: String,
+    reports_pose: bool,
+    reports_velocity: bool,
+    pose_clock: Option<SampleClock>,
+    velocity_clock: Option<SampleClock>,
+    /// Its last report.
+    heard: Option<Instant>,
+    /// Whether the last news of a subscription was that reports have stopped.
+    is_down: bool,
+}
+
+/// What was reported, by whom, and when it was true: when the sample was taken, by its time stamp;
+/// without one, when the report arrived.
+#[derive(Debug, Clone, Copy)]
+struct Told<T> {
+    what: T,
+    by: JausId,
+    at: Instant,
+}
+
+impl Part {
+    /// After so long without a report, a part that reports periodically is silent.
+    const SILENT: Duration = Duration::from_millis(1500);
+    /// Likewise, if its subscription is down as well.
+    const DOWN: Duration = Duration::from_secs(1);
+
+    fn new(role: Role) -> Self {
+        Self {
+            role,
+            managed: false,
+            status: None,
+            controller: None,
+            stage: None,
+            name: String::new(),
+            reports_pose: false,
+            reports_velocity: false,
+            pose_clock: None,
+            velocity_clock: None,
+            heard: None,
+            is_down: false,
+        }
+    }
+
+    /// Takes what Discovery knows of it.
+    fn describe(&mut self, component: &Component, role: Role) {
+        self.role = role;
+        self.managed = role::is_managed(component);
+        self.reports_pose = role::reports_pose(component);
+        self.reports_velocity = role::reports_velocity(component);
+        let own_name = component.identification.as_ref().map(|it| it.name.clone());
+        let own_name = own_name.filter(|it| !it.is_empty());
+        self.name = role.title().map_or_else(
+            || own_name.unwrap_or_else(|| "Component".to_owned()),
+            str::to_owned,
+        );
+    }
+
+    /// Whether its reports have stopped.
+    fn is_silent(&self, now: Instant) -> bool {
+        let is_periodic = self.managed || self.reports_pose || self.reports_velocity;
+        self.heard.is_some_and(|heard| {
+            let silence = now.saturating_duration_since(heard);
+            (is_periodic && silence >= Self::SILENT) || (self.is_down && silence >= Self::DOWN)
+        })
+    }
+
+    fn was_heard_within(&self, limit: Duration, now: Instant) -> bool {
+        self.heard
+            .is_some_and(|heard| now.saturating_duration_since(heard) < limit)
+    }
+
+    pub(super) fn is(&self, state: State) -> bool {
+        self.status.is_some_and(|it| it.what == state as u8)
+    }
+
+    /// Whether it has said since `since` that it stands by.
+    pub(super) fn stands_by(&self, since: Instant) -> bool {
+        self.is(State::Standby) && self.status.is_some_and(|it| it.at > since)
+    }
+
+    /// Whether it has said since `since` that somebody other than `own`, or nobody, controls it;
+    /// who does.
+    pub(super) fn disowns(&self, own: JausId, since: Instant) -> Option<Option<JausId>> {
+        let told = self.controller.filter(|it| it.at > since)?;
+        let controller = told.what.map(|(id, _)| id);
+        (controller != Some(own)).then_some(controller)
+    }
+
+    pub(super) fn controller(&self) -> Option<JausId> {
+        self.told_controller()?
+    }
+
+    /// Who controls it, or that nobody does, once it has said so.
+    pub(super) fn told_controller(&self) -> Option<Option<JausId>> {
+        Some(self.controller?.what.map(|(id, _)| id))
+    }
+}
+
+impl Picture {
+    /// A report that is older counts for nothing when the vehicle's safety is at stake.
+    const FRESH: Duration = Duration::from_secs(2);
+    /// With an older pose, velocity or status nobody may drive.
+    const DRIVABLE: Duration = Duration::from_secs(1);
+    /// A planner that is silent for so long, while other parts report, is lost.
+    const LOST: Duration = Duration::from_secs(2);
+
+    /// Nothing is known yet; `vehicle` is the one to look at, the first that turns up if there is
+    /// none.
+    pub(super) fn new(own: JausId, vehicle: Option<u16>) -> Self {
+        Self {
+            own,
+            directory: Arc::default(),
+            vehicle,
+            name: String::new(),
+            parts: BTreeMap::new(),
+            gone: GoneParts::default(),
+            pose: None,
+            velocity: None,
+            mission: None,
+            path: Vec::new(),
+            maps: Vec::new(),
+            store: None,
+        }
+    }
+
+    pub(super) const fn vehicle(&self) -> Option<u16> {
+        self.vehicle
+    }
+
+    pub(super) const fn parts(&self) -> &BTreeMap<JausId, Part> {
+        &self.parts
+    }
+
+    /// The component that does something in the vehicle.
+    pub(super) fn find(&self, role: Role) -> Option<JausId> {
+        let mut parts = self.parts.iter();
+        parts.find(|(_, part)| part.role == role).map(|(id, _)| *id)
+    }
+
+    pub(super) fn directory(&self) -> &Directory {
+        &self.directory
+    }
+
+    pub(super) fn mission(&self) -> Option<&Mission> {
+        self.mission.as_ref().map(|told| &told.what)
+    }
+
+    /// The component that keeps the maps.
+    pub(super) const fn store(&self) -> Option<JausId> {
+        self.store
+    }
+
+    /// One of its maps.
+    pub(super) fn map(&self, id: u16) -> Option<state::Map> {
+        self.maps.iter().find(|map| map.id == id).cloned()
+    }
+
+    /// Another vehicle is chosen.
+    ///
+    /// # Errors
+    /// If there is none with this number: why not, in words.
+    pub(super) fn select(&mut self, now: Instant, subsystem: u16) -> Result<(), String> {
+        if !role::is_vehicle(&self.directory, subsystem) || subsystem == self.own.subsystem() {
+            return Err(format!(
+                "subsystem {subsystem} is not known as a vehicle; choose one of the tree"
+            ));
+        }
+        if self.vehicle != Some(subsystem) {
+            let directory = self.directory.clone();
+            *self = Self::new(self.own, Some(subsystem));
+            self.handle_directory(now, directory);
+        }
+        Ok(())
+    }
+
+    /// Components came, changed or went.
+    pub(super) fn handle_directory(&mut self, now: Instant, directory: Arc<Directory>) {
+        self.directory = directory;
+        self.vehicle = self.vehicle.or_else(|| self.first_vehicle());
+        let directory = Arc::clone(&self.directory);
+        let known = self.vehicle.and_then(|it| directory.subsystem(it));
+        if let Some(identification) = known.and_then(|it| it.identification()) {
+            self.name.clone_from(&identification.name);
+        }
+        self.set_parts(now, known.iter().flat_map(|it| it.components()));
+    }
+
+    /// The vehicle has these components, and no others.
+    fn set_parts<'c>(&mut self, now: Instant, components: impl Iterator<Item = &'c Component>) {
+        let mut parts = BTreeMap::new();
+        for component in components {
+            let before = self.parts.remove(&component.id);
+            let Some(role) = Role::of(component).filter(|_| component.id != self.own) else {
+                continue;
+            };
+            let mut part = before.unwrap_or_else(|| Part::new(role));
+            part.describe(component, role);
+            parts.insert(component.id, part);
+        }
+        for (id, part) in std::mem::replace(&mut self.parts, parts) {
+            let (role, name, heard) = (part.role, part.name, part.heard);
+            let at = now;
+            let part = GonePart {
+                role,
+                name,
+                heard,
+                at,
+            };
+            self.gone.insert(id, part);
+        }
+        let present = self.parts.iter().map(|(id, part)| (*id, part.role));
+        self.gone.handle_present(&present.collect::<Vec<_>>());
+    }
+
+    pub(super) fn handle_time(&mut self, now: Instant) {
+        self.gone.handle_time(now);
+    }
+
+    fn first_vehicle(&self) -> Option<u16> {
+        let others = || {
+            let own = self.own.subsystem();
+            let all = self.directory.subsystems();
+            all.filter(move |(id, _)| *id != own && role::is_vehicle(&self.directory, *id))
+        };
+        let is_vehicle = |it: &jaus::service::Subsystem| {
+            it.identification()
+                .is_some_and(|it| it.kind == Kind::Vehicle)
+        };
+        let named = others().find(|(_, subsystem)| is_vehicle(subsystem));
+        named.or_else(|| others().next()).map(|(id, _)| id)
+    }
+
+    /// A part of the vehicle has told something.
+    pub(super) fn handle_report(&mut self, now: Instant, by: JausId, report: Report) {
+        let Some(part) = self.parts.get_mut(&by) else {
+            return;
+        };
+        if let Report::Subscription { is_up } = report {
+            part.is_down = !is_up;
+            return;
+        }
+        (part.heard, part.is_down) = (Some(now), false);
+        match report {
+            Report::Status(what) => part.status = Some(Told { what, by, at: now }),
+            Report::Control(what) => part.controller = Some(Told { what, by, at: now }),
+            Report::Stage(stage) => part.stage = Some(stage),
+            Report::Pose(what, stamp) => {
+                let at = sampled_at(&mut part.pose_clock, now, stamp);
+                self.pose = Some(Told { what, by, at });
+            }
+            Report::Velocity(what, stamp) => {
+                let at = sampled_at(&mut part.velocity_clock, now, stamp);
+                self.velocity = Some(Told { what, by, at });
+            }
+            Report::Mission(what) => self.mission = Some(Told { what, by, at: now }),
+            Report::Path(path) => self.path = path,
+            Report::Maps(maps) => {
+                self.maps = maps;
+                self.store = Some(by);
+            }
+            Report::Subscription { .. } => {}
+        }
+    }
+
+    /// Why the picture is too old to drive by, in words; `None` if it is not. What no part of the
+    /// vehicle offers is not expected.
+    pub(super) fn stale(&self, now: Instant) -> Option<String> {
+        let gone = self.gone.iter();
+        let gone = gone.map(|(id, part)| (id, part.role));
+        let mut gone = gone.filter(|(_, role)| *role == Role::PrimitiveDriver);
+        if let Some((id, role)) = gone.next() {
+            return Some(format!("{} {id} is gone", role.words()));
+        }
+        let driver = self.find(Role::PrimitiveDriver);
+        let driver = driver.and_then(|id| self.parts.get(&id));
+        let status = driver.and_then(|it| it.status.map(|it| it.at));
+        let has_status = driver.is_some_and(|it| it.managed);
+        let pose = self.pose.map(|it| it.at);
+        let has_pose = pose.is_some() || self.parts.values().any(|it| it.reports_pose);
+        let velocity = self.velocity.map(|it| it.at);
+        let has_velocity = velocity.is_some() || self.parts.values().any(|it| it.reports_velocity);
+        let is_old = |at: Instant| now.saturating_duration_since(at) >= Self::DRIVABLE;
+        let topics = [
+            ("status", has_status, status),
+            ("pose", has_pose, pose),
+            ("velocity", has_velocity, velocity),
+        ];
+        topics
+            .into_iter()
+            .find_map(|(what, is_expected, at)| match at {
+                Some(at) if is_old(at) => Some(format!(
+                    "no new {what} for {} s: the picture is stale",
+                    Self::DRIVABLE.as_secs()
+                )),
+                None if is_expected => Some(format!("the {what} is not known yet")),
+                _ => None,
+            })
+    }
+
+    /// Whether the vehicle reports where it is.
+    pub(super) fn is_position_known(&self) -> bool {
+        self.pose
+            .is_some_and(|it| it.what.x.is_some() && it.what.y.is_some())
+    }
+
+    /// The parts that have disappeared or fallen silent: each with its name and how.
+    pub(super) fn missing(&self, now: Instant) -> impl Iterator<Item = (JausId, &str, Absence)> {
+        let gone = self.gone.iter();
+        let gone = gone.map(|(id, part)| (id, &*part.name, Absence::Gone));
+        let silent = self
+            .parts
+            .iter()
+            .filter(move |(_, part)| part.is_silent(now));
+        let silent = silent.map(|(id, part)| (*id, &*part.name, Absence::Silent));
+        gone.chain(silent)
+    }
+
+    fn missing_state(&self, now: Instant) -> Vec<state::Missing> {
+        let describe = |(id, name, how): (JausId, &str, Absence)| {
+            let part = self.parts.get(&id).map(|it| (it.role, it.heard));
+            let gone = || self.gone.get(id).map(|it| (it.role, it.heard));
+            let (role, heard) = part.or_else(gone).unwrap_or((Role::Other, None));
+            state::Missing {
+                id: id.to_string(),
+                role: role.name(),
+                name: name.to_owned(),
+                how: how.name(),
+                age_ms: heard.map(|at| age(now, at)),
+            }
+        };
+        self.missing(now).map(describe).collect()
+    }
+
+    /// The planner, if it was lost while it drove. When everything is silent, the network is the
+    /// reason, and nothing is known of the planner.
+    pub(super) fn lost_planner(&self, now: Instant) -> Option<(JausId, Absence)> {
+        let told = self.mission.as_ref();
+        let planner = told.filter(|it| it.what.stage.is_driven())?.by;
+        if self.gone.get(planner).is_some() {
+            return Some((planner, Absence::Gone));
+        }
+        let part = self.parts.get(&planner)?;
+        let mut others = self.parts.iter().filter(|(id, _)| **id != planner);
+        let is_lost = part.heard.is_some()
+            && !part.was_heard_within(Self::LOST, now)
+            && others.any(|(_, it)| it.was_heard_within(Self::DRIVABLE, now));
+        is_lost.then_some((planner, Absence::Silent))
+    }
+
+    /// The parts that can be stopped by an emergency and have not said lately that they are.
+    pub(super) fn not_in_emergency(&self, now: Instant) -> impl Iterator<Item = JausId> {
+        let stands = move |part: &Part| {
+            let fresh = |it: &Told<u8>| now.saturating_duration_since(it.at) < Self::FRESH;
+            part.is(State::Emergency) && part.status.as_ref().is_some_and(fresh)
+        };
+        let managed = self.parts.iter().filter(|(_, part)| part.managed);
+        managed
+            .filter(move |(_, part)| !stands(part))
+            .map(|(id, _)| *id)
+    }
+
+    /// The parts that are stopped by an emergency.
+    pub(super) fn in_emergency(&self) -> impl Iterator<Item = JausId> {
+        let stopped = self
+            .parts
+            .iter()
+            .filter(|(_, part)| part.is(State::Emergency));
+        stopped.map(|(id, _)| *id)
+    }
+
+    /// What is known of everybody.
+    pub(super) fn tree(&self) -> Vec<state::Subsystem> {
+        super::tree::of(&self.directory)
+    }
+
+    /// What is known of the vehicle. `obstacle` says why a part is not under control.
+    pub(super) fn vehicle_state(
+        &self,
+        now: Instant,
+        emergency_wanted: bool,
+        obstacle: impl Fn(JausId) -> Option<String>,
+    ) -> Option<state::Vehicle> {
+        let subsystem = self.vehicle?;
+        let is_known = self.directory.subsystem(subsystem).is_some();
+        if !is_known && self.gone.iter().next().is_none() {
+            return None;
+        }
+        let mut parts: Vec<_> = self.parts.iter().collect();
+        parts.sort_by_key(|(id, part)| (part.role, **id));
+        let describe =
+            |(id, part): (&JausId, &Part)| self.part_state(now, *id, part, obstacle(*id));
+        let any = self.in_emergency().next().is_some();
+        let all = any && self.not_in_emergency(now).next().is_none();
+        Some(state::Vehicle {
+            subsystem,
+            name: self.name.clone(),
+            pose: self.pose.map(|told| state::Pose {
+                age_ms: age(now, told.at),
+                ..told.what
+            }),
+            velocity: self.velocity.map(|told| state::Velocity {
+                age_ms: age(now, told.at),
+                ..told.what
+            }),
+            parts: parts.into_iter().map(describe).collect(),
+            missing: self.missing_state(now),
+            stale: self.stale(now),
+            emergency: if emergency_wanted { all } else { any },
+        })
+    }
+
+    fn part_state(
+        &self,
+        now: Instant,
+        id: JausId,
+        part: &Part,
+        obstacle: Option<String>,
+    ) -> state::Part {
+        let controller = part.controller.and_then(|told| told.what);
+        state::Part {
+            id: id.to_string(),
+            role: part.role.name(),
+            managed: part.managed,
+            state: part.status.map(|told| state_name(told.what)),
+            state_age_ms: part.status.map(|told| age(now, told.at)),
+            controller: controller.map(|(id, _)| id.to_string()),
+            authority: controller.map(|(_, authority)| authority),
+            ours: controller.is_some_and(|(id, _)| id == self.own),
+            obstacle,
+            stage: part.stage.clone(),
+            age_ms: part.heard.map(|at| age(now, at)),
+        }
+    }
+
+    /// The mission with its path; also of a planner that was lost while it drove. `told_to_stop`
+    /// says whether the drivers have been stopped for that.
+    pub(super) fn mission_state(&self, now: Instant, told_to_stop: bool) -> Option<state::Mission> {
+        let told = self.mission.as_ref()?;
+        let lost = self.lost_planner(now).map(|(id, how)| state::LostPlanner {
+            id: id.to_string(),
+            how: how.name(),
+            told_to_stop,
+        });
+        let is_known = lost.is_some() || self.parts.contains_key(&told.by);
+        is_known.then(|| state::Mission {
+            path: self.path.clone(),
+            age_ms: age(now, told.at),
+            lost,
+            ..told.what.state()
+        })
+    }
+
+    /// The map to show: the one of the planner, or the first.
+    pub(super) fn map_state(&self) -> Option<state::Map> {
+        let traversability = |map: &&state::Map| map.name == "traversability";
+        let map = self.maps.iter().find(traversability);
+        map.or_else(|| self.maps.first()).cloned()
+    }
+}
+
+/// When a sample was taken that arrives now.
+fn sampled_at(clock: &mut Option<SampleClock>, now: Instant, stamp: Option<Stamp>) -> Instant {
+    match (stamp, clock) {
+        (None, clock) => {
+            *clock = None;
+            now
+        }
+        (Some(stamp), Some(clock)) => clock.handle_sample(now, stamp),
+        (Some(stamp), clock) => {
+            *clock = Some(SampleClock::new(now, stamp));
+            now
+        }
+    }
+}
+
+/// Milliseconds since then.
+fn age(now: Instant, then: Instant) -> u64 {
+    let age = now.saturating_duration_since(then).as_millis();
+    u64::try_from(age).unwrap_or(u64::MAX)
+}
+
+fn state_name(status: u8) -> &'static str {
+    match status {
+        0 => "initialize",
+        1 => "ready",
+        2 => "standby",
+        3 => "shutdown",
+        4 => "failure",
+        5 => "emergency",
+        _ => "unknown",
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the tests' time begins somewhere"
+)]
+mod tests;

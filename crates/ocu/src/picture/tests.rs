@@ -1,0 +1,262 @@
+//! What the picture says about parts that are missing and reports that are old.
+
+use super::*;
+use jaus::messages::core::{ReportStatus, management};
+use jaus::messages::ground::{ReportMission, mission_planner};
+use jaus::messages::mobility::report_local_pose::TimeStamp;
+use jaus::messages::mobility::{
+    ReportLocalPose, ReportVelocityState, local_pose_sensor, primitive_driver,
+    velocity_state_sensor,
+};
+use jaus::service::Offer;
+
+const DRIVER: JausId = JausId::new(101, 2, 33);
+const SENSORS: JausId = JausId::new(101, 2, 40);
+const PLANNER: JausId = JausId::new(101, 2, 63);
+
+fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+fn component(id: JausId, urns: &[&str]) -> Component {
+    let offer = |urn: &&str| Offer {
+        urn: (*urn).to_owned(),
+        major: 1,
+        minor: 0,
+    };
+    Component {
+        id,
+        identification: None,
+        services: Some(urns.iter().map(offer).collect()),
+    }
+}
+
+fn driver() -> Component {
+    component(DRIVER, &[management::URN, primitive_driver::URN])
+}
+
+fn sensors() -> Component {
+    component(
+        SENSORS,
+        &[local_pose_sensor::URN, velocity_state_sensor::URN],
+    )
+}
+
+fn planner() -> Component {
+    component(PLANNER, &[management::URN, mission_planner::URN])
+}
+
+/// A vehicle with these components.
+fn picture(now: Instant, components: &[Component]) -> Picture {
+    let mut picture = Picture::new(JausId::new(42, 1, 1), Some(101));
+    picture.set_parts(now, components.iter());
+    picture
+}
+
+fn pose() -> ReportLocalPose {
+    let mut pose = ReportLocalPose::default();
+    pose.set_x_m(4.0).unwrap();
+    pose.set_y_m(2.0).unwrap();
+    pose
+}
+
+fn mission(stage: u8) -> ReportMission {
+    ReportMission {
+        mission: 7,
+        stage: stage.into(),
+        ..ReportMission::default()
+    }
+}
+
+/// Everything is reported.
+fn report_all(picture: &mut Picture, now: Instant) {
+    picture.handle_report(now, DRIVER, ReportStatus::default().into());
+    picture.handle_report(now, SENSORS, pose().into());
+    picture.handle_report(now, SENSORS, ReportVelocityState::default().into());
+}
+
+fn missing(picture: &Picture, now: Instant) -> Vec<String> {
+    let all = picture.missing_state(now).into_iter();
+    all.map(|it| format!("{} {} {}", it.name, it.id, it.how))
+        .collect()
+}
+
+#[test]
+fn the_picture_is_stale_without_a_status_a_pose_and_a_velocity_of_the_last_second() {
+    let start = Instant::now();
+    for topic in ["status", "pose", "velocity"] {
+        let mut picture = picture(start, &[driver(), sensors()]);
+        assert!(picture.stale(start).is_some(), "nothing was reported");
+        report_all(&mut picture, start);
+        assert_eq!(picture.stale(start + ms(999)), None);
+        for now in [500, 1000].map(|it| start + ms(it)) {
+            if topic != "status" {
+                picture.handle_report(now, DRIVER, ReportStatus::default().into());
+            }
+            if topic != "pose" {
+                picture.handle_report(now, SENSORS, pose().into());
+            }
+            if topic != "velocity" {
+                picture.handle_report(now, SENSORS, ReportVelocityState::default().into());
+            }
+        }
+        let why = picture.stale(start + ms(1000)).unwrap_or_default();
+        assert!(why.contains(&format!("no new {topic}")), "{topic}: {why}");
+    }
+}
+
+#[test]
+fn a_vehicle_without_sensors_is_driven_by_its_status_alone() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver()]);
+    picture.handle_report(start, DRIVER, ReportStatus::default().into());
+    assert_eq!(picture.stale(start + ms(900)), None);
+    assert!(picture.stale(start + ms(1000)).is_some());
+}
+
+#[test]
+fn a_sensor_that_disappears_makes_the_picture_stale() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), sensors()]);
+    report_all(&mut picture, start);
+    picture.set_parts(start, [driver()].iter());
+    picture.handle_report(start + ms(1000), DRIVER, ReportStatus::default().into());
+    assert!(picture.stale(start + ms(1000)).is_some());
+}
+
+#[test]
+fn a_pose_with_a_frozen_time_stamp_gets_old_although_reports_arrive() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), sensors()]);
+    let frozen = ReportLocalPose {
+        time_stamp: Some(TimeStamp::default().with_seconds(7).unwrap()),
+        ..pose()
+    };
+    for tenth in 0..=20 {
+        let now = start + ms(100 * tenth);
+        picture.handle_report(now, DRIVER, ReportStatus::default().into());
+        picture.handle_report(now, SENSORS, frozen.clone().into());
+        picture.handle_report(now, SENSORS, ReportVelocityState::default().into());
+    }
+    let now = start + ms(2000);
+    assert!(picture.stale(now).is_some_and(|it| it.contains("pose")));
+    assert!(missing(&picture, now).is_empty(), "it reports");
+}
+
+#[test]
+fn an_unknown_position_is_not_known_although_it_is_reported() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), sensors()]);
+    picture.handle_report(start, SENSORS, ReportLocalPose::default().into());
+    assert!(!picture.is_position_known());
+    picture.handle_report(start, SENSORS, pose().into());
+    assert!(picture.is_position_known());
+}
+
+#[test]
+fn a_part_that_disappears_is_gone_until_it_is_back_or_replaced() {
+    let start = Instant::now();
+    let replacement = component(
+        JausId::new(101, 3, 33),
+        &[management::URN, primitive_driver::URN],
+    );
+    for back in [driver(), replacement] {
+        let mut picture = picture(start, &[driver(), sensors()]);
+        report_all(&mut picture, start);
+        picture.set_parts(start, [sensors()].iter());
+        let gone = vec!["Primitive Driver 101.2.33 gone".to_owned()];
+        assert_eq!(missing(&picture, start), gone);
+        let why = picture.stale(start).unwrap();
+        assert_eq!(why, "the primitive driver 101.2.33 is gone");
+        picture.set_parts(start, [sensors(), back].iter());
+        assert!(missing(&picture, start).is_empty());
+    }
+}
+
+#[test]
+fn a_part_that_stays_away_is_forgotten_in_the_end() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), sensors()]);
+    picture.set_parts(start, [sensors()].iter());
+    picture.handle_time(start + Duration::from_secs(299));
+    assert_eq!(missing(&picture, start).len(), 1);
+    picture.handle_time(start + Duration::from_secs(300));
+    assert!(missing(&picture, start).is_empty());
+}
+
+#[test]
+fn a_part_that_falls_silent_is_missing_after_1500_ms_and_until_it_reports() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), sensors()]);
+    report_all(&mut picture, start);
+    assert!(missing(&picture, start + ms(1499)).is_empty());
+    let silent = missing(&picture, start + ms(1500));
+    let expected = [
+        "Primitive Driver 101.2.33 silent",
+        "Velocity Sensor 101.2.40 silent",
+    ];
+    assert_eq!(silent, expected);
+    report_all(&mut picture, start + ms(1600));
+    assert!(missing(&picture, start + ms(1600)).is_empty());
+}
+
+#[test]
+fn a_part_whose_subscription_is_down_is_missing_after_1_s() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver()]);
+    picture.handle_report(start, DRIVER, ReportStatus::default().into());
+    let down = Report::Subscription { is_up: false };
+    picture.handle_report(start + ms(900), DRIVER, down);
+    assert!(missing(&picture, start + ms(999)).is_empty());
+    assert_eq!(missing(&picture, start + ms(1000)).len(), 1);
+    let up = Report::Subscription { is_up: true };
+    picture.handle_report(start + ms(1100), DRIVER, up);
+    assert!(missing(&picture, start + ms(1100)).is_empty());
+}
+
+#[test]
+fn a_planner_that_is_gone_while_it_drives_leaves_its_mission_behind() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(7).into());
+    assert_eq!(picture.lost_planner(start), None);
+    picture.set_parts(start, [driver()].iter());
+    assert_eq!(picture.lost_planner(start), Some((PLANNER, Absence::Gone)));
+    let shown = picture.mission_state(start, true).unwrap();
+    let lost = state::LostPlanner {
+        id: "101.2.63".to_owned(),
+        how: "gone",
+        told_to_stop: true,
+    };
+    assert_eq!((shown.mission, shown.lost), (7, Some(lost)));
+}
+
+#[test]
+fn a_planner_that_did_not_drive_is_not_lost_with_its_mission() {
+    let start = Instant::now();
+    for stage in [0, 3, 8, 9, 10] {
+        let mut picture = picture(start, &[driver(), planner()]);
+        picture.handle_report(start, PLANNER, mission(stage).into());
+        picture.set_parts(start, [driver()].iter());
+        assert_eq!(picture.lost_planner(start), None, "{stage}");
+        assert_eq!(picture.mission_state(start, false), None, "{stage}");
+    }
+}
+
+#[test]
+fn a_planner_that_is_silent_while_others_report_is_lost_after_2_s() {
+    let start = Instant::now();
+    let mut picture = picture(start, &[driver(), planner()]);
+    picture.handle_report(start, PLANNER, mission(7).into());
+    let now = start + ms(2000);
+    assert_eq!(
+        picture.lost_planner(now),
+        None,
+        "all are silent: the network"
+    );
+    picture.handle_report(now, DRIVER, ReportStatus::default().into());
+    assert_eq!(picture.lost_planner(now), Some((PLANNER, Absence::Silent)));
+    assert_eq!(picture.lost_planner(now - ms(1)), None);
+    picture.handle_report(now, PLANNER, mission(7).into());
+    assert_eq!(picture.lost_planner(now), None);
+}

@@ -1,0 +1,259 @@
+//! What the parts of a vehicle tell, as the station keeps it: read from messages, in SI units.
+
+use super::sample_clock::Stamp;
+use super::state;
+use jaus::address::JausId;
+use jaus::messages::core::{ReportControl, ReportStatus};
+use jaus::messages::ground::{ReportMission, ReportPlannedPath, ReportRasterMaps, ReportStage};
+use jaus::messages::mobility::{ReportLocalPose, ReportVelocityState};
+
+/// What a part has told.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Report {
+    /// The number of its state in Management.
+    Status(u8),
+    /// Who controls it, with which authority.
+    Control(Option<(JausId, u8)>),
+    Stage(state::Stage),
+    /// The pose, and the time stamp of the sample if it has one.
+    Pose(state::Pose, Option<Stamp>),
+    /// The velocity, likewise.
+    Velocity(state::Velocity, Option<Stamp>),
+    Mission(Mission),
+    Path(Vec<[f64; 2]>),
+    Maps(Vec<state::Map>),
+    /// A subscription has stopped bringing reports, or brings them again.
+    Subscription {
+        is_up: bool,
+    },
+}
+
+/// How the planner's mission is.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Mission {
+    pub(super) number: u32,
+    pub(super) stage: MissionStage,
+    attempt: u8,
+    attempts: u8,
+    progress: u8,
+    destination: [f64; 2],
+    remaining: f64,
+    reason: String,
+}
+
+/// The stages of a mission by their numbers in Report Mission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct MissionStage(u8);
+
+impl MissionStage {
+    const NAMES: [&str; 11] = [
+        "idle",
+        "map",
+        "planning",
+        "awaiting_approval",
+        "path",
+        "vector",
+        "primitive",
+        "driving",
+        "arrived",
+        "failed",
+        "stopped",
+    ];
+
+    pub(super) fn name(self) -> &'static str {
+        let name = Self::NAMES.get(usize::from(self.0));
+        name.copied().unwrap_or("unknown")
+    }
+
+    pub(super) const fn awaits_approval(self) -> bool {
+        self.0 == 3
+    }
+
+    /// Whether the planner drives the vehicle, or is about to.
+    pub(super) const fn is_driven(self) -> bool {
+        matches!(self.0, 4..=7)
+    }
+}
+
+impl Mission {
+    /// As pages show it, without its path.
+    pub(super) fn state(&self) -> state::Mission {
+        state::Mission {
+            mission: self.number,
+            stage: self.stage.name(),
+            attempt: self.attempt,
+            attempts: self.attempts,
+            progress: self.progress,
+            destination: self.destination,
+            remaining_m: self.remaining,
+            reason: self.reason.clone(),
+            path: Vec::new(),
+            age_ms: 0,
+            lost: None,
+        }
+    }
+}
+
+impl From<ReportStatus> for Report {
+    fn from(report: ReportStatus) -> Self {
+        Self::Status(report.status.0)
+    }
+}
+
+impl From<ReportControl> for Report {
+    fn from(report: ReportControl) -> Self {
+        let id = JausId::new(report.subsystem_id, report.node_id, report.component_id);
+        Self::Control((id.to_u32() != 0).then_some((id, report.authority_code)))
+    }
+}
+
+impl From<ReportStage> for Report {
+    fn from(report: ReportStage) -> Self {
+        let state = match report.state.0 {
+            0 => "idle",
+            1 => "engaging",
+            2 => "active",
+            3 => "blocked",
+            4 => "done",
+            _ => "unknown",
+        };
+        Self::Stage(state::Stage {
+            state,
+            progress: report.progress,
+            reason: report.reason.to_string(),
+        })
+    }
+}
+
+impl From<ReportLocalPose> for Report {
+    fn from(report: ReportLocalPose) -> Self {
+        let pose = state::Pose {
+            x: report.x_m(),
+            y: report.y_m(),
+            yaw: report.yaw_rad(),
+            age_ms: 0,
+        };
+        Self::Pose(pose, report.time_stamp.and_then(Stamp::read))
+    }
+}
+
+impl From<ReportVelocityState> for Report {
+    fn from(report: ReportVelocityState) -> Self {
+        let velocity = state::Velocity {
+            x: report.velocity_x_m_per_s(),
+            yaw_rate: report.yaw_rate_rad_per_s(),
+            age_ms: 0,
+        };
+        Self::Velocity(velocity, report.time_stamp.and_then(Stamp::read))
+    }
+}
+
+impl From<ReportMission> for Report {
+    fn from(report: ReportMission) -> Self {
+        Self::Mission(Mission {
+            number: report.mission,
+            stage: MissionStage(report.stage.0),
+            attempt: report.attempt,
+            attempts: report.attempts,
+            progress: report.progress,
+            destination: [report.destination_x, report.destination_y],
+            remaining: f64::from(report.remaining),
+            reason: report.reason.to_string(),
+        })
+    }
+}
+
+/// The most points of a path that a page is told of.
+const MOST_POINTS: usize = 500;
+
+impl From<ReportPlannedPath> for Report {
+    fn from(report: ReportPlannedPath) -> Self {
+        let points = report.point_list;
+        // Every so many, and the last one always.
+        let step = points.len().div_ceil(MOST_POINTS - 1).max(1);
+        let mut thin: Vec<_> = points.iter().step_by(step).map(|it| [it.x, it.y]).collect();
+        if let Some(last) = points
+            .last()
+            .filter(|_| !(points.len() - 1).is_multiple_of(step))
+        {
+            thin.push([last.x, last.y]);
+        }
+        Self::Path(thin)
+    }
+}
+
+/// The most maps that are kept in mind.
+const MOST_MAPS: usize = 256;
+
+impl From<ReportRasterMaps> for Report {
+    fn from(report: ReportRasterMaps) -> Self {
+        let maps = report.map_list.into_iter().take(MOST_MAPS);
+        let maps = maps.map(|it| state::Map {
+            id: it.map,
+            name: it.name.to_string(),
+            rows: it.rows,
+            columns: it.columns,
+            cell_m: f64::from(it.cell_size),
+            x: it.x,
+            y: it.y,
+            revision: it.revision,
+        });
+        Self::Maps(maps.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jaus::messages::ground::report_planned_path::PointRec;
+
+    #[test]
+    fn a_long_path_is_thinned_out_and_keeps_its_ends() {
+        for count in [0, 1, 2, 499, 500, 501, 998, 999, 65_535] {
+            let point = |x: u16| PointRec {
+                x: x.into(),
+                y: 0.0,
+            };
+            let report = ReportPlannedPath {
+                point_list: (0..count).map(point).collect(),
+                ..ReportPlannedPath::default()
+            };
+            let Report::Path(path) = report.into() else {
+                panic!("not a path");
+            };
+            assert!(path.len() <= MOST_POINTS, "{count}: {}", path.len());
+            let ends = (count > 0).then(|| ([0.0, 0.0], [f64::from(count - 1), 0.0]));
+            let kept = path.first().copied().zip(path.last().copied());
+            assert_eq!(kept, ends, "{count}");
+        }
+    }
+
+    #[test]
+    fn what_a_report_does_not_say_is_unknown_and_not_zero() {
+        let pose = state::Pose {
+            x: None,
+            y: None,
+            yaw: None,
+            age_ms: 0,
+        };
+        assert_eq!(
+            Report::from(ReportLocalPose::default()),
+            Report::Pose(pose, None)
+        );
+        let velocity = state::Velocity {
+            x: None,
+            yaw_rate: None,
+            age_ms: 0,
+        };
+        assert_eq!(
+            Report::from(ReportVelocityState::default()),
+            Report::Velocity(velocity, None)
+        );
+    }
+
+    #[test]
+    fn nobody_in_control_is_nobody() {
+        let report = ReportControl::default();
+        assert_eq!(Report::from(report), Report::Control(None));
+    }
+}

@@ -1,0 +1,296 @@
+//! One page's WebSocket: what it says goes to the desk, snapshots and answers come back. Reading
+//! and writing are independent, so that a page that does not keep up can still stop the vehicle.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+use axum::extract::ws::{CloseFrame, Message, Utf8Bytes, WebSocket, close_code};
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt, StreamExt};
+use tokio::sync::mpsc;
+use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
+
+use super::Shared;
+use super::bounds::Rate;
+use super::view::{self, MessageView};
+use crate::PageId;
+use crate::answer::Said as Answer;
+use crate::desk::{Order, Reply};
+use crate::wish::{Frame, MessageFilter, Said, Wish};
+use jaus::view::Filter;
+
+/// The version of the protocol between page and station.
+const VERSION: u32 = 1;
+/// Answers that may wait for a page; a page that takes none loses further ones.
+const ANSWERS: usize = 64;
+/// A page that takes nothing for so long is given up.
+const STUCK: Duration = Duration::from_secs(5);
+/// Between two pings, to which a page's browser answers by itself.
+const PING: Duration = Duration::from_secs(5);
+/// How long a wrong token is thought about.
+const WRONG_TOKEN: Duration = Duration::from_secs(1);
+/// After so many of them the connection ends.
+const WRONG_TOKENS: u32 = 5;
+/// Between two refusals that answer no wish in particular.
+const REFUSAL: Duration = Duration::from_secs(1);
+
+/// Serves a page until it goes, or has to.
+pub(super) async fn serve(socket: WebSocket, shared: Arc<Shared>) {
+    let page = PageId(shared.pages.fetch_add(1, Relaxed));
+    let (mut sink, stream) = socket.split();
+    let (answers, waiting) = mpsc::channel(ANSWERS);
+    let (views, chosen) = mpsc::channel(ANSWERS);
+    let trusted = AtomicBool::new(!shared.needs_token());
+    let reader = Reader {
+        page,
+        shared: &shared,
+        answers,
+        views,
+        trusted: &trusted,
+        rate: Rate::new(Instant::now()),
+        wrong_tokens: 0,
+        refused: None,
+    };
+    let parting = tokio::select! {
+        parting = reader.run(stream) => parting,
+        () = write(&mut sink, &shared, &trusted, waiting, chosen) => None,
+    };
+    // The hand that was on the stick is gone, whatever else is.
+    let _ = shared.access.orders.send(Order::Gone(page)).await;
+    if let Some((code, reason)) = parting {
+        let frame = CloseFrame {
+            code,
+            reason: Utf8Bytes::from_static(reason),
+        };
+        let close = sink.send(Message::Close(Some(frame)));
+        // Whoever does not listen is not told.
+        let _ = timeout(STUCK, close).await;
+    }
+}
+
+/// Why a connection ends: the code and the words of the Close frame.
+type Parting = (u16, &'static str);
+
+struct Reader<'s> {
+    page: PageId,
+    shared: &'s Shared,
+    answers: mpsc::Sender<Utf8Bytes>,
+    /// Which messages the page wants to see.
+    views: mpsc::Sender<Option<Filter>>,
+    trusted: &'s AtomicBool,
+    rate: Rate,
+    wrong_tokens: u32,
+    /// When a wish without an id was last refused.
+    refused: Option<Instant>,
+}
+
+impl Reader<'_> {
+    async fn run(mut self, mut stream: SplitStream<WebSocket>) -> Option<Parting> {
+        while let Some(message) = stream.next().await {
+            let message = match message {
+                Ok(message) => message,
+                Err(error) => {
+                    tracing::debug!(page = self.page.0, %error, "connection broken");
+                    // Most of all a frame that is too large; nobody hears it if the connection is
+                    // broken.
+                    self.shared.counters.too_much.fetch_add(1, Relaxed);
+                    return Some((close_code::SIZE, "frames have up to 4096 octets"));
+                }
+            };
+            if !self.rate.allows(Instant::now()) {
+                self.shared.counters.too_much.fetch_add(1, Relaxed);
+                return Some((
+                    close_code::POLICY,
+                    "too many frames; up to 50 a second are read",
+                ));
+            }
+            let parting = match message {
+                Message::Text(text) => self.handle(&text).await,
+                Message::Binary(_) => Some((close_code::UNSUPPORTED, "frames are JSON text")),
+                Message::Close(_) => return None,
+                Message::Ping(_) | Message::Pong(_) => None,
+            };
+            if parting.is_some() {
+                return parting;
+            }
+        }
+        None
+    }
+
+    async fn handle(&mut self, text: &str) -> Option<Parting> {
+        let frame: Frame = match serde_json::from_str(text) {
+            Ok(frame) => frame,
+            Err(error) => {
+                self.refuse(None, &format!("this is not a wish: {error}"));
+                return None;
+            }
+        };
+        match frame.said {
+            Said::Token { token } => return self.show(frame.id, &token).await,
+            Said::Messages { on, filter } => self.choose(frame.id, on, &filter).await,
+            Said::Wish(_) if !self.trusted.load(Relaxed) => {
+                self.refuse(
+                    frame.id,
+                    "this needs the token that jaus-ocu printed or read from its file",
+                );
+            }
+            Said::Wish(wish) => self.wish(frame.id, wish).await,
+        }
+        None
+    }
+
+    /// The page shows a token.
+    async fn show(&mut self, id: Option<u64>, token: &str) -> Option<Parting> {
+        if self.shared.admits(token) {
+            self.trusted.store(true, Relaxed);
+            self.say(id.map(|id| Answer::Done { id }).as_ref());
+            return None;
+        }
+        self.wrong_tokens += 1;
+        tracing::warn!(page = self.page.0, "wrong token");
+        sleep(WRONG_TOKEN).await;
+        self.refuse(id, "this is not the token");
+        (self.wrong_tokens >= WRONG_TOKENS).then_some((close_code::POLICY, "too many wrong tokens"))
+    }
+
+    /// The page wants to see messages, or none.
+    async fn choose(&mut self, id: Option<u64>, on: bool, filter: &MessageFilter) {
+        if !self.may_read() {
+            return self.refuse(id, "looking needs the token, too");
+        }
+        if on && self.shared.door.node.is_none() {
+            return self.refuse(
+                id,
+                "the station's node runs in another process: look at its debug view",
+            );
+        }
+        let chosen = match on.then(|| view::filter(filter)).transpose() {
+            Ok(chosen) => chosen,
+            Err(error) => return self.refuse(id, &error.to_string()),
+        };
+        // An error means that the writer has ended, and with it the connection.
+        let _ = self.views.send(chosen).await;
+        self.say(id.map(|id| Answer::Done { id }).as_ref());
+    }
+
+    fn may_read(&self) -> bool {
+        may_read(self.shared, self.trusted)
+    }
+
+    async fn wish(&mut self, id: Option<u64>, wish: Wish) {
+        let (page, reply) = (self.page, self.reply(id));
+        let order = Order::Wish { page, wish, reply };
+        // An error means that the desk has ended, and the writer notices that.
+        let _ = self.shared.access.orders.send(order).await;
+    }
+
+    /// What tells the page how its wish went. Without an id it only hears of refusals, and of them
+    /// not too many.
+    fn reply(&mut self, id: Option<u64>) -> Reply {
+        let answers = self.answers.clone();
+        let now = Instant::now();
+        let quiet = self.refused.is_some_and(|at| now < at + REFUSAL);
+        if id.is_none() && !quiet {
+            self.refused = Some(now);
+        }
+        Box::new(move |result| {
+            let answer = match (&result, id) {
+                (Ok(()), Some(id)) => Answer::Done { id },
+                (Err(reason), _) if id.is_some() || !quiet => Answer::Refused { id, reason },
+                _ => return,
+            };
+            say(&answers, &answer);
+        })
+    }
+
+    fn refuse(&mut self, id: Option<u64>, reason: &str) {
+        self.reply(id)(Err(reason.to_owned()));
+    }
+
+    fn say(&self, answer: Option<&Answer<'_>>) {
+        if let Some(answer) = answer {
+            say(&self.answers, answer);
+        }
+    }
+}
+
+/// Queues an answer for the page, unless too many wait already.
+fn say(answers: &mpsc::Sender<Utf8Bytes>, answer: &Answer<'_>) {
+    // Numbers and texts only, so that there is nothing that JSON can not say.
+    if let Ok(json) = serde_json::to_string(answer) {
+        let _ = answers.try_send(json.into());
+    }
+}
+
+/// Whether a page may look.
+fn may_read(shared: &Shared, trusted: &AtomicBool) -> bool {
+    !shared.door.token_to_read || trusted.load(Relaxed)
+}
+
+/// The next message of the view, if there is one.
+async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
+    match view {
+        Some(view) => view.next().await,
+        None => std::future::pending().await,
+    }
+}
+
+/// Tells the page everything, until it does not take it or the desk has ended.
+async fn write(
+    sink: &mut SplitSink<WebSocket, Message>,
+    shared: &Shared,
+    trusted: &AtomicBool,
+    mut answers: mpsc::Receiver<Utf8Bytes>,
+    mut chosen: mpsc::Receiver<Option<Filter>>,
+) {
+    let mut view = None;
+    let mut snapshots = shared.access.snapshots.clone();
+    snapshots.mark_changed();
+    let mut pings = interval(PING);
+    pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let hello = Answer::Hello {
+        version: VERSION,
+        token_needed: shared.needs_token(),
+        operator: shared.door.operator.to_string(),
+        authority: shared.door.authority,
+    };
+    let mut next = serde_json::to_string(&hello)
+        .ok()
+        .map(|it| Message::Text(it.into()));
+    loop {
+        if let Some(message) = next.take() {
+            match timeout(STUCK, sink.send(message)).await {
+                Ok(Ok(())) => {}
+                Ok(Err(_)) | Err(_) => return,
+            }
+        }
+        next = tokio::select! {
+            biased;
+            answer = answers.recv() => match answer {
+                Some(json) => Some(Message::Text(json)),
+                None => return,
+            },
+            changed = snapshots.changed() => {
+                if changed.is_err() {
+                    return;
+                }
+                let json = snapshots.borrow_and_update().clone();
+                let shown = may_read(shared, trusted) && !json.is_empty();
+                let json = Some(json).filter(|_| shown);
+                json.map(|json| Message::Text(Utf8Bytes::from(&*json)))
+            }
+            _ = pings.tick() => Some(Message::Ping(axum::body::Bytes::new())),
+            Some(filter) = chosen.recv() => {
+                view = filter.zip(shared.door.node.as_ref()).map(|(filter, node)| {
+                    MessageView::new(node, &shared.dictionary, filter)
+                });
+                None
+            }
+            message = next_message(&mut view) => match message {
+                Some(json) => Some(Message::Text(json)),
+                None => return,
+            },
+        };
+    }
+}

@@ -1,0 +1,224 @@
+//! What operators do: look, take control, drive, let go, stop; alone and two of them.
+
+use jaus_ocu::Station;
+use serde_json::json;
+
+use crate::scene::{Page, Scene, driver_of};
+
+#[tokio::test]
+async fn a_page_sees_the_vehicle_and_its_parts_without_asking() {
+    let scene = Scene::new().await;
+    let mut page = scene.page().await;
+    assert_eq!(page.hello["token_needed"], false);
+    assert_eq!(page.hello["operator"], "42.1.1");
+    let complete = |state: &serde_json::Value| {
+        let vehicle = &state["vehicle"];
+        !vehicle["pose"].is_null()
+            && !vehicle["velocity"].is_null()
+            && driver_of(state)["state"] == "standby"
+    };
+    let state = page.until(complete).await;
+    assert_eq!(state["vehicle"]["subsystem"], 101);
+    assert_eq!(state["vehicle"]["name"], "Rover");
+    assert_eq!(driver_of(&state)["id"], "101.1.1");
+    assert_eq!(state["control"]["held"], false);
+    assert_eq!(state["mission"], json!(null));
+    assert_eq!(state["tree"].as_array().unwrap().len(), 2);
+}
+
+#[tokio::test]
+async fn who_has_not_taken_control_is_told_so_and_moves_nothing() {
+    let scene = Scene::new().await;
+    let mut page = scene.page().await;
+    page.until(|state| driver_of(state)["state"] == "standby")
+        .await;
+    for wish in [
+        json!({"type": "drive", "forward": 1, "turn": 0}),
+        json!({"type": "resume"}),
+        json!({"type": "standby"}),
+    ] {
+        let refused = page.ask(wish).await.unwrap_err();
+        assert_eq!(refused, "take control first");
+    }
+    let refused = page
+        .ask(json!({"type": "destination", "x": 1, "y": 1}))
+        .await;
+    assert_eq!(
+        refused.unwrap_err(),
+        "the vehicle has no planner at present"
+    );
+    assert_eq!(scene.speed(), 0.0);
+}
+
+#[tokio::test]
+async fn a_vehicle_is_driven_while_the_page_says_so_and_stops_300_ms_after_its_last_word() {
+    let scene = Scene::new().await;
+    let mut page = scene.driver().await;
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    page.until(|state| state["drive"]["active"] == true).await;
+    let state = page.until(|state| driver_of(state)["ours"] == true).await;
+    assert_eq!(driver_of(&state)["authority"], 200);
+    // Not a word any more.
+    scene.until(|scene| scene.speed() == 0.0).await;
+    page.until(|state| state["drive"]["active"] == false).await;
+}
+
+#[tokio::test]
+async fn a_vehicle_stops_when_the_page_is_gone() {
+    let scene = Scene::new().await;
+    let mut page = scene.driver().await;
+    page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+    drop(page);
+    scene.until(|scene| scene.speed() == 0.0).await;
+}
+
+#[tokio::test]
+async fn standby_and_giving_back_control_stop_the_vehicle() {
+    let scene = Scene::new().await;
+    let mut page = scene.driver().await;
+    for wish in [
+        json!({"type": "standby"}),
+        json!({"type": "control", "on": false}),
+    ] {
+        page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+        page.ask(wish).await.unwrap();
+        scene.until(|scene| scene.speed() == 0.0).await;
+        let again = page.ask(json!({"type": "drive", "forward": 1, "turn": 0}));
+        again.await.unwrap_err();
+        page.ask(json!({"type": "control", "on": true}))
+            .await
+            .unwrap();
+        page.ask(json!({"type": "resume"})).await.unwrap();
+    }
+}
+
+#[tokio::test]
+async fn an_emergency_needs_no_control_and_ends_only_when_it_is_cleared() {
+    let scene = Scene::new().await;
+    let mut driver = scene.driver().await;
+    let mut other = scene.page().await;
+    driver
+        .drive_until(&scene, |scene| scene.speed() > 0.3)
+        .await;
+    for _ in 0..2 {
+        other
+            .ask(json!({"type": "emergency", "on": true}))
+            .await
+            .unwrap();
+    }
+    scene.until(|scene| scene.speed() == 0.0).await;
+    driver
+        .until(|state| state["vehicle"]["emergency"] == true)
+        .await;
+    let refused = driver.ask(json!({"type": "drive", "forward": 1, "turn": 0}));
+    assert!(refused.await.unwrap_err().contains("emergency"));
+    let refused = driver.ask(json!({"type": "resume"})).await;
+    refused.unwrap_err();
+
+    other
+        .ask(json!({"type": "emergency", "on": false}))
+        .await
+        .unwrap();
+    driver
+        .until(|state| state["vehicle"]["emergency"] == false)
+        .await;
+    let refused = driver.ask(json!({"type": "drive", "forward": 1, "turn": 0}));
+    assert!(
+        refused.await.unwrap_err().contains("resume"),
+        "not by itself"
+    );
+    driver.until(|state| state["control"]["held"] == true).await;
+    driver.ask(json!({"type": "resume"})).await.unwrap();
+    driver
+        .drive_until(&scene, |scene| scene.speed() > 0.3)
+        .await;
+}
+
+#[tokio::test]
+async fn of_two_pages_one_drives_and_the_other_is_told_so() {
+    let scene = Scene::new().await;
+    let mut driver = scene.driver().await;
+    let mut other = scene.page().await;
+    driver
+        .drive_until(&scene, |scene| scene.speed() > 0.3)
+        .await;
+    let wish = json!({"type": "drive", "forward": 0.5, "turn": 0});
+    // On a machine that is busy for 300 ms the first has let go before the second comes.
+    let refused = loop {
+        driver.ask(wish.clone()).await.unwrap();
+        if let Err(refused) = other.ask(wish.clone()).await {
+            break refused;
+        }
+        other.ask(json!({"type": "drive_end"})).await.unwrap();
+    };
+    assert_eq!(refused, "another page drives now; it has to let go first");
+    driver.ask(json!({"type": "drive_end"})).await.unwrap();
+    let taken = other.ask(json!({"type": "drive", "forward": 0.5, "turn": 0}));
+    taken.await.unwrap();
+}
+
+#[tokio::test]
+async fn of_two_stations_with_the_same_authority_the_second_is_told_who_is_in_control() {
+    let scene = Scene::new().await;
+    let _driver = scene.driver().await;
+    let (address, station, _node) = scene.another_station().await;
+    let mut other = Page::open(address).await;
+    other
+        .until(|state| driver_of(state)["controller"] == "42.1.1")
+        .await;
+    let refused = other.ask(json!({"type": "control", "on": true})).await;
+    let reason = refused.unwrap_err();
+    assert!(reason.contains("authority"), "{reason}");
+    let state = other
+        .until(|state| state["control"]["wanted"] == true)
+        .await;
+    assert_eq!(state["control"]["held"], false);
+    // Stopping needs nobody's leave; taking it back is up to who did it.
+    other
+        .ask(json!({"type": "emergency", "on": true}))
+        .await
+        .unwrap();
+    let mut first = scene.page().await;
+    first
+        .until(|state| state["vehicle"]["emergency"] == true)
+        .await;
+    let refused = first.ask(json!({"type": "emergency", "on": false})).await;
+    assert!(refused.unwrap_err().contains("another client"));
+    other
+        .ask(json!({"type": "emergency", "on": false}))
+        .await
+        .unwrap();
+    first
+        .until(|state| state["vehicle"]["emergency"] == false)
+        .await;
+    station.abort();
+}
+
+#[tokio::test]
+async fn a_vehicle_that_starts_again_is_taken_and_made_ready_again() {
+    // With control that outlives the vehicle because it is renewed, and without.
+    for timeout in [0, 2] {
+        let mut scene = Scene::with(Station::default(), timeout).await;
+        let mut page = scene.driver().await;
+        scene.restart_rover().await;
+        page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+        page.ask(json!({"type": "drive_end"})).await.unwrap();
+        scene.until(|scene| scene.speed() == 0.0).await;
+    }
+}
+
+#[tokio::test]
+async fn another_vehicle_can_be_chosen_if_there_is_one() {
+    let scene = Scene::new().await;
+    let mut page = scene.driver().await;
+    page.ask(json!({"type": "select", "subsystem": 101}))
+        .await
+        .unwrap();
+    for nobody in [42, 77] {
+        let refused = page
+            .ask(json!({"type": "select", "subsystem": nobody}))
+            .await;
+        assert!(refused.unwrap_err().contains("not known as a vehicle"));
+    }
+    assert_eq!(page.state().await["vehicle"]["subsystem"], 101);
+}

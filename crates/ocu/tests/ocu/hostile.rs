@@ -1,0 +1,281 @@
+//! Pages that are not what they seem: each gets a stated answer, and those that are all right do
+//! not notice.
+
+use futures_util::{SinkExt, StreamExt};
+use jaus_ocu::{Station, Token};
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio_tungstenite::tungstenite::protocol::CloseFrame;
+use tokio_tungstenite::tungstenite::{Error, Message};
+
+use crate::scene::{Page, Scene, driver_of, within_limit};
+
+const TOKEN: &str = "correct-horse-battery";
+
+async fn guarded(token_to_read: bool) -> Scene {
+    Scene::with(
+        Station {
+            token: Token::new(TOKEN),
+            token_to_read,
+            ..Station::default()
+        },
+        0,
+    )
+    .await
+}
+
+/// Asks with plain HTTP; the whole answer.
+async fn get(scene: &Scene, path: &str, header: &str) -> String {
+    let mut stream = TcpStream::connect(scene.address).await.unwrap();
+    let request = format!("GET {path} HTTP/1.1\r\n{header}Connection: close\r\n\r\n");
+    stream.write_all(request.as_bytes()).await.unwrap();
+    let mut answer = Vec::new();
+    within_limit(stream.read_to_end(&mut answer)).await.unwrap();
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+async fn health(scene: &Scene) -> Value {
+    let answer = get(scene, "/health", "Host: localhost\r\n").await;
+    let body = answer.split("\r\n\r\n").nth(1).unwrap();
+    serde_json::from_str(body).unwrap()
+}
+
+/// Why the station ends a connection.
+async fn parting(page: &mut Page) -> CloseFrame {
+    loop {
+        match within_limit(page.socket.next()).await {
+            Some(Ok(Message::Close(Some(frame)))) => return frame,
+            Some(Ok(_)) => {}
+            other => panic!("no close frame: {other:?}"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn without_the_token_a_page_may_look_and_change_nothing_not_even_by_guessing() {
+    let scene = guarded(false).await;
+    let mut page = scene.page().await;
+    assert_eq!(page.hello["token_needed"], true);
+    page.until(|state| driver_of(state)["state"] == "standby")
+        .await;
+    for wish in [
+        json!({"type": "control", "on": true}),
+        json!({"type": "emergency", "on": true}),
+        json!({"type": "select", "subsystem": 101}),
+    ] {
+        let refused = page.ask(wish).await.unwrap_err();
+        assert!(refused.contains("token"), "{refused}");
+    }
+    let wrong = json!({"type": "token", "token": "correct-horse-batterz"});
+    assert_eq!(page.ask(wrong).await.unwrap_err(), "this is not the token");
+    page.ask(json!({"type": "control", "on": true}))
+        .await
+        .unwrap_err();
+    assert_eq!(health(&scene).await["wrong_tokens"], 1);
+    assert!(!scene.is_controlled());
+
+    page.ask(json!({"type": "token", "token": TOKEN}))
+        .await
+        .unwrap();
+    page.ask(json!({"type": "control", "on": true}))
+        .await
+        .unwrap();
+}
+
+#[tokio::test]
+async fn who_guesses_five_times_is_shown_the_door() {
+    let scene = guarded(false).await;
+    let mut page = scene.page().await;
+    for _ in 0..5 {
+        page.say(&json!({"type": "token", "token": "0123456789abcdef"}))
+            .await;
+    }
+    assert_eq!(
+        parting(&mut page).await.reason.as_str(),
+        "too many wrong tokens"
+    );
+    assert_eq!(health(&scene).await["wrong_tokens"], 5);
+}
+
+#[tokio::test]
+async fn if_looking_needs_the_token_nothing_is_shown_before() {
+    let scene = guarded(true).await;
+    let mut page = scene.page().await;
+    page.say(&json!({"type": "control", "on": true, "id": 1}))
+        .await;
+    assert_eq!(page.next().await["type"], "refused", "and no state before");
+    let map = get(&scene, "/map/1", "Host: localhost\r\n").await;
+    assert!(map.starts_with("HTTP/1.1 401"), "{map}");
+    let shown = format!("Host: localhost\r\nAuthorization: Bearer {TOKEN}\r\n");
+    let map = get(&scene, "/map/1", &shown).await;
+    assert!(map.starts_with("HTTP/1.1 404"), "{map}");
+    page.ask(json!({"type": "token", "token": TOKEN}))
+        .await
+        .unwrap();
+    page.state().await;
+}
+
+#[tokio::test]
+async fn a_giant_frame_ends_the_connection_that_sent_it_and_no_other() {
+    let scene = Scene::new().await;
+    let mut good = scene.driver().await;
+    let mut giant = scene.page().await;
+    // It may be refused before all of it is sent.
+    let _ = giant.socket.send(Message::text("x".repeat(1 << 20))).await;
+    loop {
+        match within_limit(giant.socket.next()).await {
+            Some(Ok(Message::Close(_)) | Err(_)) | None => break,
+            Some(Ok(_)) => {}
+        }
+    }
+    assert_eq!(health(&scene).await["too_much"], 1);
+    good.drive_until(&scene, |scene| scene.speed() > 0.3).await;
+}
+
+#[tokio::test]
+async fn a_page_that_never_stops_talking_is_shown_the_door() {
+    let scene = Scene::new().await;
+    let mut page = scene.page().await;
+    for _ in 0..500 {
+        let said = page
+            .socket
+            .feed(Message::text(r#"{"type":"drive_end"}"#))
+            .await;
+        if said.is_err() {
+            break;
+        }
+    }
+    let _ = page.socket.flush().await;
+    let reason = parting(&mut page).await.reason;
+    assert_eq!(
+        reason.as_str(),
+        "too many frames; up to 50 a second are read"
+    );
+}
+
+#[tokio::test]
+async fn what_is_no_wish_is_refused_in_words_and_the_page_goes_on() {
+    let scene = Scene::new().await;
+    let mut page = scene.page().await;
+    for text in [
+        "",
+        "{}",
+        "[[[[",
+        r#"{"type":"fly","id":3}"#,
+        "\u{0}",
+        "1e999",
+    ] {
+        page.socket.send(Message::text(text)).await.unwrap();
+    }
+    loop {
+        let said = page.next().await;
+        if said["type"] == "refused" {
+            assert!(
+                said["reason"]
+                    .as_str()
+                    .unwrap()
+                    .starts_with("this is not a wish")
+            );
+            break;
+        }
+    }
+    for wish in [
+        json!({"type": "drive", "forward": 2, "turn": 0}),
+        json!({"type": "destination", "x": 1e300, "y": 0, "speed": -1}),
+        json!({"type": "approve", "mission": 9}),
+    ] {
+        page.ask(wish).await.unwrap_err();
+    }
+    page.state().await;
+}
+
+#[tokio::test]
+async fn of_a_thousand_sockets_most_are_refused_and_the_pages_that_stand_keep_working() {
+    let scene = Scene::new().await;
+    let mut driver = scene.driver().await;
+    let mut taken = Vec::new();
+    let mut refused = 0;
+    for _ in 0..1000 {
+        match Page::try_open(scene.address, &[]).await {
+            Ok(page) => taken.push(page),
+            Err(error) => match *error {
+                Error::Http(answer) => {
+                    assert_eq!(answer.status(), 503);
+                    refused += 1;
+                }
+                other => panic!("{other}"),
+            },
+        }
+    }
+    assert_eq!((taken.len(), refused), (31, 969));
+    driver
+        .drive_until(&scene, |scene| scene.speed() > 0.3)
+        .await;
+    driver.ask(json!({"type": "drive_end"})).await.unwrap();
+    // None of them reads anything, and there is place again when they are gone.
+    drop(taken);
+    within_limit(async {
+        while Page::try_open(scene.address, &[]).await.is_err() {
+            tokio::task::yield_now().await;
+        }
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn connections_that_say_nothing_leave_the_pages_alone() {
+    let scene = Scene::new().await;
+    let mut driver = scene.driver().await;
+    let mut silent = Vec::new();
+    for _ in 0..400 {
+        silent.push(TcpStream::connect(scene.address).await.unwrap());
+    }
+    driver
+        .drive_until(&scene, |scene| scene.speed() > 0.3)
+        .await;
+    drop(silent);
+}
+
+#[tokio::test]
+async fn pages_of_other_sites_are_refused_and_so_are_names_that_are_not_ours() {
+    let scene = Scene::new().await;
+    let own = format!("http://{}", scene.address);
+    Page::try_open(scene.address, &[("origin", &own)])
+        .await
+        .unwrap();
+    for (header, value, status) in [
+        ("origin", "http://evil.example", 403),
+        ("origin", "null", 403),
+        ("sec-fetch-site", "cross-site", 403),
+        ("host", "evil.example", 421),
+    ] {
+        match Page::try_open(scene.address, &[(header, value)])
+            .await
+            .err()
+            .map(|it| *it)
+        {
+            Some(Error::Http(answer)) => assert_eq!(answer.status(), status, "{header}: {value}"),
+            other => panic!("{header}: {value}: {other:?}"),
+        }
+    }
+    assert_eq!(health(&scene).await["strangers"], 4);
+}
+
+#[tokio::test]
+async fn every_file_of_the_page_comes_with_what_keeps_the_browser_in_bounds() {
+    let scene = Scene::new().await;
+    let answer = get(&scene, "/", "Host: localhost\r\n").await;
+    let head = answer.split("\r\n\r\n").next().unwrap().to_lowercase();
+    assert!(head.starts_with("http/1.1 200"), "{head}");
+    for header in [
+        "content-security-policy: default-src 'none'",
+        "x-content-type-options: nosniff",
+        "referrer-policy: no-referrer",
+        "content-type: text/html; charset=utf-8",
+    ] {
+        assert!(head.contains(header), "{header} is not in {head}");
+    }
+    let answer = get(&scene, "/../../etc/passwd", "Host: localhost\r\n").await;
+    assert!(answer.starts_with("HTTP/1.1 404"), "{answer}");
+}

@@ -1,0 +1,17 @@
+//! The operator's station over real sockets on the loopback interface: pages that control, drive
+//! and stop a vehicle, two of them at once, and hostile ones.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test with sockets"
+)]
+
+mod scene;
+
+mod drive;
+mod hostile;
+mod looking;
+mod missing;

@@ -1,0 +1,361 @@
+//! A vehicle, the operator's station, and pages.
+
+use std::future::Future;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, UNIX_EPOCH};
+
+use futures_util::{SinkExt, StreamExt};
+use jaus::component::{AccessControl, Builder, Component, Handlers, Kind, Management, TimeOfDay};
+use jaus::link::Group;
+use jaus::messages::mobility::report_local_pose::TimeStamp;
+use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
+use jaus::node::{Config, Node};
+use jaus::parts::{Part, Seat};
+use jaus::service::mobility::Vehicle;
+use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+use jaus_ocu::{Listen, Station};
+use jaus_test_kit::group::own_group;
+use serde_json::{Value, json};
+use tokio::net::TcpStream;
+use tokio::task::JoinHandle;
+use tokio_tungstenite::tungstenite::client::IntoClientRequest;
+use tokio_tungstenite::tungstenite::{Error, Message};
+use tokio_tungstenite::{MaybeTlsStream, WebSocketStream, connect_async};
+
+/// Longer than anything takes; reached only when a test fails.
+const LIMIT: Duration = Duration::from_secs(30);
+
+pub(crate) async fn within_limit<T>(future: impl Future<Output = T>) -> T {
+    tokio::time::timeout(LIMIT, future)
+        .await
+        .expect("it takes too long")
+}
+
+/// A vehicle that is one component, and a station that looks at it.
+pub(crate) struct Scene {
+    pub(crate) vehicle: Vehicle,
+    rover: Option<Component>,
+    pub(crate) address: SocketAddr,
+    group: Group,
+    timeout: u8,
+    frozen: Option<Arc<AtomicBool>>,
+    station: JoinHandle<()>,
+    nodes: Vec<Node>,
+}
+
+impl Scene {
+    pub(crate) async fn new() -> Self {
+        Self::with(Station::default(), 0).await
+    }
+
+    /// With a pose sensor that repeats its last sample while the switch is on.
+    pub(crate) async fn with_frozen_pose(switch: Arc<AtomicBool>) -> Self {
+        Self::start(Station::default(), 0, Some(switch)).await
+    }
+
+    /// With a vehicle whose control has to be renewed after so many seconds; 0 for never.
+    pub(crate) async fn with(station: Station, timeout: u8) -> Self {
+        Self::start(station, timeout, None).await
+    }
+
+    async fn start(station: Station, timeout: u8, frozen: Option<Arc<AtomicBool>>) -> Self {
+        let group = own_group();
+        let node = Node::start(Config::loopback(101, 1).group(group)).unwrap();
+        let platform = SkidSteer::new(SkidSteerConfig::default());
+        let vehicle = Vehicle::new(Pilot::new(platform, Frame::at(52.5, 13.4)))
+            .with_clock(TimeOfDay::new(|| UNIX_EPOCH.elapsed().unwrap()));
+        let rover = rover(&vehicle, &node, timeout, frozen.as_ref());
+        let station = Station {
+            listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
+            ..station
+        };
+        let (address, station, desk) = start(station, 42, group).await;
+        Self {
+            vehicle,
+            rover: Some(rover),
+            address,
+            group,
+            timeout,
+            frozen,
+            station,
+            nodes: vec![node, desk],
+        }
+    }
+
+    /// Another operator's station in the same network: its address, and what keeps it alive.
+    pub(crate) async fn another_station(&self) -> (SocketAddr, JoinHandle<()>, Node) {
+        let station = Station {
+            listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
+            ..Station::default()
+        };
+        start(station, 43, self.group).await
+    }
+
+    pub(crate) async fn page(&self) -> Page {
+        Page::open(self.address).await
+    }
+
+    /// A page of an operator who has the vehicle under control, and ready.
+    pub(crate) async fn driver(&self) -> Page {
+        let mut page = self.page().await;
+        page.until(|state| !state["vehicle"]["pose"].is_null())
+            .await;
+        page.ask(json!({"type": "control", "on": true}))
+            .await
+            .unwrap();
+        page.ask(json!({"type": "resume"})).await.unwrap();
+        page
+    }
+
+    /// The vehicle's component ends, and another one begins that knows nothing of the first.
+    pub(crate) async fn restart_rover(&mut self) {
+        self.end_rover();
+        self.start_rover().await;
+    }
+
+    pub(crate) fn end_rover(&mut self) {
+        drop(self.rover.take());
+    }
+
+    pub(crate) async fn start_rover(&mut self) {
+        let restarted = async {
+            // Its number is free once it has taken leave.
+            while self.nodes[0]
+                .components()
+                .iter()
+                .any(|it| it.id.component() == 1)
+            {
+                tokio::time::sleep(Duration::from_millis(10)).await;
+            }
+        };
+        within_limit(restarted).await;
+        let frozen = self.frozen.as_ref();
+        self.rover = Some(rover(&self.vehicle, &self.nodes[0], self.timeout, frozen));
+    }
+
+    pub(crate) fn is_controlled(&self) -> bool {
+        let standing = self.rover.as_ref().map(Component::standing);
+        standing.is_some_and(|it| it.controller.is_some())
+    }
+
+    /// A place for another part of the vehicle.
+    pub(crate) fn seat(&self, component: u8) -> Seat {
+        let node = &self.nodes[0];
+        Seat {
+            port: node.attach(component).unwrap(),
+            node: Some(node.clone()),
+            kind: Kind::Vehicle,
+            name: "Rover".to_owned(),
+        }
+    }
+
+    /// Another part of the vehicle that is made of services.
+    pub(crate) fn attach(&self, component: u8, builder: Builder) -> Component {
+        builder.attach(&self.nodes[0], component).unwrap()
+    }
+
+    pub(crate) fn speed(&self) -> f64 {
+        self.vehicle.motion().velocity.x
+    }
+
+    /// Waits until the vehicle is as wanted.
+    pub(crate) async fn until(&self, wanted: impl Fn(&Self) -> bool) {
+        within_limit(async {
+            while !wanted(self) {
+                tokio::time::sleep(Duration::from_millis(10)).await;
+            }
+        })
+        .await;
+    }
+}
+
+impl Drop for Scene {
+    fn drop(&mut self) {
+        self.station.abort();
+    }
+}
+
+/// A component with what it takes to be driven.
+fn rover(
+    vehicle: &Vehicle,
+    node: &Node,
+    timeout: u8,
+    frozen: Option<&Arc<AtomicBool>>,
+) -> Component {
+    let control = AccessControl::new().timeout(timeout);
+    let rover = Component::builder(Kind::Vehicle, "Rover")
+        .management(Management::new().access_control(control))
+        .offer(vehicle.velocity_state_sensor())
+        .offer(vehicle.primitive_driver());
+    let rover = match frozen {
+        Some(switch) => rover.offer(pose_that_freezes(Arc::clone(switch))),
+        None => rover.offer(vehicle.local_pose_sensor()),
+    };
+    rover.attach(node, 1).unwrap()
+}
+
+/// A pose sensor whose samples advance unless the switch is on.
+fn pose_that_freezes(switch: Arc<AtomicBool>) -> Handlers {
+    let start = Instant::now();
+    let mut sampled = Duration::ZERO;
+    Handlers::new(local_pose_sensor::LATEST).answer(move |_: QueryLocalPose| {
+        if !switch.load(Ordering::Relaxed) {
+            sampled = start.elapsed();
+        }
+        let seconds = u8::try_from(sampled.as_secs()).unwrap();
+        let stamp = TimeStamp::default().with_seconds(seconds).unwrap();
+        let milliseconds = u16::try_from(sampled.subsec_millis()).unwrap();
+        let mut report = ReportLocalPose {
+            time_stamp: stamp.with_milliseconds(milliseconds).ok(),
+            ..ReportLocalPose::default()
+        };
+        report.set_x_m(3.0).unwrap();
+        report.set_y_m(4.0).unwrap();
+        report
+    })
+}
+
+async fn start(
+    station: Station,
+    subsystem: u16,
+    group: Group,
+) -> (SocketAddr, JoinHandle<()>, Node) {
+    let node = Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
+    let open = station.open().await.unwrap();
+    let address = open.address();
+    let seat = Seat {
+        port: node.attach(1).unwrap(),
+        node: Some(node.clone()),
+        kind: Kind::OperatorControlUnit,
+        name: "Operator".to_owned(),
+    };
+    let running = tokio::spawn(async move {
+        let Err(error) = open.run(seat).await;
+        panic!("the station has ended: {error}");
+    });
+    (address, running, node)
+}
+
+pub(crate) type Socket = WebSocketStream<MaybeTlsStream<TcpStream>>;
+
+/// What a browser does.
+pub(crate) struct Page {
+    pub(crate) socket: Socket,
+    pub(crate) hello: Value,
+    last_id: u64,
+}
+
+impl Page {
+    pub(crate) async fn open(address: SocketAddr) -> Self {
+        Self::try_open(address, &[]).await.unwrap()
+    }
+
+    pub(crate) async fn try_open(
+        address: SocketAddr,
+        headers: &[(&'static str, &str)],
+    ) -> Result<Self, Box<Error>> {
+        let mut request = format!("ws://{address}/ws").into_client_request().unwrap();
+        for (name, value) in headers {
+            request.headers_mut().insert(*name, value.parse().unwrap());
+        }
+        let (socket, _) = within_limit(connect_async(request)).await?;
+        let mut page = Self {
+            socket,
+            hello: Value::Null,
+            last_id: 0,
+        };
+        page.hello = page.next().await;
+        assert_eq!(page.hello["type"], "hello");
+        Ok(page)
+    }
+
+    /// What the station says next.
+    pub(crate) async fn next(&mut self) -> Value {
+        loop {
+            match within_limit(self.socket.next())
+                .await
+                .expect("closed")
+                .unwrap()
+            {
+                Message::Text(text) => return serde_json::from_str(&text).unwrap(),
+                Message::Ping(_) => {}
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    /// The next state.
+    pub(crate) async fn state(&mut self) -> Value {
+        self.said("state").await
+    }
+
+    /// The next frame of a type.
+    pub(crate) async fn said(&mut self, wanted: &str) -> Value {
+        loop {
+            let said = self.next().await;
+            if said["type"] == wanted {
+                return said;
+            }
+        }
+    }
+
+    /// The first state from now on that is as wanted.
+    pub(crate) async fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        let mut last = Value::Null;
+        let found = tokio::time::timeout(LIMIT, async {
+            loop {
+                last = self.state().await;
+                if wanted(&last) {
+                    return last.clone();
+                }
+            }
+        });
+        match found.await {
+            Ok(state) => state,
+            Err(_) => panic!("it never came to that: {last:#}"),
+        }
+    }
+
+    /// Says something and forgets it.
+    pub(crate) async fn say(&mut self, wish: &Value) {
+        let said = self.socket.send(Message::text(wish.to_string()));
+        within_limit(said).await.unwrap();
+    }
+
+    /// Wishes something, and waits for what becomes of it.
+    pub(crate) async fn ask(&mut self, mut wish: Value) -> Result<(), String> {
+        self.last_id += 1;
+        wish["id"] = self.last_id.into();
+        self.say(&wish).await;
+        loop {
+            let said = self.next().await;
+            if said["id"] == self.last_id {
+                return match said["type"].as_str() {
+                    Some("done") => Ok(()),
+                    _ => Err(said["reason"].as_str().unwrap().to_owned()),
+                };
+            }
+        }
+    }
+
+    /// Drives until the vehicle is as wanted, as a page does: a word every 100 ms.
+    pub(crate) async fn drive_until(&mut self, scene: &Scene, wanted: impl Fn(&Scene) -> bool) {
+        within_limit(async {
+            while !wanted(scene) {
+                self.say(&json!({"type": "drive", "forward": 0.5, "turn": 0.0}))
+                    .await;
+                tokio::time::sleep(Duration::from_millis(100)).await;
+            }
+        })
+        .await;
+    }
+}
+
+/// The primitive driver, as a state tells of it.
+pub(crate) fn driver_of(state: &Value) -> &Value {
+    let parts = state["vehicle"]["parts"].as_array();
+    let driver = parts.and_then(|it| it.iter().find(|it| it["role"] == "primitive_driver"));
+    driver.unwrap_or(&Value::Null)
+}

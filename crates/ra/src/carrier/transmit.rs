@@ -1,0 +1,192 @@
+//! What is sent: to whom, in which framing, in how many parts.
+
+use std::net::SocketAddr;
+
+use bytes::Bytes;
+
+use super::pace::Pace;
+use super::{Carrier, Dialect, packet, parts};
+use crate::BadId;
+use crate::{Counter, Message, RaId};
+use jaus::wire::Acknowledgement;
+use jaus::wire::ra::{Fields, Header};
+
+/// Where a datagram is to be sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum To {
+    /// The multicast group, which is 224.1.0.1 by default.
+    Group,
+    /// One host.
+    Address(SocketAddr),
+}
+
+/// A datagram to be sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Transmit {
+    /// Where to.
+    pub to: To,
+    /// Its octets.
+    pub datagram: Bytes,
+}
+
+/// Why a message was not sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SendError {
+    /// Its source is no component that is announced.
+    #[error("the source {0} is not announced: announce its subsystem with it first")]
+    NotOurs(RaId),
+    /// Its source or destination is none.
+    #[error("{0}")]
+    BadId(#[from] BadId),
+    /// Nothing was heard of the destination's subsystem, so that its address is not known.
+    #[error("subsystem {0} was not heard, so its address is not known: wait until it appears")]
+    Unknown(u8),
+    /// The data is above [`Settings::max_message`](super::Settings::max_message).
+    #[error(
+        "{length} octets of data are above the limit of {limit}: send less, or raise the limit"
+    )]
+    TooLong {
+        /// Octets of its data.
+        length: usize,
+        /// Octets that are allowed.
+        limit: usize,
+    },
+    /// The priority is none.
+    #[error("{0} is no priority: use 0 to 15")]
+    Priority(u8),
+    /// Too many datagrams wait to be sent.
+    #[error("too many datagrams wait to be sent: poll them, or send less")]
+    QueueFull,
+}
+
+impl Carrier {
+    /// Sends a message of a component that is here. A large one is numbered part by part from 0,
+    /// which OpenJAUS insists on, and its first parts are sent at once, the others when
+    /// [`settle`](Carrier::settle) has said what time it is. Another message keeps its number.
+    ///
+    /// # Errors
+    /// See [`SendError`]; nothing is sent then.
+    pub fn send(&mut self, message: &Message) -> Result<(), SendError> {
+        message.source.require_one()?;
+        if !self.components.contains(&message.source) {
+            return Err(SendError::NotOurs(message.source));
+        }
+        message.destination.recipients()?;
+        if message.priority > 15 {
+            return Err(SendError::Priority(message.priority));
+        }
+        let (length, limit) = (message.data.len(), self.settings.max_message);
+        if length > limit {
+            return Err(SendError::TooLong { length, limit });
+        }
+        let ways = self.ways(message.source.subsystem, message.destination.subsystem)?;
+        let packets = length.div_ceil(jaus::wire::ra::MAX_DATA).max(1) * ways.len();
+        if self.transmits.len() + self.pace.len() + packets > self.settings.queue_limit {
+            self.counters.add(Counter::TransmitQueueFull);
+            return Err(SendError::QueueFull);
+        }
+        for (to, dialect) in ways {
+            for (place, number, data) in parts::cut(&message.data) {
+                let header = header(message, place, number, data.len());
+                let datagram = packet::datagram(dialect, &header, data);
+                match place {
+                    parts::Place::Single => self.push(to, datagram)?,
+                    // In their order, so behind those that wait already.
+                    _ if self.pace.len() > 0 || usize::from(number) >= Pace::BURST => {
+                        self.pace.push(Transmit { to, datagram });
+                    }
+                    _ => self.push(to, datagram)?,
+                }
+            }
+        }
+        self.counters.add(Counter::MessagesSent);
+        Ok(())
+    }
+
+    /// Where what is for a subsystem goes, and how.
+    fn ways(&mut self, from: u8, to: u8) -> Result<Vec<(To, Dialect)>, SendError> {
+        if to == RaId::ALL {
+            let sent = self.group_sent.entry(from).or_default();
+            let turn = *sent;
+            *sent = sent.wrapping_add(1);
+            let group = self.group_dialects(turn);
+            let group = group.map(|dialect| (To::Group, dialect));
+            return Ok(group.chain(self.to_peers(turn)).collect());
+        }
+        let known = self.addresses.of(to);
+        let (address, dialect) = known.ok_or(SendError::Unknown(to))?;
+        Ok(vec![(To::Address(address), dialect)])
+    }
+
+    /// The framings of what a subsystem sends to everybody: those that are spoken, and those that are
+    /// configured. OpenJAUS reports each datagram of a framing that is not its own as an error; so
+    /// where others are spoken, one that nobody speaks is used each tenth time only. Who does speak
+    /// it is heard by then.
+    fn group_dialects(&self, turn: u32) -> impl Iterator<Item = Dialect> + '_ {
+        const RARELY: u32 = 10;
+        let is_turn = turn.is_multiple_of(RARELY);
+        let all = [Dialect::Opc, Dialect::As5669].into_iter();
+        let is_quiet = !all.clone().any(|dialect| self.addresses.speaks(dialect));
+        all.filter(move |&dialect| {
+            let configured = self.settings.group_dialects.contains(&dialect);
+            self.addresses.speaks(dialect) || (configured && (is_quiet || is_turn))
+        })
+    }
+
+    /// The same for the hosts that multicast does not reach: each in its own framing; who was not
+    /// heard yet waits for the first word, and gets it in one of those that it may understand.
+    fn to_peers(&self, turn: u32) -> impl Iterator<Item = (To, Dialect)> + '_ {
+        let configured = self.settings.group_dialects.as_slice();
+        let candidates = match configured {
+            [] => &[Dialect::Opc, Dialect::As5669],
+            some => some,
+        };
+        let next = candidates[turn as usize % candidates.len()];
+        self.settings.peers.iter().map(move |&host| {
+            let to = SocketAddr::new(host, self.settings.port);
+            let dialect = self.addresses.dialect_at(host).unwrap_or(next);
+            (To::Address(to), dialect)
+        })
+    }
+
+    /// Puts a datagram behind those that wait.
+    pub(super) fn push(&mut self, to: To, datagram: Bytes) -> Result<(), SendError> {
+        if self.transmits.len() >= self.settings.queue_limit {
+            self.counters.add(Counter::TransmitQueueFull);
+            return Err(SendError::QueueFull);
+        }
+        self.transmits.push_back(Transmit { to, datagram });
+        Ok(())
+    }
+
+    /// The next datagram to be sent.
+    pub fn poll_transmit(&mut self) -> Option<Transmit> {
+        let transmit = self.transmits.pop_front()?;
+        self.counters.add(Counter::DatagramsSent);
+        Some(transmit)
+    }
+}
+
+/// The header of a part of a message.
+fn header(message: &Message, place: parts::Place, number: u16, data_size: usize) -> Header {
+    let sequence = match place {
+        parts::Place::Single => message.sequence,
+        _ => number,
+    };
+    Header::new(&Fields {
+        priority: message.priority,
+        acknowledgement: if message.acknowledge {
+            Acknowledgement::Request
+        } else {
+            Acknowledgement::None
+        },
+        service_connection: message.connection,
+        experimental: message.experimental,
+        code: message.code,
+        destination: message.destination,
+        source: message.source,
+        data_flag: place.flag(),
+        data_size,
+        sequence,
+    })
+}

@@ -1,0 +1,258 @@
+//! Connections of others to reports of ours.
+
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::{ConnectionId, Connections, Event, Request, ResponseCode, period};
+use crate::{Counter, Message};
+use jaus::codec::DecodeError;
+use jaus::messages::ra33::confirm_service_connection::ConfirmedPeriodicUpdateRate;
+use jaus::messages::ra33::{
+    ActivateServiceConnection, ConfirmServiceConnection, CreateServiceConnection,
+    SuspendServiceConnection, TerminateServiceConnection,
+};
+
+/// A connection of somebody to a report of ours.
+#[derive(Debug)]
+pub(super) struct Provided {
+    pub(super) request: Request,
+    pub(super) instance: u8,
+    priority: u8,
+    /// The time between two reports, once it is accepted.
+    period: Option<Duration>,
+    active: bool,
+    report: Option<Bytes>,
+    sequence: u16,
+    next: Instant,
+}
+
+impl Provided {
+    /// When a report is to be sent.
+    pub(super) fn due(&self) -> Option<Instant> {
+        let sends = self.active && self.report.is_some() && self.period.is_some();
+        sends.then_some(self.next)
+    }
+
+    /// The report that is due, if it is.
+    fn take_report(&mut self, now: Instant) -> Option<Message> {
+        if self.due()? > now {
+            return None;
+        }
+        let period = self.period?;
+        // On the beat, unless it was missed altogether.
+        self.next = (self.next + period).max(now + period / 2);
+        let sequence = self.sequence;
+        self.sequence = self.sequence.wrapping_add(1);
+        Some(Message {
+            connection: true,
+            priority: self.priority,
+            sequence,
+            ..Message::new(
+                self.request.provider,
+                self.request.client,
+                self.request.code,
+                self.report.clone()?,
+            )
+        })
+    }
+}
+
+impl Connections {
+    /// Somebody wants a report. For the same fields it is the same connection as before, perhaps at
+    /// another rate; other fields make another one, with the lowest instance that is free, as in
+    /// OpenJAUS.
+    pub(super) fn handle_create(
+        &mut self,
+        now: Instant,
+        message: &Message,
+    ) -> Result<(), DecodeError> {
+        let body: CreateServiceConnection = message.body()?;
+        let request = Request {
+            provider: message.destination,
+            client: message.source,
+            code: body.command_code,
+            presence: body.presence_vector,
+            rate: body.requested_periodic_update_rate.value(),
+        };
+        if request.provider.require_one().is_err() {
+            self.counters.add(Counter::InvalidDestination);
+            return Ok(());
+        }
+        if request.rate <= 0.0 {
+            self.confirm(&request, 0, 0.0, ResponseCode::INVALID_PARAMETER);
+            return Ok(());
+        }
+        let known = self.provided.iter_mut().find(|(_, known)| {
+            let known = Request {
+                rate: request.rate,
+                ..known.request
+            };
+            known == request
+        });
+        if let Some((&id, known)) = known {
+            known.active = true;
+            let confirmed = known.period.filter(|_| known.request.rate == request.rate);
+            known.request = request;
+            match confirmed {
+                Some(period) => {
+                    let (instance, rate) = (known.instance, period.as_secs_f64().recip());
+                    self.confirm(&request, instance, rate, ResponseCode::SUCCESSFUL);
+                }
+                None => self.tell(Event::Wanted(id, request)),
+            }
+            return Ok(());
+        }
+        let Some(instance) = self.free_instance(&request) else {
+            self.confirm(&request, 0, 0.0, ResponseCode::CONNECTION_REFUSED);
+            return Ok(());
+        };
+        let id = self.next_id();
+        let provided = Provided {
+            request,
+            instance,
+            priority: message.priority,
+            period: None,
+            active: true,
+            report: None,
+            sequence: 0,
+            next: now,
+        };
+        self.provided.insert(id, provided);
+        self.tell(Event::Wanted(id, request));
+        Ok(())
+    }
+
+    fn free_instance(&self, request: &Request) -> Option<u8> {
+        if self.provided.len() >= self.settings.max_provided {
+            return None;
+        }
+        let same = |known: &Request| {
+            (known.provider, known.client, known.code)
+                == (request.provider, request.client, request.code)
+        };
+        let taken = self.provided.values().filter(|known| same(&known.request));
+        let taken: Vec<_> = taken.map(|known| known.instance).collect();
+        (0..=u8::MAX).find(|instance| !taken.contains(instance))
+    }
+
+    /// Confirms what was wanted, at the rate that was wanted or the highest that there is.
+    /// Gives the rate, in hertz; `None` if it is not wanted any more.
+    pub fn accept(&mut self, now: Instant, id: ConnectionId) -> Option<f64> {
+        let max_rate = self.settings.max_rate;
+        let provided = self.provided.get_mut(&id)?;
+        let request = provided.request;
+        let rate = request.rate.min(max_rate);
+        provided.period = Some(period(rate));
+        provided.next = now;
+        let instance = provided.instance;
+        self.confirm(&request, instance, rate, ResponseCode::SUCCESSFUL);
+        self.report_due(now);
+        Some(rate)
+    }
+
+    /// Refuses what was wanted, and forgets it.
+    pub fn refuse(&mut self, id: ConnectionId, why: ResponseCode) {
+        if let Some(provided) = self.provided.remove(&id) {
+            self.confirm(&provided.request, 0, 0.0, why);
+        }
+    }
+
+    fn confirm(&mut self, request: &Request, instance: u8, rate: f64, response: ResponseCode) {
+        if response != ResponseCode::SUCCESSFUL {
+            self.counters.add(Counter::ConnectionRefused);
+        }
+        let rate = rate.clamp(0.0, Self::MAX_RATE);
+        let rate = ConfirmedPeriodicUpdateRate::new(rate).unwrap_or_default();
+        let body = ConfirmServiceConnection {
+            command_code: request.code,
+            instance_id: instance,
+            confirmed_periodic_update_rate: rate,
+            response_code: response,
+        };
+        self.transmit(Message::with_body(request.provider, request.client, &body));
+    }
+
+    /// Says what the report is now: its data with the fields of [`Request::presence`]. It is sent
+    /// at once, if the last was sent long enough ago, and then again and again until it is
+    /// replaced.
+    pub fn set_report(&mut self, now: Instant, id: ConnectionId, data: Bytes) {
+        let Some(provided) = self.provided.get_mut(&id) else {
+            return;
+        };
+        if provided.report.is_none() {
+            provided.next = provided.next.max(now);
+        }
+        provided.report = Some(data);
+        self.report_due(now);
+    }
+
+    /// Says that the report is not known any more: nothing is sent until it is.
+    pub fn clear_report(&mut self, id: ConnectionId) {
+        if let Some(provided) = self.provided.get_mut(&id) {
+            provided.report = None;
+        }
+    }
+
+    /// Sends the reports that are due.
+    pub(super) fn report_due(&mut self, now: Instant) {
+        let provided = self.provided.values_mut();
+        let due: Vec<_> = provided
+            .filter_map(|known| known.take_report(now))
+            .collect();
+        for report in due {
+            self.transmit(Ok(report));
+        }
+    }
+
+    fn meant(&mut self, message: &Message, code: u16, instance: u8) -> Option<ConnectionId> {
+        let is_it = |known: &Provided| {
+            let request = &known.request;
+            (
+                request.provider,
+                request.client,
+                request.code,
+                known.instance,
+            ) == (message.destination, message.source, code, instance)
+        };
+        let known = self.provided.iter().find(|(_, known)| is_it(known));
+        known.map(|(&id, _)| id)
+    }
+
+    pub(super) fn handle_activate(
+        &mut self,
+        now: Instant,
+        message: &Message,
+    ) -> Result<(), DecodeError> {
+        let body: ActivateServiceConnection = message.body()?;
+        let id = self.meant(message, body.command_code, body.instance_id);
+        if let Some(known) = id.and_then(|id| self.provided.get_mut(&id)) {
+            known.active = true;
+            known.next = known.next.max(now);
+            self.report_due(now);
+        }
+        Ok(())
+    }
+
+    pub(super) fn handle_suspend(&mut self, message: &Message) -> Result<(), DecodeError> {
+        let body: SuspendServiceConnection = message.body()?;
+        let id = self.meant(message, body.command_code, body.instance_id);
+        if let Some(known) = id.and_then(|id| self.provided.get_mut(&id)) {
+            known.active = false;
+        }
+        Ok(())
+    }
+
+    /// Either side may end a connection.
+    pub(super) fn handle_terminate(&mut self, message: &Message) -> Result<(), DecodeError> {
+        let body: TerminateServiceConnection = message.body()?;
+        let provided = self.meant(message, body.command_code, body.instance_id);
+        let wanted = self.by_report(message.source, message.destination, body.command_code);
+        for id in provided.into_iter().chain(wanted) {
+            self.provided.remove(&id);
+            self.wanted.remove(&id);
+            self.tell(Event::Ended(id));
+        }
+        Ok(())
+    }
+}

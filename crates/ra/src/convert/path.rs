@@ -1,0 +1,225 @@
+//! Path segments: 040Fh 0410h, 240Eh to 2410h, 440Eh to 4410h, and the speed to drive along them.
+//!
+//! Both sides draw the same curve, towards a control point P1 to an end P2 with a weight. A path
+//! segment driver of the Reference Architecture is sent its segments by number and sets out when it
+//! is given a speed of travel. Ours has a list: a segment comes as an element that follows the one
+//! before it, and the list is executed at a speed. So the segment with the number n is the element
+//! n + 1, which follows the element n, and for these drivers Set Travel Speed is Execute List: from
+//! the first element on at a speed above zero, whether or not the vehicle is under way, and without
+//! an element, which only changes the speed, at zero. Our list takes no second first element: another
+//! path is set after a Reset. (Who knows what was set before says it otherwise: the gateway keeps the
+//! list, and has [`Places`](super::Places) convert its places alone.)
+//!
+//! The segment that ours reports is the one that is driven along; it is asked for and reported under
+//! the number 0. A limit of the path is refused in a command and left out in a report.
+
+use bytes::{Bytes, BytesMut};
+
+use super::carry::{Carry, Counterpart, same_fields};
+use super::pair::Pair;
+use super::waypoints::{ONLY, only, unlimited};
+use super::{Context, Refusal};
+use crate::ids::RaComponent;
+use jaus::codec::{FormattedBlob, Message};
+use jaus::messages::core::set_element::{ElementDataFormat, ElementRec};
+use jaus::messages::{core, mobility, ra33};
+
+const GLOBAL: &[RaComponent] = &[RaComponent::GLOBAL_PATH_SEGMENT_DRIVER];
+const LOCAL: &[RaComponent] = &[RaComponent::LOCAL_PATH_SEGMENT_DRIVER];
+const BOTH: &[RaComponent] = &[
+    RaComponent::GLOBAL_PATH_SEGMENT_DRIVER,
+    RaComponent::LOCAL_PATH_SEGMENT_DRIVER,
+];
+const WAYPOINTS: &[RaComponent] = &[
+    RaComponent::GLOBAL_WAYPOINT_DRIVER,
+    RaComponent::LOCAL_WAYPOINT_DRIVER,
+];
+
+pub(super) const PAIRS: &[Pair] = &[
+    Pair::of::<ra33::SetTravelSpeed, mobility::ExecuteList>().for_parts(BOTH),
+    Pair::of::<ra33::SetGlobalPathSegment, core::SetElement>().for_parts(GLOBAL),
+    Pair::of::<ra33::SetLocalPathSegment, core::SetElement>().for_parts(LOCAL),
+    Pair::of::<ra33::QueryGlobalPathSegment, mobility::QueryGlobalPathSegment>(),
+    Pair::of::<ra33::QueryLocalPathSegment, mobility::QueryLocalPathSegment>(),
+    Pair::of::<ra33::ReportGlobalPathSegment, mobility::ReportGlobalPathSegment>(),
+    Pair::of::<ra33::ReportLocalPathSegment, mobility::ReportLocalPathSegment>(),
+    Pair::of::<ra33::QueryPathSegmentCount, core::QueryElementCount>().for_parts(BOTH),
+    Pair::of::<ra33::ReportPathSegmentCount, core::ReportElementCount>().for_parts(BOTH),
+    Pair::of::<ra33::QueryWaypointCount, core::QueryElementCount>().for_parts(WAYPOINTS),
+    Pair::of::<ra33::ReportWaypointCount, core::ReportElementCount>().for_parts(WAYPOINTS),
+];
+
+same_fields! {
+    ra33::QueryPathSegmentCount, core::QueryElementCount {}
+    ra33::QueryWaypointCount, core::QueryElementCount {}
+    ra33::ReportPathSegmentCount, core::ReportElementCount {; path_segment_count = element_count }
+    ra33::ReportWaypointCount, core::ReportElementCount {; waypoint_count = element_count }
+}
+
+impl Counterpart<mobility::ExecuteList> for ra33::SetTravelSpeed {
+    fn counterpart(self, _: Context<'_>) -> Result<mobility::ExecuteList, Refusal> {
+        let sets_out = self.speed_m_per_s() > 0.0;
+        Ok(mobility::ExecuteList {
+            speed: self.speed.carry()?,
+            element_uid: sets_out.then_some(FROM_THE_FIRST),
+        })
+    }
+}
+
+impl Counterpart<ra33::SetTravelSpeed> for mobility::ExecuteList {
+    fn counterpart(self, _: Context<'_>) -> Result<ra33::SetTravelSpeed, Refusal> {
+        match self.element_uid {
+            None | Some(FROM_THE_FIRST) => {}
+            Some(_) => {
+                return Err(Refusal::Inexpressible {
+                    field: "ElementUID",
+                });
+            }
+        }
+        Ok(ra33::SetTravelSpeed {
+            speed: self.speed.carry()?,
+        })
+    }
+}
+
+/// The element that stands for the first one in Execute List.
+const FROM_THE_FIRST: u16 = 0;
+
+/// The neighbour that an element at an end of the list has.
+const NONE: u16 = 0;
+
+/// A segment as our list holds it: the message that would set it.
+fn element(number: u16, code: u16, report: &Bytes) -> Result<core::SetElement, Refusal> {
+    let uid = number.checked_add(1).ok_or(Refusal::UnknownValue {
+        field: "PathSegmentNumber",
+        value: number.into(),
+    })?;
+    Ok(core::SetElement {
+        element_list: vec![ElementRec {
+            element_uid: uid,
+            previous_uid: number,
+            next_uid: NONE,
+            element_data: FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, recode(report, code)),
+        }],
+        ..core::SetElement::default()
+    })
+}
+
+/// The number and the report in the only element, which must follow the one before it.
+fn segment<Report: Message>(set: &core::SetElement, code: u16) -> Result<(u16, Report), Refusal> {
+    let inexpressible = |field| Err(Refusal::Inexpressible { field });
+    let [element] = set.element_list.as_slice() else {
+        return inexpressible("ElementList");
+    };
+    if element.next_uid != NONE {
+        return inexpressible("NextUID");
+    }
+    if element.element_uid == NONE || element.previous_uid != element.element_uid - 1 {
+        return inexpressible("PreviousUID");
+    }
+    let data = &element.element_data;
+    let is_segment = data.format == ElementDataFormat::JAUS_MESSAGE
+        && data.data.starts_with(&code.to_le_bytes());
+    if !is_segment {
+        return inexpressible("ElementData");
+    }
+    let report = Report::decode(&recode(&data.data, Report::CODE))?;
+    Ok((element.previous_uid, report))
+}
+
+/// The same octets with another code: setting and reporting a segment are laid out alike, and only
+/// the report has a definition.
+fn recode(message: &Bytes, code: u16) -> Bytes {
+    let mut recoded = BytesMut::from(message.as_ref());
+    if let Some(place) = recoded.first_chunk_mut() {
+        *place = code.to_le_bytes();
+    }
+    recoded.freeze()
+}
+
+/// Segments: how they are set and reported.
+macro_rules! segments {
+    ($(
+        $set:path, $query:path, $report:path = $our_query:path, $our_report:path, $code:literal
+            { $($theirs:ident = $ours:ident),* }
+    )*) => {$(
+        impl Counterpart<$our_report> for $report {
+            fn counterpart(self, _: Context<'_>) -> Result<$our_report, Refusal> {
+                type There = $our_report;
+                Ok(There {
+                    $($ours: self.$theirs.carry()?,)*
+                    path_tolerance: None,
+                })
+            }
+        }
+
+        impl Counterpart<$report> for $our_report {
+            fn counterpart(self, _: Context<'_>) -> Result<$report, Refusal> {
+                type There = $report;
+                Ok(There {
+                    path_segment_number: ONLY,
+                    $($theirs: self.$ours.carry()?,)*
+                })
+            }
+        }
+
+        impl Counterpart<core::SetElement> for $set {
+            fn counterpart(self, _: Context<'_>) -> Result<core::SetElement, Refusal> {
+                type Report = $our_report;
+                let report = Report {
+                    $($ours: self.$theirs.carry()?,)*
+                    path_tolerance: None,
+                };
+                element(self.path_segment_number, $code, &report.encode()?)
+            }
+        }
+
+        impl Counterpart<$set> for core::SetElement {
+            fn counterpart(self, _: Context<'_>) -> Result<$set, Refusal> {
+                type There = $set;
+                let (number, report) = segment::<$our_report>(&self, $code)?;
+                unlimited(report.path_tolerance_m())?;
+                Ok(There {
+                    path_segment_number: number,
+                    $($theirs: report.$ours.carry()?,)*
+                })
+            }
+        }
+
+        impl Counterpart<$our_query> for $query {
+            fn counterpart(self, _: Context<'_>) -> Result<$our_query, Refusal> {
+                type There = $our_query;
+                only(self.path_segment_number, "PathSegmentNumber")?;
+                let presence_vector = self.presence_vector & HEIGHTS;
+                Ok(There { presence_vector })
+            }
+        }
+
+        impl Counterpart<$query> for $our_query {
+            fn counterpart(self, _: Context<'_>) -> Result<$query, Refusal> {
+                type There = $query;
+                Ok(There {
+                    path_segment_number: ONLY,
+                    presence_vector: self.presence_vector & HEIGHTS,
+                })
+            }
+        }
+    )*};
+}
+
+/// The heights of P1 and P2, which both sides may leave out.
+const HEIGHTS: u8 = 0b11;
+
+segments! {
+    ra33::SetGlobalPathSegment, ra33::QueryGlobalPathSegment, ra33::ReportGlobalPathSegment
+        = mobility::QueryGlobalPathSegment, mobility::ReportGlobalPathSegment, 0x040F {
+        p1_latitude = p1_latitude, p1_longitude = p1_longitude, p1_altitude = p1_altitude,
+        p2_latitude = p2_latitude, p2_longitude = p2_longitude, p2_altitude = p2_altitude,
+        weighting_factor = weighting_factor
+    }
+    ra33::SetLocalPathSegment, ra33::QueryLocalPathSegment, ra33::ReportLocalPathSegment
+        = mobility::QueryLocalPathSegment, mobility::ReportLocalPathSegment, 0x0410 {
+        p1x = p1_x, p1y = p1_y, p1z = p1_z, p2x = p2_x, p2y = p2_y, p2z = p2_z,
+        weighting_factor = weighting_factor
+    }
+}

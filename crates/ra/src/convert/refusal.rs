@@ -1,0 +1,128 @@
+//! Why a message was not converted.
+
+use std::fmt;
+
+use jaus::codec::{DecodeError, EncodeError, OutOfRange};
+
+/// What could not be said in the words of the other side. A message is converted whole or refused;
+/// no value is bent to fit.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// The other side has no such message.
+    #[error("message {0:04X}h has no counterpart on the other side")]
+    NoCounterpart(u16),
+    /// A payload that is too short for a code.
+    #[error("the payload has no message code")]
+    NoCode,
+    /// The octets are not the message that the code promises.
+    #[error(transparent)]
+    Malformed(#[from] DecodeError),
+    /// A number that the field of the other side cannot hold.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// A field that is set and that the other side does not have, where leaving it out would change
+    /// what is meant.
+    #[error("{field} cannot be said on the other side")]
+    Inexpressible {
+        /// The field's name in the definition that it comes from.
+        field: &'static str,
+    },
+    /// A field that is not set and that the other side must have.
+    #[error("{field} is missing, which the other side must have")]
+    Missing {
+        /// The field's name in the definition that it would go to.
+        field: &'static str,
+    },
+    /// A value of an enumeration that the other side does not know.
+    #[error("{field} {value} has no counterpart on the other side")]
+    UnknownValue {
+        /// The field's name in the definition that it comes from.
+        field: &'static str,
+        /// The value.
+        value: u32,
+    },
+    /// An id of a component that is not seen on the other side.
+    #[error("{field} names a component that is not seen on the other side")]
+    UnknownId {
+        /// The field's name in the definition that it comes from.
+        field: &'static str,
+    },
+    /// More elements or octets than the message of the other side can hold.
+    #[error(transparent)]
+    TooLong(#[from] EncodeError),
+}
+
+/// The kinds of [`Refusal`], for counting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Reason {
+    /// [`Refusal::NoCounterpart`].
+    NoCounterpart,
+    /// [`Refusal::Malformed`], [`Refusal::NoCode`].
+    Malformed,
+    /// [`Refusal::OutOfRange`].
+    OutOfRange,
+    /// [`Refusal::Inexpressible`].
+    Inexpressible,
+    /// [`Refusal::Missing`].
+    Missing,
+    /// [`Refusal::UnknownValue`].
+    UnknownValue,
+    /// [`Refusal::UnknownId`].
+    UnknownId,
+    /// [`Refusal::TooLong`].
+    TooLong,
+}
+
+impl Reason {
+    /// All of them, in the order of their discriminants.
+    pub const ALL: [Self; 8] = [
+        Self::NoCounterpart,
+        Self::Malformed,
+        Self::OutOfRange,
+        Self::Inexpressible,
+        Self::Missing,
+        Self::UnknownValue,
+        Self::UnknownId,
+        Self::TooLong,
+    ];
+
+    /// The name in counters.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoCounterpart => "no counterpart",
+            Self::Malformed => "malformed",
+            Self::OutOfRange => "out of range",
+            Self::Inexpressible => "inexpressible",
+            Self::Missing => "missing field",
+            Self::UnknownValue => "unknown value",
+            Self::UnknownId => "unknown id",
+            Self::TooLong => "too long",
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl Refusal {
+    /// Its kind.
+    #[must_use]
+    pub const fn reason(&self) -> Reason {
+        match self {
+            Self::NoCounterpart(_) => Reason::NoCounterpart,
+            Self::NoCode | Self::Malformed(_) => Reason::Malformed,
+            Self::OutOfRange(_) => Reason::OutOfRange,
+            Self::Inexpressible { .. } => Reason::Inexpressible,
+            Self::Missing { .. } => Reason::Missing,
+            Self::UnknownValue { .. } => Reason::UnknownValue,
+            Self::UnknownId { .. } => Reason::UnknownId,
+            Self::TooLong(_) => Reason::TooLong,
+        }
+    }
+}

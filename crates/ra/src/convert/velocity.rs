@@ -1,0 +1,50 @@
+//! Set Velocity State, 0404h: ours is Set Velocity Command, 0415h, that sets the current command.
+//!
+//! Our other kinds of commands (limits, defaults) have no counterpart. The deviations and the time
+//! stamp, which the Reference Architecture shares with the report, say nothing about a command and
+//! are left out.
+
+use super::carry::{Carry, Counterpart};
+use super::pair::Pair;
+use super::{Context, Refusal};
+use jaus::messages::mobility::set_velocity_command::CommandType;
+use jaus::messages::{mobility, ra33};
+
+pub(super) const PAIRS: &[Pair] = &[Pair::of::<
+    ra33::SetVelocityState,
+    mobility::SetVelocityCommand,
+>()];
+
+impl Counterpart<mobility::SetVelocityCommand> for ra33::SetVelocityState {
+    fn counterpart(self, _: Context<'_>) -> Result<mobility::SetVelocityCommand, Refusal> {
+        Ok(mobility::SetVelocityCommand {
+            command_type: CommandType::SET_CURRENT_COMMAND,
+            velocity_x: self.velocity_x.carry()?,
+            velocity_y: self.velocity_y.carry()?,
+            velocity_z: self.velocity_z.carry()?,
+            roll_rate: self.roll_rate.carry()?,
+            pitch_rate: self.pitch_rate.carry()?,
+            yaw_rate: self.yaw_rate.carry()?,
+        })
+    }
+}
+
+impl Counterpart<ra33::SetVelocityState> for mobility::SetVelocityCommand {
+    fn counterpart(self, _: Context<'_>) -> Result<ra33::SetVelocityState, Refusal> {
+        if self.command_type != CommandType::SET_CURRENT_COMMAND {
+            return Err(Refusal::UnknownValue {
+                field: "CommandType",
+                value: self.command_type.0.into(),
+            });
+        }
+        Ok(ra33::SetVelocityState {
+            velocity_x: self.velocity_x.carry()?,
+            velocity_y: self.velocity_y.carry()?,
+            velocity_z: self.velocity_z.carry()?,
+            roll_rate: self.roll_rate.carry()?,
+            pitch_rate: self.pitch_rate.carry()?,
+            yaw_rate: self.yaw_rate.carry()?,
+            ..ra33::SetVelocityState::default()
+        })
+    }
+}

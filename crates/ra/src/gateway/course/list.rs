@@ -1,0 +1,452 @@
+//! The list that JAUS clients set for an RA driver.
+//!
+//! The list is kept here, and the driver gets it when it is executed: the elements from the one that it
+//! is executed from, with the numbers from 0 on, and then the speed. While it drives, elements may be
+//! put behind the last or be replaced, which it is told at once; whatever else would change their order
+//! is refused. As drivers forget no place, a list that is shorter than the one before ends with its
+//! last waypoint once more under each number that is left; of path segments, where that would be a
+//! way of its own, it is refused.
+
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use super::handover::{Do, Handover};
+use crate::convert::{Places, Refusal, speed_to_ra};
+use jaus::codec::Message;
+use jaus::messages::core::reject_element_request::ResponseCode;
+use jaus::messages::core::set_element::ElementRec;
+use jaus::messages::core::{
+    ConfirmElementRequest, DeleteElement, QueryElement, QueryElementCount, QueryElementList,
+    RejectElementRequest, ReportElement, ReportElementCount, ReportElementList, SetElement,
+    report_element_list,
+};
+use jaus::messages::mobility::{ExecuteList, QueryActiveElement, ReportActiveElement};
+use jaus::messages::ra33::SetTravelSpeed;
+use jaus::service::{ElementList, code_of};
+
+/// The list of an RA driver.
+#[derive(Debug)]
+pub(in crate::gateway) struct Course {
+    places: Places,
+    patience: Duration,
+    list: ElementList,
+    /// The elements that the driver was given, in the order of their numbers: those that are driven
+    /// along, or were before it was stopped.
+    given: Vec<ElementRec>,
+    /// How many numbers it holds.
+    held: usize,
+    /// Whether it drives along them.
+    under_way: bool,
+    handover: Handover,
+    /// The speed that follows when all has been given.
+    speed: Option<Bytes>,
+    /// The speed that it was given last.
+    told_speed: Option<Bytes>,
+    /// Whether it tells its speed, as far as is known.
+    pub(in crate::gateway) tells_speed: bool,
+    said: Said,
+}
+
+/// What is to be sent, told and counted.
+#[derive(Debug, Default)]
+pub(in crate::gateway) struct Said {
+    /// Answers to the client whose message was handled.
+    pub(in crate::gateway) answers: Vec<Bytes>,
+    /// Code and data of messages for the driver.
+    pub(in crate::gateway) to_ra: Vec<(u16, Bytes)>,
+    /// Whether the answers to queries are others now.
+    pub(in crate::gateway) changed: bool,
+    /// What was refused, by the code of the message.
+    pub(in crate::gateway) refused: Vec<(u16, Refused)>,
+}
+
+/// Why something about a list was not done.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub(in crate::gateway) enum Refused {
+    #[error(transparent)]
+    Conversion(#[from] Refusal),
+    #[error("no list, or no such element")]
+    NoSuchElement,
+    #[error("the order of places may not be changed while they are driven along: stop first")]
+    UnderWay,
+    #[error("the order of places has been changed: execute the list from an element")]
+    Reordered,
+    #[error(
+        "the driver holds {0} segments and forgets none, and the list is shorter: reset it first"
+    )]
+    Shorter(usize),
+    #[error("the list manager refuses: {0:?}")]
+    List(ResponseCode),
+    #[error("the place with the number {0} is not confirmed: the list is not executed")]
+    Unconfirmed(u16),
+    #[error("the driver tells no places: it gets them unconfirmed")]
+    Mute,
+    #[error(
+        "the driver keeps what it had under the number {0}: places are put behind those that it has"
+    )]
+    Keeps(u16),
+    #[error("the place with the number {0} is missing: the list is not executed")]
+    Missing(u16),
+    #[error("more places than are kept")]
+    TooMany,
+    #[error("no answer to the places that were set")]
+    Unanswered,
+}
+
+/// Stands for all elements.
+const ALL: u16 = u16::MAX;
+
+impl Course {
+    /// An empty list for drivers to such places.
+    pub(in crate::gateway) fn new(places: Places, patience: Duration) -> Self {
+        Self {
+            places,
+            patience,
+            list: ElementList::default(),
+            given: Vec::new(),
+            held: 0,
+            under_way: false,
+            handover: Handover::default(),
+            speed: None,
+            told_speed: None,
+            tells_speed: true,
+            said: Said::default(),
+        }
+    }
+
+    /// Whether a command with this code is about the list.
+    pub(in crate::gateway) const fn is_command(code: u16) -> bool {
+        matches!(
+            code,
+            SetElement::CODE | DeleteElement::CODE | ExecuteList::CODE
+        )
+    }
+
+    /// A command of the client in control.
+    pub(in crate::gateway) fn handle_command(&mut self, now: Instant, payload: &Bytes) {
+        let done = match code_of(payload) {
+            Some(SetElement::CODE) => self.handle_set(payload),
+            Some(DeleteElement::CODE) => self.handle_delete(payload),
+            Some(ExecuteList::CODE) => match ExecuteList::decode(payload) {
+                Ok(execute) => self.execute(&execute),
+                Err(error) => Err(Refusal::from(error).into()),
+            },
+            _ => Ok(()),
+        };
+        if let Err(why) = done {
+            let code = code_of(payload).unwrap_or_default();
+            self.said.refused.push((code, why));
+        }
+        self.pump(now);
+    }
+
+    /// What the list answers to a query, if it is about the list.
+    pub(in crate::gateway) fn answer(&self, payload: &Bytes) -> Option<Bytes> {
+        match code_of(payload)? {
+            QueryElement::CODE => {
+                let query = QueryElement::decode(payload).ok()?;
+                let element = self.list.get(query.element_uid)?.clone();
+                let report = ReportElement {
+                    element_uid: element.element_uid,
+                    previous_uid: element.previous_uid,
+                    next_uid: element.next_uid,
+                    element_data: element.element_data,
+                };
+                report.encode().ok()
+            }
+            QueryElementList::CODE => {
+                let uids = self.list.uids();
+                let list =
+                    uids.map(|element_uid| report_element_list::ElementListRec { element_uid });
+                let element_list = list.collect();
+                ReportElementList { element_list }.encode().ok()
+            }
+            QueryElementCount::CODE => {
+                let element_count = self.list.len();
+                ReportElementCount { element_count }.encode().ok()
+            }
+            QueryActiveElement::CODE => {
+                let first = self.given.first().filter(|_| self.under_way);
+                let element_uid = first.map_or(0, |element| element.element_uid);
+                ReportActiveElement { element_uid }.encode().ok()
+            }
+            _ => None,
+        }
+    }
+
+    /// The queries whose answers change with the list.
+    pub(in crate::gateway) const QUERIES: [u16; 4] = [
+        QueryElement::CODE,
+        QueryElementList::CODE,
+        QueryElementCount::CODE,
+        QueryActiveElement::CODE,
+    ];
+
+    /// The data of the report of the speed that the driver was given last, if it does not tell it
+    /// itself.
+    pub(in crate::gateway) fn given_speed(&self) -> Option<Bytes> {
+        self.told_speed.clone().filter(|_| !self.tells_speed)
+    }
+
+    /// A client has set the speed without a list.
+    pub(in crate::gateway) fn note_speed(&mut self, data: Bytes) {
+        self.told_speed = Some(data);
+    }
+
+    /// The driver has told something with this code. Says whether that was waited for.
+    pub(in crate::gateway) fn handle_report(
+        &mut self,
+        now: Instant,
+        code: u16,
+        data: &[u8],
+    ) -> bool {
+        if code != self.places.report() {
+            return false;
+        }
+        let Some(number) = self.places.number(data) else {
+            return false;
+        };
+        let is_same_as = |set: &Bytes| self.places.are_near(set, data);
+        let waited_for = self.handover.handle_report(number, is_same_as);
+        self.pump(now);
+        waited_for
+    }
+
+    /// Nobody controls it any more: it is stopped.
+    pub(in crate::gateway) fn leave(&mut self) {
+        if self.under_way
+            && let Err(why) = self.halt()
+        {
+            self.said.refused.push((ExecuteList::CODE, why));
+        }
+        self.stop();
+    }
+
+    /// It drives no more: it was sent to standby, or is to be.
+    pub(in crate::gateway) fn stop(&mut self) {
+        self.handover.clear();
+        self.speed = None;
+        self.said.changed |= std::mem::take(&mut self.under_way);
+        self.given.clear();
+    }
+
+    /// It was reset: its list is empty. OpenJAUS's drivers keep their waypoints over that.
+    pub(in crate::gateway) fn reset(&mut self) {
+        self.stop();
+        self.list.clear();
+        self.said.changed = true;
+        if self.places.is_path {
+            self.held = 0;
+        }
+    }
+
+    /// What is to be sent and counted since this was asked last.
+    pub(in crate::gateway) fn take_said(&mut self) -> Said {
+        std::mem::take(&mut self.said)
+    }
+
+    /// The time of [`poll_timeout`](Self::poll_timeout) has come.
+    pub(in crate::gateway) fn handle_timeout(&mut self, now: Instant) {
+        self.pump(now);
+    }
+
+    /// When there is something to do.
+    pub(in crate::gateway) fn poll_timeout(&self) -> Option<Instant> {
+        self.handover.poll_timeout()
+    }
+
+    fn handle_set(&mut self, payload: &Bytes) -> Result<(), Refused> {
+        let request = SetElement::decode(payload).map_err(Refusal::from)?;
+        let id = request.request_id_rec.request_id;
+        let done = self.set(&request.element_list);
+        self.reply(id, done)
+    }
+
+    fn handle_delete(&mut self, payload: &Bytes) -> Result<(), Refused> {
+        let request = DeleteElement::decode(payload).map_err(Refusal::from)?;
+        let id = request.request_id_rec.request_id;
+        let uids = request.delete_element_list.iter();
+        let uids: Vec<_> = uids.map(|element| element.element_uid).collect();
+        let done = self.delete(&uids);
+        self.reply(id, done)
+    }
+
+    /// Tells the client whether its request was carried out.
+    fn reply(&mut self, request_id: u8, done: Result<(), Refused>) -> Result<(), Refused> {
+        let answer = match &done {
+            Ok(()) => ConfirmElementRequest { request_id }.encode(),
+            Err(why) => RejectElementRequest {
+                request_id,
+                response_code: why.response(),
+            }
+            .encode(),
+        };
+        self.said.answers.extend(answer.ok());
+        self.said.changed |= done.is_ok();
+        done
+    }
+
+    fn set(&mut self, elements: &[ElementRec]) -> Result<(), Refused> {
+        for element in elements {
+            self.places.to_ra(&element.element_data, 0)?;
+        }
+        let mut list = self.list.clone();
+        list.set(elements).map_err(Refused::List)?;
+        self.replace(list)
+    }
+
+    fn delete(&mut self, uids: &[u16]) -> Result<(), Refused> {
+        if uids.contains(&ALL) {
+            self.list.clear();
+            self.leave();
+            return Ok(());
+        }
+        let mut list = self.list.clone();
+        list.delete(uids).map_err(Refused::List)?;
+        self.replace(list)
+    }
+
+    /// Takes another list, and gives the driver what is new in it while it drives.
+    fn replace(&mut self, list: ElementList) -> Result<(), Refused> {
+        if self.under_way {
+            let chain = self.continuation(&list).ok_or(Refused::UnderWay)?;
+            self.give_new(chain)?;
+        }
+        self.list = list;
+        Ok(())
+    }
+
+    /// The elements of a list that goes on as the one that the driver was given, from the first of
+    /// those on.
+    fn continuation(&self, list: &ElementList) -> Option<Vec<ElementRec>> {
+        let first = self.given.first()?.element_uid;
+        let chain = chain(list, first);
+        let same = |(one, other): (&ElementRec, &ElementRec)| one.element_uid == other.element_uid;
+        let goes_on = chain.len() >= self.given.len() && chain.iter().zip(&self.given).all(same);
+        goes_on.then_some(chain)
+    }
+
+    /// Gives the driver those elements that are others than it was given.
+    fn give_new(&mut self, chain: Vec<ElementRec>) -> Result<(), Refused> {
+        let is_new = |(number, element): &(usize, &ElementRec)| {
+            let before = self.given.get(*number);
+            before.is_none_or(|it| it.element_data != element.element_data)
+        };
+        let new = chain.iter().enumerate().filter(is_new);
+        let new: Result<Vec<_>, _> = new.map(|(at, element)| self.place(at, element)).collect();
+        self.handover.add(new?);
+        self.given = chain;
+        self.held = self.held.max(self.given.len());
+        Ok(())
+    }
+
+    /// The number and the data of an element at its place.
+    fn place(&self, at: usize, element: &ElementRec) -> Result<(u16, Bytes), Refused> {
+        let number = u16::try_from(at).map_err(|_| Refused::TooMany)?;
+        Ok((number, self.places.to_ra(&element.element_data, number)?))
+    }
+
+    fn execute(&mut self, execute: &ExecuteList) -> Result<(), Refused> {
+        let speed = speed_to_ra(execute)?;
+        match execute.element_uid {
+            Some(uid) => self.begin(uid)?,
+            None if self.given.is_empty() => return Err(Refused::NoSuchElement),
+            None => {
+                let chain = self.continuation(&self.list).ok_or(Refused::Reordered)?;
+                self.give_new(chain)?;
+            }
+        }
+        self.under_way = execute.speed_m_per_s() > 0.0;
+        self.speed = Some(speed);
+        self.said.changed = true;
+        Ok(())
+    }
+
+    /// Gives the driver the list from an element on.
+    fn begin(&mut self, uid: u16) -> Result<(), Refused> {
+        let first = self.list.get(uid).ok_or(Refused::NoSuchElement)?;
+        let chain = chain(&self.list, first.element_uid);
+        let is_repeated = !self.handover.is_done() && chain == self.given;
+        if is_repeated {
+            return Ok(());
+        }
+        if self.places.is_path && chain.len() < self.held {
+            return Err(Refused::Shorter(self.held));
+        }
+        let last = chain.last().ok_or(Refused::NoSuchElement)?;
+        let rest = (chain.len()..self.held).map(|at| (at, last));
+        let all = chain.iter().enumerate().chain(rest);
+        let all: Result<Vec<_>, _> = all.map(|(at, element)| self.place(at, element)).collect();
+        let all = all?;
+        self.held = all.len();
+        self.handover.clear();
+        self.handover.add(all);
+        self.given = chain;
+        Ok(())
+    }
+
+    /// Stops the driver at once.
+    fn halt(&mut self) -> Result<(), Refused> {
+        let stop = speed_to_ra(&ExecuteList::default())?;
+        self.tell_speed(stop);
+        Ok(())
+    }
+
+    fn tell_speed(&mut self, speed: Bytes) {
+        self.told_speed = Some(speed.clone());
+        self.said.to_ra.push((SetTravelSpeed::CODE, speed));
+    }
+
+    /// Gives what is to be given now, and the speed behind it. To stop needs nothing before.
+    fn pump(&mut self, now: Instant) {
+        if !self.under_way
+            && let Some(stop) = self.speed.take()
+        {
+            self.tell_speed(stop);
+        }
+        for step in self.handover.poll(now, self.patience) {
+            match step {
+                Do::Set(data) => self.said.to_ra.push((self.places.set, data)),
+                Do::Ask(number) => {
+                    let query = self.places.query_for(number);
+                    self.said.to_ra.push((self.places.query, query));
+                }
+                Do::Mute => self.refuse(Refused::Mute),
+                Do::Keeps(number) => self.refuse(Refused::Keeps(number)),
+                Do::GiveUp(number) => {
+                    self.refuse(Refused::Unconfirmed(number));
+                    self.stop();
+                }
+            }
+        }
+        if self.handover.is_done()
+            && let Some(speed) = self.speed.take()
+        {
+            self.tell_speed(speed);
+        }
+    }
+
+    fn refuse(&mut self, why: Refused) {
+        self.said.refused.push((self.places.set, why));
+    }
+}
+
+/// The elements of a list from one on.
+fn chain(list: &ElementList, first: u16) -> Vec<ElementRec> {
+    let uids = list.uids().skip_while(|&uid| uid != first);
+    uids.filter_map(|uid| list.get(uid).cloned()).collect()
+}
+
+impl Refused {
+    /// What the client is told of it.
+    fn response(&self) -> ResponseCode {
+        match self {
+            Self::List(code) => *code,
+            Self::Conversion(Refusal::Inexpressible {
+                field: "ElementData",
+            }) => ResponseCode::UNSUPPORTED_ELEMENT_TYPE,
+            _ => ResponseCode::UNSPECIFIED_ERROR,
+        }
+    }
+}

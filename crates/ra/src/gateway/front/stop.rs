@@ -1,0 +1,87 @@
+//! The commands that stop RA drivers. Drivers over OpenJAUS's library keep the last command whatever
+//! state they are sent to, so each stop is a command of the kind that moved them.
+
+use bytes::Bytes;
+
+use super::codes::{SET_GLOBAL_VECTOR, SET_LOCAL_VECTOR};
+use super::lease::Halt;
+use crate::ids::RaComponent;
+use jaus::codec::{Message, OutOfRange};
+use jaus::messages::ra33::{SetGlobalVector, SetLocalVector, SetTravelSpeed, SetWrenchEffort};
+
+/// How a component of this type is stopped; `None` if it drives nothing.
+pub(super) fn halt(part: RaComponent) -> Option<Halt> {
+    part.is_driver().then(|| Halt {
+        command: command(part),
+    })
+}
+
+/// The command that stops a component of this type, where it needs nothing but the type.
+pub(super) fn command(part: RaComponent) -> Option<(u16, Bytes)> {
+    match part {
+        RaComponent::PRIMITIVE_DRIVER => encoded(&no_effort().ok()?),
+        RaComponent::GLOBAL_VECTOR_DRIVER => encoded(&no_global_speed().ok()?),
+        RaComponent::LOCAL_VECTOR_DRIVER => encoded(&no_local_speed().ok()?),
+        RaComponent::GLOBAL_WAYPOINT_DRIVER
+        | RaComponent::LOCAL_WAYPOINT_DRIVER
+        | RaComponent::GLOBAL_PATH_SEGMENT_DRIVER
+        | RaComponent::LOCAL_PATH_SEGMENT_DRIVER => encoded(&SetTravelSpeed::default()),
+        _ => None,
+    }
+}
+
+/// The command that ends another one: a vector keeps its heading, so that nothing turns.
+pub(super) fn after(part: RaComponent, (code, data): (u16, &Bytes)) -> Option<(u16, Bytes)> {
+    match code {
+        SET_LOCAL_VECTOR => {
+            let mut vector = decoded::<SetLocalVector>(code, data)?;
+            vector.set_speed_m_per_s(0.0).ok()?;
+            encoded(&vector)
+        }
+        SET_GLOBAL_VECTOR => {
+            let mut vector = decoded::<SetGlobalVector>(code, data)?;
+            vector.set_speed_m_per_s(0.0).ok()?;
+            encoded(&vector)
+        }
+        _ => command(part),
+    }
+}
+
+/// Nothing that drives, and full brakes.
+fn no_effort() -> Result<SetWrenchEffort, OutOfRange> {
+    let mut effort = SetWrenchEffort::default();
+    effort.set_propulsive_linear_effort_x_percent(0.0)?;
+    effort.set_propulsive_linear_effort_y_percent(0.0)?;
+    effort.set_propulsive_linear_effort_z_percent(0.0)?;
+    effort.set_propulsive_rotational_effort_x_percent(0.0)?;
+    effort.set_propulsive_rotational_effort_y_percent(0.0)?;
+    effort.set_propulsive_rotational_effort_z_percent(0.0)?;
+    effort.set_resistive_linear_effort_x_percent(100.0)?;
+    Ok(effort)
+}
+
+fn no_global_speed() -> Result<SetGlobalVector, OutOfRange> {
+    let mut vector = SetGlobalVector::default();
+    vector.set_speed_m_per_s(0.0)?;
+    Ok(vector)
+}
+
+/// The heading cannot be left out. That of the vector that is to end is not known here, and standing
+/// still matters more than which way.
+fn no_local_speed() -> Result<SetLocalVector, OutOfRange> {
+    let mut vector = SetLocalVector::default();
+    vector.set_speed_m_per_s(0.0)?;
+    vector.set_heading_rad(0.0)?;
+    Ok(vector)
+}
+
+/// Code and data of a message.
+fn encoded<M: Message>(message: &M) -> Option<(u16, Bytes)> {
+    let payload = message.encode().ok()?;
+    Some((M::CODE, payload.slice(2..)))
+}
+
+fn decoded<M: Message>(code: u16, data: &Bytes) -> Option<M> {
+    let payload = [&code.to_le_bytes()[..], data].concat();
+    M::decode(&Bytes::from(payload)).ok()
+}

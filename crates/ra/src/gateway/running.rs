@@ -1,0 +1,300 @@
+//! The running gateway: the RA network's socket, the JAUS node with the counterparts of the RA
+//! components attached, and one task that gives the [`Gateway`] its time.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here the gateway gets its time, and waits for it"
+)]
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::future::poll_fn;
+use std::net::SocketAddr;
+use std::task::Poll;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use tokio::time::{Interval, MissedTickBehavior};
+
+use super::{Action, Gateway, Report, Settings};
+use crate::carrier::To;
+use jaus::address::JausId;
+use jaus::endpoint::Received;
+use jaus::link::udp::{self, UdpLink};
+use jaus::link::{Group, Interface, Interfaces, Ip, STANDARD_PORT, Slab};
+use jaus::node::{Node, Port, Resident};
+use jaus::parts::{Part, PartError, Seat};
+use jaus::wire::Priority;
+
+/// The gateway between RA systems and JAUS, as a program runs it.
+#[derive(Debug, Clone)]
+pub struct RaGateway {
+    /// What is carried across, and how.
+    pub settings: Settings,
+    /// The interface of the RA network, by name or address; without it the JAUS node's first one.
+    pub interface: Option<String>,
+    /// The multicast group by which RA systems find each other.
+    pub group: Group,
+    /// How many routers multicast may pass.
+    pub ttl: u8,
+    /// Our UDP port among RA systems, which answer to 3794 whatever it is.
+    pub port: u16,
+    /// How often the report is given; at the end, if this is zero. Without it there is none.
+    pub reports: Option<Duration>,
+    /// What a report goes to.
+    pub reporter: fn(&Report),
+}
+
+impl RaGateway {
+    /// The multicast group of RA systems: 224.1.0.1.
+    #[must_use]
+    pub fn group() -> Group {
+        const GROUP: &str = "224.1.0.1:3794";
+        GROUP.parse().unwrap_or_default()
+    }
+}
+
+impl Default for RaGateway {
+    fn default() -> Self {
+        Self {
+            settings: Settings::default(),
+            interface: None,
+            group: Self::group(),
+            ttl: 32,
+            port: STANDARD_PORT,
+            reports: None,
+            reporter: |report| tracing::info!("{}", report.line()),
+        }
+    }
+}
+
+impl Part for RaGateway {
+    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+        let Some(node) = seat.node else {
+            return Err(PartError::Broken(
+                "the gateway attaches components of many subsystems, and so runs a node of its own: \
+                 leave --attach out"
+                    .to_owned(),
+            ));
+        };
+        let broken = |error: &dyn std::fmt::Display| PartError::Broken(error.to_string());
+        let link = self.open(&node)?;
+        let mut settings = self.settings;
+        settings.name = seat.name;
+        let gateway = Gateway::new(seat.port.id(), settings).map_err(|error| broken(&error))?;
+        let (id, ra) = (gateway.id(), gateway.ra_id());
+        tracing::info!("{id} is {ra} among RA systems, UDP {}", link.local());
+        let resident = seat.port.reside();
+        let mut running = Leaver(Some(Running {
+            gateway,
+            link,
+            slab: Slab::new(),
+            _resident: seat.port.reside(),
+            ports: BTreeMap::from([(id, seat.port)]),
+            node,
+            reports: self.reports,
+            reporter: self.reporter,
+        }));
+        let Some(running) = &mut running.0 else {
+            return Err(PartError::NodeStopped);
+        };
+        tokio::select! {
+            ended = running.go() => ended,
+            () = resident.closing() => Err(PartError::NodeStopped),
+        }
+    }
+}
+
+impl RaGateway {
+    fn open(&self, node: &Node) -> Result<UdpLink, PartError> {
+        let broken = |error: jaus::link::Error| PartError::Broken(error.to_string());
+        let interface = match &self.interface {
+            Some(name) => {
+                let named = Interfaces::Only(vec![name.clone()]);
+                let found = named.choose(Ip::V4).map_err(broken)?;
+                found.into_iter().next()
+            }
+            None => first_interface(node),
+        };
+        let interface = interface.ok_or_else(|| {
+            PartError::Broken(
+                "no interface for the RA network: name one with --ra-interface".to_owned(),
+            )
+        })?;
+        let settings = udp::Settings {
+            port: self.port,
+            group: self.group,
+            ttl: self.ttl,
+            ..udp::Settings::default()
+        };
+        UdpLink::open(&interface, &settings).map_err(broken)
+    }
+}
+
+/// The first interface of the node with an IPv4 address, which RA systems need.
+fn first_interface(node: &Node) -> Option<Interface> {
+    let mut interfaces = node.links().into_iter().map(|link| link.interface);
+    interfaces.find(|it| it.address.is_ipv4())
+}
+
+/// A gateway that leaves in order when it is dropped.
+struct Leaver(Option<Running>);
+
+impl Drop for Leaver {
+    /// Also when the program ends: the node waits for its residents.
+    fn drop(&mut self) {
+        let runtime = tokio::runtime::Handle::try_current();
+        if let (Some(running), Ok(runtime)) = (self.0.take(), runtime) {
+            runtime.spawn(running.leave());
+        }
+    }
+}
+
+/// A gateway with what it needs to run.
+struct Running {
+    gateway: Gateway,
+    link: UdpLink,
+    slab: Slab,
+    /// Makes a stopping node wait until everything is released.
+    _resident: Resident,
+    /// The doors of the gateway's own component and of all counterparts.
+    ports: BTreeMap<JausId, Port>,
+    node: Node,
+    reports: Option<Duration>,
+    reporter: fn(&Report),
+}
+
+/// What has come.
+enum Arrival {
+    Datagram(SocketAddr, Bytes),
+    Message(Received),
+    NodeStopped,
+}
+
+impl Running {
+    async fn go(&mut self) -> Result<Infallible, PartError> {
+        self.gateway.start(now());
+        let mut ticks = self.reports.filter(|it| !it.is_zero()).map(ticks);
+        loop {
+            self.carry_out();
+            let wake = self.gateway.poll_timeout();
+            tokio::select! {
+                arrival = poll_fn(|cx| self.poll_arrival(cx)) => match arrival {
+                    Arrival::Datagram(from, datagram) => {
+                        self.gateway.handle_datagram(now(), from, datagram);
+                    }
+                    Arrival::Message(message) => self.gateway.handle_message(now(), &message),
+                    Arrival::NodeStopped => return Err(PartError::NodeStopped),
+                },
+                () = sleep_until(wake) => self.gateway.handle_timeout(now()),
+                () = tick(&mut ticks) => (self.reporter)(&self.gateway.report()),
+            }
+        }
+    }
+
+    /// How long a gateway that ends tries to release what it controls.
+    const LEAVE: Duration = Duration::from_millis(900);
+
+    /// Stops and releases what is controlled on either side, until that is confirmed or for a moment.
+    async fn leave(mut self) {
+        if self.reports.is_some() {
+            (self.reporter)(&self.gateway.report());
+        }
+        let end = now() + Self::LEAVE;
+        self.gateway.release_all(now());
+        self.carry_out();
+        while !self.gateway.is_released() && now() < end {
+            let wake = self
+                .gateway
+                .poll_timeout()
+                .map_or(end, |wake| wake.min(end));
+            tokio::select! {
+                arrival = poll_fn(|cx| self.poll_arrival(cx)) => match arrival {
+                    Arrival::Datagram(from, datagram) => {
+                        self.gateway.handle_datagram(now(), from, datagram);
+                    }
+                    Arrival::Message(message) => self.gateway.handle_message(now(), &message),
+                    Arrival::NodeStopped => return,
+                },
+                () = sleep_until(Some(wake)) => self.gateway.handle_timeout(now()),
+            }
+            self.carry_out();
+        }
+        self.gateway.take_leave(now());
+        self.carry_out();
+    }
+
+    /// The next datagram or message; sends what waits for the network meanwhile.
+    fn poll_arrival(&mut self, cx: &mut std::task::Context<'_>) -> Poll<Arrival> {
+        // Whether all has been sent is nobody's question here.
+        let _ = self.link.poll_flush(cx);
+        if let Poll::Ready((from, datagram)) = self.link.poll_recv(cx, &mut self.slab) {
+            return Poll::Ready(Arrival::Datagram(from, datagram));
+        }
+        for port in self.ports.values_mut() {
+            match port.poll_recv(cx) {
+                Poll::Ready(Some(message)) => return Poll::Ready(Arrival::Message(message)),
+                Poll::Ready(None) => return Poll::Ready(Arrival::NodeStopped),
+                Poll::Pending => {}
+            }
+        }
+        Poll::Pending
+    }
+
+    fn carry_out(&mut self) {
+        while let Some(transmit) = self.gateway.poll_transmit() {
+            let (link, datagram) = (&mut self.link, &transmit.datagram);
+            match transmit.to {
+                To::Group => link.send_to_group(Priority::Standard, datagram),
+                To::Address(peer) => link.send_to(peer, Priority::Standard, datagram),
+            }
+        }
+        while let Some(action) = self.gateway.poll_action() {
+            match action {
+                Action::Attach(id) => self.attach(id),
+                Action::Detach(id) => drop(self.ports.remove(&id)),
+                Action::Send(message) => {
+                    let destination = message.destination;
+                    let port = self.ports.get(&message.source);
+                    if let Some(Err(error)) = port.map(|port| port.send(message)) {
+                        tracing::debug!(%destination, %error, "not sent");
+                    }
+                }
+            }
+        }
+    }
+
+    fn attach(&mut self, id: JausId) {
+        if self.ports.contains_key(&id) {
+            return;
+        }
+        match self.node.attach_as(id) {
+            Ok(port) => drop(self.ports.insert(id, port)),
+            Err(error) => tracing::warn!(%error, "an RA component cannot be shown"),
+        }
+    }
+}
+
+fn now() -> Instant {
+    tokio::time::Instant::now().into_std()
+}
+
+fn ticks(period: Duration) -> Interval {
+    let mut ticks = tokio::time::interval(period);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    ticks.reset();
+    ticks
+}
+
+async fn tick(ticks: &mut Option<Interval>) {
+    match ticks {
+        Some(ticks) => drop(ticks.tick().await),
+        None => std::future::pending().await,
+    }
+}
+
+async fn sleep_until(wake: Option<Instant>) {
+    match wake {
+        Some(wake) => tokio::time::sleep_until(wake.into()).await,
+        None => std::future::pending().await,
+    }
+}

@@ -1,0 +1,300 @@
+//! A subsystem of others: what is known of it, and what is still to be asked.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use super::Settings;
+use super::subsystem::{Component, Node, Service, Subsystem};
+use crate::RaId;
+
+/// Something to be found out, in the order of asking.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Question {
+    /// The subsystem's name, asked of its communicator.
+    Subsystem,
+    /// Its nodes and components.
+    Configuration,
+    /// To be told when they change.
+    Subscription,
+    /// The name of a node, asked of its manager.
+    Node(u8),
+    /// The name of a component, asked of itself.
+    Name(RaId),
+    /// Its services.
+    Services(RaId),
+}
+
+impl Question {
+    /// Whether the answer belongs to what the owner is told.
+    const fn is_detail(self) -> bool {
+        !matches!(self, Self::Configuration | Self::Subscription)
+    }
+}
+
+/// How often a question has been asked, and when it is due again.
+#[derive(Clone, Copy, Debug)]
+struct Attempts {
+    made: u32,
+    next: Instant,
+}
+
+/// A subsystem of others.
+#[derive(Debug)]
+pub(super) struct Peer {
+    pub(super) subsystem: Subsystem,
+    pub(super) communicator: RaId,
+    /// When something of it was heard.
+    pub(super) heard: Instant,
+    /// Whether it has told its nodes and components.
+    pub(super) configured: bool,
+    pub(super) subscribed: bool,
+    /// Whether something is other than the owner was told.
+    changed: bool,
+    /// Whether something is gone, which the owner is told before all questions are answered.
+    shrunk: bool,
+    questions: BTreeMap<Question, Attempts>,
+    next_refresh: Instant,
+    next_review: Instant,
+    /// When it is told what we show, if it has not asked for that by then.
+    pub(super) greet: Option<Instant>,
+    /// When there is something to do.
+    pub(super) next: Instant,
+}
+
+impl Peer {
+    pub(super) fn new(now: Instant, communicator: RaId, settings: &Settings) -> Self {
+        let mut peer = Self {
+            subsystem: Subsystem {
+                id: communicator.subsystem,
+                ..Subsystem::default()
+            },
+            communicator,
+            heard: now,
+            configured: false,
+            subscribed: false,
+            changed: false,
+            shrunk: false,
+            questions: BTreeMap::new(),
+            next_refresh: now + settings.refresh,
+            next_review: now + settings.review,
+            greet: Some(now + settings.silence),
+            next: now,
+        };
+        peer.wonder(now, Question::Subsystem);
+        peer
+    }
+
+    /// Its node manager beside the communicator.
+    pub(super) fn manager(&self) -> RaId {
+        RaId {
+            component: RaId::NODE_MANAGER,
+            instance: 1,
+            ..self.communicator
+        }
+    }
+
+    /// Puts a question on the list, unless it is there.
+    pub(super) fn wonder(&mut self, now: Instant, question: Question) {
+        let attempts = Attempts { made: 0, next: now };
+        self.questions.entry(question).or_insert(attempts);
+        self.next = self.next.min(now);
+    }
+
+    /// Takes a question off the list; what comes after the first is asked then.
+    pub(super) fn settle(&mut self, now: Instant, question: Question) {
+        let was_open = self.questions.remove(&question).is_some();
+        if was_open && question == Question::Subsystem && !self.configured {
+            self.wonder(now, Question::Configuration);
+            self.wonder(now, Question::Subscription);
+        }
+    }
+
+    /// The next question that is due, which counts as asked now. One that was asked in vain too
+    /// often is left for later.
+    pub(super) fn poll_question(&mut self, now: Instant, settings: &Settings) -> Option<Question> {
+        loop {
+            let due = self.questions.iter_mut();
+            let (&question, attempts) = due.into_iter().find(|(_, a)| a.next <= now)?;
+            if attempts.made < settings.tries {
+                attempts.made += 1;
+                attempts.next = now + settings.patience;
+                return Some(question);
+            }
+            self.settle(now, question);
+        }
+    }
+
+    /// A question that was due could not be asked yet.
+    pub(super) fn postpone(&mut self, question: Question, until: Instant) {
+        if let Some(attempts) = self.questions.get_mut(&question) {
+            attempts.made -= 1;
+            attempts.next = until;
+        }
+    }
+
+    /// Puts on the list again what may have changed unnoticed.
+    pub(super) fn refresh(&mut self, now: Instant, settings: &Settings) {
+        if self.next_refresh <= now {
+            self.next_refresh = now + settings.refresh;
+            if self.subsystem.name.is_empty() {
+                self.wonder(now, Question::Subsystem);
+            }
+            self.wonder(now, Question::Configuration);
+            if !self.subscribed {
+                self.wonder(now, Question::Subscription);
+            }
+            self.wonder_about_parts(now, false);
+        }
+        if self.next_review <= now {
+            self.next_review = now + settings.review;
+            self.wonder_about_parts(now, true);
+        }
+    }
+
+    /// Asks for names and services: for `all`, or for those that are not known.
+    fn wonder_about_parts(&mut self, now: Instant, all: bool) {
+        let nodes = self.subsystem.nodes.iter();
+        let nodes = nodes.filter(|node| all || node.name.is_empty());
+        let nodes = nodes.map(|node| Question::Node(node.id));
+        let components = self.subsystem.components();
+        let components = components.flat_map(|(id, component)| {
+            let name = all || component.name.is_empty();
+            let services = all || component.services.is_empty();
+            let name = name.then_some(Question::Name(id));
+            name.into_iter()
+                .chain(services.then_some(Question::Services(id)))
+        });
+        let questions: Vec<_> = nodes.chain(components).collect();
+        for question in questions {
+            self.wonder(now, question);
+        }
+    }
+
+    /// Sets when there is something to do again. Questions wait while there is nobody who `asks`.
+    pub(super) fn schedule(&mut self, silence: Duration, asks: bool) {
+        let questions = self.questions.values().map(|attempts| attempts.next);
+        let question = questions.min().filter(|_| asks);
+        let times = [
+            Some(self.next_refresh),
+            Some(self.next_review),
+            question,
+            self.greet,
+        ];
+        let times = times.into_iter().flatten();
+        self.next = times.fold(self.heard + silence, Instant::min);
+    }
+
+    /// Whether the owner can be told of it: all that it was asked is answered, or was asked in vain.
+    pub(super) fn is_settled(&self) -> bool {
+        self.configured && !self.questions.keys().any(|question| question.is_detail())
+    }
+
+    /// Whether there is news for the owner, who is told with this.
+    pub(super) fn take_news(&mut self) -> bool {
+        let news = self.configured && (self.shrunk || (self.changed && self.is_settled()));
+        if news {
+            self.changed &= !self.is_settled();
+            self.shrunk = false;
+        }
+        news
+    }
+
+    /// It has told its name.
+    pub(super) fn name_subsystem(&mut self, name: String) {
+        self.changed |= replace(&mut self.subsystem.name, name);
+    }
+
+    /// A node has told its name.
+    pub(super) fn name_node(&mut self, id: u8, name: String) {
+        let nodes = &mut self.subsystem.nodes;
+        if let Some(node) = nodes.iter_mut().find(|node| node.id == id) {
+            self.changed |= replace(&mut node.name, name);
+        }
+    }
+
+    /// A component has told its name.
+    pub(super) fn name_component(&mut self, id: RaId, name: String) {
+        if let Some(component) = component(&mut self.subsystem, id) {
+            self.changed |= replace(&mut component.name, name);
+        }
+    }
+
+    /// A component has told its services.
+    pub(super) fn set_services(&mut self, id: RaId, services: Vec<Service>) {
+        if let Some(component) = component(&mut self.subsystem, id) {
+            self.changed |= replace(&mut component.services, services);
+        }
+    }
+
+    /// The messages of all services but those of one component.
+    pub(super) fn commands_but_of(&self, id: RaId) -> usize {
+        let others = self
+            .subsystem
+            .components()
+            .filter(|&(other, _)| other != id);
+        others
+            .map(|(_, component)| commands(&component.services))
+            .sum()
+    }
+
+    /// It has told its nodes and components, new ones of which are asked for names and services.
+    pub(super) fn configure(&mut self, now: Instant, nodes: Vec<Node>) {
+        self.changed |= !self.configured;
+        self.configured = true;
+        let mut old = std::mem::take(&mut self.subsystem);
+        self.subsystem = Subsystem {
+            id: old.id,
+            name: std::mem::take(&mut old.name),
+            nodes,
+        };
+        let mut questions = Vec::new();
+        for node in &mut self.subsystem.nodes {
+            match old.nodes.iter_mut().find(|known| known.id == node.id) {
+                Some(known) => node.name = std::mem::take(&mut known.name),
+                None => questions.push(Question::Node(node.id)),
+            }
+            for new in &mut node.components {
+                let id = RaId::new(old.id, node.id, new.component, new.instance);
+                match component(&mut old, id) {
+                    Some(known) => *new = std::mem::take(known),
+                    None => questions.extend([Question::Name(id), Question::Services(id)]),
+                }
+            }
+        }
+        // What was taken over has left components without number behind.
+        let kept = |node: &Node| self.subsystem.nodes.iter().any(|new| new.id == node.id);
+        self.shrunk |= !old.nodes.iter().all(kept);
+        self.shrunk |= old.components().any(|(id, _)| id.component != 0);
+        self.changed |= self.shrunk || !questions.is_empty();
+        for question in questions {
+            self.wonder(now, question);
+        }
+        let subsystem = &self.subsystem;
+        self.questions.retain(|question, _| match *question {
+            Question::Node(node) => subsystem.nodes.iter().any(|known| known.id == node),
+            Question::Name(id) | Question::Services(id) => {
+                subsystem.components().any(|(known, _)| known == id)
+            }
+            _ => true,
+        });
+    }
+}
+
+/// How many messages some services list.
+pub(super) fn commands(services: &[Service]) -> usize {
+    let in_one = |service: &Service| 1 + service.inputs.len() + service.outputs.len();
+    services.iter().map(in_one).sum()
+}
+
+fn component(subsystem: &mut Subsystem, id: RaId) -> Option<&mut Component> {
+    let node = subsystem.nodes.iter_mut().find(|node| node.id == id.node)?;
+    let mut components = node.components.iter_mut();
+    components.find(|known| (known.component, known.instance) == (id.component, id.instance))
+}
+
+/// Replaces a value, and says whether it was another.
+fn replace<T: PartialEq>(old: &mut T, new: T) -> bool {
+    let other = *old != new;
+    *old = new;
+    other
+}

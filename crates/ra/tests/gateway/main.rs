@@ -1,0 +1,19 @@
+//! The gateway between RA systems and JAUS in virtual time: an RA vehicle and an RA operator on one
+//! side, JAUS components on the other, and no sockets.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test in virtual time"
+)]
+
+mod drivers;
+mod events;
+mod hostile;
+mod jaus_vehicle;
+mod knowledge;
+mod lists;
+mod ra_vehicle;
+mod replay;
+mod safety;
+mod world;
