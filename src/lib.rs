@@ -15,8 +15,6 @@
 //! `service` and `endpoint` downwards nothing opens a socket or reads a clock.
 #![forbid(unsafe_code)]
 
-#[cfg(feature = "ground")]
-pub mod actuator;
 pub mod address;
 mod as_text;
 pub mod codec;
@@ -27,21 +25,11 @@ pub mod endpoint;
 #[cfg(feature = "node")]
 pub mod link;
 pub mod messages;
-#[cfg(feature = "ground")]
-pub mod mission;
 #[cfg(feature = "node")]
 pub mod node;
-#[cfg(feature = "parts")]
-pub mod parts;
 pub mod peer;
 pub mod service;
-#[cfg(feature = "mobility")]
-pub mod vehicle;
-#[cfg(feature = "view")]
-pub mod view;
 pub mod wire;
-#[cfg(feature = "ground")]
-pub mod world;
 
 /// The README's programs compile.
 #[cfg(all(doctest, feature = "node", feature = "mobility"))]

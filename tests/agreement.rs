@@ -6,7 +6,6 @@
 //!
 //! `JAUS_CASES=500` tries so many inputs for each message in place of a few.
 
-#![cfg(feature = "view")]
 #![allow(
     clippy::unwrap_used,
     clippy::panic,

@@ -1,7 +1,6 @@
 //! Recorded traffic of other JAUS stacks, put through the wire formats and, in the place of one of
 //! the two parties, through an endpoint.
 
-#![cfg(feature = "view")]
 #![expect(clippy::expect_used, reason = "helpers of tests")]
 
 use std::fs::File;
@@ -14,9 +13,9 @@ use bytes::Bytes;
 use jaus::endpoint::{
     Config, Counter, Endpoint, LinkId, LinkProfile, Path, Received, To, Transmit,
 };
-use jaus::view::{Capture, Network};
 use jaus::wire::{Version, judp};
 use jaus_test_kit::evidence;
+use jaus_view::{Capture, Network};
 
 /// A captured datagram.
 struct Recorded {

@@ -14,7 +14,6 @@
 //! Streams and serial lines are compared in `jtcp_captures.rs` and `jserial_captures.rs`; what is
 //! received from the recordings in `captures.rs`.
 
-#![cfg(feature = "view")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests")]
 
 use std::collections::BTreeSet;
@@ -25,9 +24,9 @@ use std::time::{Duration, Instant};
 
 use bytes::{Bytes, BytesMut};
 use jaus::endpoint::{Config, Endpoint, LinkId, LinkProfile, Outgoing, Path, Rate, Received};
-use jaus::view::{Capture, Network};
 use jaus::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, judp};
 use jaus_test_kit::evidence;
+use jaus_view::{Capture, Network};
 
 /// A recorded datagram: its sender, and the first message in it.
 struct Recorded {

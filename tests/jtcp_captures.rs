@@ -1,6 +1,5 @@
 //! Recorded JTCP connections of Junior and JAUS++: read, however they are cut, and written again.
 
-#![cfg(feature = "view")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests")]
 
 #[path = "support/streams.rs"]

@@ -2,7 +2,6 @@
 //! they were captured, against a node with real sockets on the loopback interface.
 //!
 //! The capture is not part of the project; see `JAUS_SHARED` in CONTRIBUTING.
-#![cfg(all(feature = "node", feature = "view"))]
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -20,8 +19,8 @@ use std::time::{Duration, Instant};
 use jaus::component::{Component, Kind};
 use jaus::link::Group;
 use jaus::node::{Config, Node};
-use jaus::view::{Capture, JAUS_PORT, Network};
 use jaus_test_kit::evidence;
+use jaus_view::{Capture, JAUS_PORT, Network};
 
 /// What the judge waits for an answer at most; reached only when a test fails.
 const JUDGES_PATIENCE: Duration = Duration::from_millis(1500);

@@ -1,7 +1,6 @@
 //! Recorded traffic of other JAUS stacks in Wireshark: with our dissector `tshark` names the
 //! messages that our own reading of the captures names, and finds fault where that does.
 
-#![cfg(feature = "view")]
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 use std::collections::BTreeMap;
@@ -9,9 +8,9 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use jaus::view::{Capture, Content, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 use jaus_test_kit::evidence;
 use jaus_test_kit::tools::has_tshark;
+use jaus_view::{Capture, Content, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 
 /// By number of the packet: the messages in it, and whether something is wrong with one.
 type Packets = BTreeMap<u64, (Vec<String>, bool)>;
@@ -45,7 +44,7 @@ fn ours(dictionary: &Dictionary, path: &Path) -> Packets {
     packets
 }
 
-fn header<'l>(line: &'l Line<'_>) -> Option<&'l jaus::view::Header> {
+fn header<'l>(line: &'l Line<'_>) -> Option<&'l jaus_view::Header> {
     line.envelope.as_ref()?.header.as_ref()
 }
 

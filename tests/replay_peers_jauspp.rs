@@ -2,7 +2,6 @@
 //! time: every request gets the answer that JAUS++ can use, within the 250 ms that it waits, at the
 //! address that it sent from.
 
-#![cfg(all(feature = "view", feature = "mobility"))]
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -32,9 +31,9 @@ use jaus::endpoint::{Config, Counter, Outgoing};
 use jaus::messages::core::*;
 use jaus::peer::Peer;
 use jaus::service::Stack;
-use jaus::view::Dictionary;
 use jaus::wire::Frame;
 use jaus_test_kit::evidence;
+use jaus_view::Dictionary;
 use recorded::Recorded;
 use seat::{Said, Seat};
 

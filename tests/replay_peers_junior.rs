@@ -1,7 +1,6 @@
 //! Junior's sides of the captures, replayed to a node of ours in the place of the other, in virtual
 //! time: what we say is, octet for octet, what Junior's own node said there.
 
-#![cfg(all(feature = "view", feature = "mobility"))]
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

@@ -1,6 +1,5 @@
 //! Who spoke in the captures is recognised as what it was, and nobody is taken for somebody else.
 
-#![cfg(feature = "view")]
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests")]
 
 #[path = "support/recorded.rs"]

@@ -1,7 +1,6 @@
 //! The recorded TCP connections of Junior and JAUS++, replayed to a node of ours that listens: each
 //! is answered where it reads.
 
-#![cfg(all(feature = "view", feature = "mobility"))]
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

@@ -29,9 +29,9 @@ use jaus::messages::ground::{
 };
 use jaus::node::{Config, Node};
 use jaus::service::Patience;
-use jaus::service::ground::WorldStore;
-use jaus::vehicle::Frame;
-use jaus::world::{Change, Raster, World};
+use jaus_vehicle::ground::WorldStore;
+use jaus_vehicle::motion::Frame;
+use jaus_vehicle::world::{Change, Raster, World};
 
 const STORE: JausId = JausId::new(101, 1, 61);
 const BASELINE: JausId = JausId::new(101, 1, 62);

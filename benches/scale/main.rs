@@ -10,7 +10,7 @@
 
 use std::time::{Duration, Instant};
 
-use jaus::mission::{Terrain, Vehicle, plan};
+use jaus_vehicle::mission::{Terrain, Vehicle, plan};
 
 const RUNS: usize = 3;
 

@@ -6,7 +6,7 @@
 
 use std::io::Read;
 
-use jaus::view::{Capture, CaptureWriter, LinkType, Timestamp};
+use jaus_view::{Capture, CaptureWriter, LinkType, Timestamp};
 use libfuzzer_sys::fuzz_target;
 
 /// What a frame says of itself, and its octets.

@@ -16,7 +16,7 @@ use jaus::service::{
     Discovery, Kind, Liveness, Management, Profile, Scope, Service, Stack, Standing, State, Time,
     TimeOfDay, Timing, Transport, mobility,
 };
-use jaus::vehicle::{Drive, Frame, Limits, Motion, Pilot, Platform, Pose, Velocity};
+use jaus_vehicle::motion::{Drive, Frame, Limits, Motion, Pilot, Platform, Pose, Velocity};
 use jaus::wire::{Broadcast, Priority};
 use jaus_fuzz::message;
 use libfuzzer_sys::fuzz_target;

@@ -2,12 +2,13 @@
 
 /// A day of the Gregorian calendar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Date {
-    pub(super) year: u64,
+pub struct Date {
+    /// 0 to 9999.
+    pub year: u64,
     /// 1 to 12.
-    pub(super) month: u64,
+    pub month: u64,
     /// 1 to 31.
-    pub(super) day: u64,
+    pub day: u64,
 }
 
 /// From the first of March of the year 0 to the first of January 1970.
@@ -19,7 +20,7 @@ impl Date {
     /// The date so many days after the first of January 1970.
     ///
     /// Counted in years that begin in March, so that the leap day is the last one.
-    pub(super) const fn after_1970(days: u64) -> Self {
+    pub const fn after_1970(days: u64) -> Self {
         let days = days + DAYS_BEFORE_1970;
         let of_era = days % DAYS_OF_ERA;
         let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
@@ -36,7 +37,7 @@ impl Date {
 
     /// How many days after the first of January 1970 this is; `None` if there is no such day, or
     /// it is earlier.
-    pub(super) fn days_after_1970(self) -> Option<u64> {
+    pub fn days_after_1970(self) -> Option<u64> {
         if !(1..=12).contains(&self.month) || !(1..=31).contains(&self.day) || self.year > 9999 {
             return None;
         }

@@ -28,8 +28,6 @@ mod control;
 mod directory;
 mod discovery;
 mod events;
-#[cfg(feature = "ground")]
-pub mod ground;
 mod guard;
 mod handlers;
 mod inquiries;
@@ -38,11 +36,9 @@ mod list;
 mod liveness;
 #[cfg(test)]
 mod machines;
-#[cfg(feature = "mobility")]
-pub mod mobility;
 mod outbox;
-#[cfg(test)]
-mod rig;
+#[cfg(any(test, feature = "arbitrary"))]
+pub mod rig;
 mod safety;
 mod share;
 mod stack;
@@ -58,6 +54,7 @@ use crate::address::JausId;
 use crate::codec::ServiceId;
 use crate::endpoint::Received;
 
+pub use calendar::Date;
 pub use client::{
     CannotSubscribe, ControlId, ControlLost, ControlNews, ControlRefused, Outage, Rejection,
     SubscriptionEnd, SubscriptionId, SubscriptionNews, Topic, When,
@@ -157,9 +154,10 @@ pub fn code_of(payload: &[u8]) -> Option<u16> {
     payload.first_chunk().map(|&code| u16::from_le_bytes(code))
 }
 
-/// Reads a message that has the right code, and traces what cannot be read: a peer's mistake is
+/// Decodes a message that has the right code, and traces what cannot be read: a peer's mistake is
 /// no error of ours.
-fn read<M: crate::codec::Message>(received: &Received) -> Option<M> {
+#[must_use]
+pub fn read<M: crate::codec::Message>(received: &Received) -> Option<M> {
     M::decode(&received.payload)
         .inspect_err(|error| {
             tracing::debug!(source = %received.source, %error, "message cannot be read");

@@ -1,5 +1,11 @@
 //! For tests: services without a stack, whose standing and time are set by hand.
+#![allow(
+    clippy::missing_panics_doc,
+    clippy::unwrap_used,
+    reason = "a test that cannot go on fails"
+)]
 
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use super::context::News;
@@ -11,17 +17,19 @@ use crate::endpoint::Received;
 use crate::wire::{Broadcast, Priority};
 
 /// The client that is in control from the beginning.
-pub(crate) const CLIENT: JausId = JausId::new(42, 1, 1);
+pub const CLIENT: JausId = JausId::new(42, 1, 1);
 /// Somebody else.
-pub(crate) const STRANGER: JausId = JausId::new(42, 2, 1);
+pub const STRANGER: JausId = JausId::new(42, 2, 1);
 
 /// Services, and what a stack would know.
-pub(crate) struct Rig {
-    pub(crate) services: Vec<Box<dyn Service>>,
-    pub(crate) now: Instant,
-    pub(crate) news: News,
+pub struct Rig {
+    /// The services, in the order in which they are offered messages.
+    pub services: Vec<Box<dyn Service>>,
+    /// The virtual time.
+    pub now: Instant,
+    news: News,
     /// Whether [`CLIENT`] shows life at each wake-up.
-    pub(crate) client_lives: bool,
+    pub client_lives: bool,
     life: Life,
     standing: Standing,
     out: Outbox,
@@ -33,7 +41,7 @@ impl Rig {
         clippy::disallowed_methods,
         reason = "any moment will do as the beginning of virtual time"
     )]
-    pub(crate) fn new(services: Vec<Box<dyn Service>>) -> Self {
+    pub fn new(services: Vec<Box<dyn Service>>) -> Self {
         let mut rig = Self {
             services,
             now: Instant::now(),
@@ -49,7 +57,7 @@ impl Rig {
     }
 
     /// Brings the component into another state, or under the control of another client.
-    pub(crate) fn stand(&mut self, state: State, controller: Option<JausId>) {
+    pub fn stand(&mut self, state: State, controller: Option<JausId>) {
         let controller = controller.map(|id| Controller { id, authority: 127 });
         let before = std::mem::replace(
             &mut self.standing,
@@ -70,7 +78,7 @@ impl Rig {
     }
 
     /// Hands a message to the first service that wants it; says whether one did.
-    pub(crate) fn send<M: Message>(&mut self, source: JausId, message: &M) -> bool {
+    pub fn send<M: Message>(&mut self, source: JausId, message: &M) -> bool {
         let received = Received {
             source,
             destination: self.out.source(),
@@ -88,25 +96,25 @@ impl Rig {
     }
 
     /// The answer to a query, if there is one.
-    pub(crate) fn ask<R: Message>(&mut self, query: &impl Message) -> Option<R> {
+    pub fn ask<R: Message>(&mut self, query: &impl Message) -> Option<R> {
         assert!(self.send(STRANGER, query), "nobody wants the query");
         self.answer()
     }
 
     /// The next message that was sent.
-    pub(crate) fn answer<R: Message>(&mut self) -> Option<R> {
+    pub fn answer<R: Message>(&mut self) -> Option<R> {
         self.out.pop().map(|sent| R::decode(&sent.payload).unwrap())
     }
 
     /// The code of the next message that was sent.
-    pub(crate) fn answer_code(&mut self) -> Option<u16> {
+    pub fn answer_code(&mut self) -> Option<u16> {
         self.out
             .pop()
             .and_then(|sent| super::code_of(&sent.payload))
     }
 
     /// Lets time pass, and wakes the services when they want it.
-    pub(crate) fn run(&mut self, duration: Duration) {
+    pub fn run(&mut self, duration: Duration) {
         let end = self.now + duration;
         while let Some(wake) = self.poll_timeout().filter(|&wake| wake <= end) {
             self.now = self.now.max(wake);
@@ -116,7 +124,20 @@ impl Rig {
         self.wake();
     }
 
-    pub(crate) fn poll_timeout(&self) -> Option<Instant> {
+    /// The codes of queries whose answers the services have said to have changed.
+    pub fn changed(&mut self) -> &mut BTreeSet<u16> {
+        &mut self.news.changed
+    }
+
+    /// The codes of commands that have come to an end, and whether to the wanted one.
+    #[must_use]
+    pub fn ended(&self) -> &[(u16, bool)] {
+        &self.news.ended
+    }
+
+    /// When the services want to be woken next.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Instant> {
         let services = self.services.iter();
         services.filter_map(|service| service.poll_timeout()).min()
     }

@@ -135,23 +135,4 @@ mod tests {
         let controlled = |stack: Stack| stack.access_control(AccessControl::new());
         assert_eq!(refused(handlers(), controlled), Ok(()));
     }
-
-    #[cfg(feature = "mobility")]
-    #[test]
-    fn a_driver_of_a_vehicle_needs_management_and_its_sensors_do_not() {
-        use crate::service::mobility::Vehicle;
-        use crate::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
-        let rover = SkidSteer::new(SkidSteerConfig::default());
-        let vehicle = Vehicle::new(Pilot::new(rover, Frame::default()));
-        let check = |service| check(&service, false, &Standing::default());
-        assert!(matches!(
-            check(vehicle.primitive_driver()),
-            Err(UnsafeService::NoManagement { .. })
-        ));
-        assert!(matches!(
-            check(vehicle.local_path_segment_driver()),
-            Err(UnsafeService::NoManagement { .. })
-        ));
-        assert_eq!(check(vehicle.velocity_state_sensor()), Ok(()));
-    }
 }

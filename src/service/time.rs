@@ -59,7 +59,8 @@ impl TimeOfDay {
     }
 
     /// By how many milliseconds it is ahead of its clock.
-    pub(crate) fn ahead(&self) -> i64 {
+    #[must_use]
+    pub fn ahead(&self) -> i64 {
         self.0.ahead.load(Ordering::Relaxed)
     }
 
@@ -315,7 +316,7 @@ mod tests {
         let (mut rig, clock) = rig(BEFORE_MIDNIGHT);
         rig.stand(State::Standby, Some(CLIENT));
         rig.send(CLIENT, &set(Some(at(1, 12, 30)), Some(on(30, 12, 1))));
-        assert!(rig.news.changed.contains(&QueryTime::CODE));
+        assert!(rig.changed().contains(&QueryTime::CODE));
         assert_eq!(shown(&mut rig), (on(30, 12, 1), at(1, 12, 30)));
         clock.fetch_add(60_000, Ordering::Relaxed);
         assert_eq!(shown(&mut rig), (on(30, 12, 1), at(1, 12, 31)));
@@ -329,7 +330,7 @@ mod tests {
         rig.stand(State::Ready, None);
         rig.send(CLIENT, &set(None, Some(on(30, 12, 1))));
         assert_eq!(shown(&mut rig), before);
-        assert!(rig.news.changed.is_empty());
+        assert!(rig.changed().is_empty());
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use jaus::vehicle::{Drive, Limits, Motion, Platform, Pose, SkidSteer, SkidSteerConfig};
+use jaus_vehicle::motion::{Drive, Limits, Motion, Platform, Pose, SkidSteer, SkidSteerConfig};
 
 /// Wheels, an actuator that stops by itself without orders, and a pose sensor.
 pub(crate) struct Plant {
@@ -231,7 +231,7 @@ impl Wheels {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use jaus::vehicle::Effort;
+    use jaus_vehicle::motion::Effort;
 
     const FULL: Drive = Drive::Effort(Effort {
         forward: 1.0,

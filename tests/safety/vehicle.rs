@@ -8,9 +8,10 @@ use jaus::endpoint::{Outgoing, Received};
 use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
 use jaus::service::{
     Condition, Discovery, Handlers, Kind, Liveness, Management, MotionPolicy, Profile, Scope,
-    Service, Stack, Standing, State, StopCause, Time, TimeOfDay, Timing, mobility,
+    Service, Stack, Standing, State, StopCause, Time, TimeOfDay, Timing,
 };
-use jaus::vehicle::{Drive, Effort, Frame, Limits, Motion, Pilot, Platform, Pose};
+use jaus_vehicle::mobility;
+use jaus_vehicle::motion::{Drive, Effort, Frame, Limits, Motion, Pilot, Platform, Pose};
 
 use crate::cell::{Cell, Driver, Fault};
 use crate::plant::{SharedPlant, Wheels};

@@ -1,11 +1,11 @@
 //! Components to be put in the place of recorded ones.
 
 use jaus::address::JausId;
-use jaus::service::mobility::Vehicle;
 use jaus::service::{
     Discovery, Kind, Liveness, Management, Profile, Scope, Service, Stack, Timing, Transport,
 };
-use jaus::vehicle::{Frame, Limits, Pilot, SkidSteer, SkidSteerConfig};
+use jaus_vehicle::mobility::Vehicle;
+use jaus_vehicle::motion::{Frame, Limits, Pilot, SkidSteer, SkidSteerConfig};
 
 /// A component that can be controlled and driven, as `jaus vehicle` is.
 pub(crate) fn vehicle(id: JausId) -> Stack {

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::view::{Capture, Network};
 use jaus::wire::{Frame, judp};
+use jaus_view::{Capture, Network};
 
 /// A captured datagram.
 #[derive(Debug, Clone)]

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
 
-use jaus::view::Capture;
 use jaus::wire::judp;
+use jaus_view::Capture;
 
 /// The octets of one direction of a connection, in order.
 pub(crate) type Streams = BTreeMap<(u16, u16), Vec<u8>>;

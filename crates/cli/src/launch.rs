@@ -16,7 +16,7 @@ use super::{output, runtime, settings};
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::{Config, Node};
-use jaus::parts::{Part, PartError, Seat};
+use jaus_vehicle::parts::{Part, PartError, Seat};
 
 /// The flags of a program that is one [`Part`].
 pub trait Ready: Args {
@@ -68,7 +68,7 @@ struct Program<F: Args> {
 
 /// What is logged without `-v`: warnings of every module, such as an emergency or a log that cannot be
 /// written, and what parts report of themselves.
-const USUAL: &str = "warn,jaus::parts=info,jaus_ocu=info,jaus_ra=info,jaus_cli=info";
+const USUAL: &str = "warn,jaus_vehicle=info,jaus_ocu=info,jaus_ra=info,jaus_cli=info";
 
 /// Runs a program to its end: reads flags and settings, takes a place on a node, lets the part run
 /// until Ctrl-C or SIGTERM, and takes leave.
@@ -247,11 +247,7 @@ mod tests {
     #[test]
     fn warnings_of_every_module_are_logged_without_a_flag() {
         let usual: Targets = USUAL.parse().unwrap();
-        for target in [
-            "jaus::service::control",
-            "jaus::view::log",
-            "jaus::endpoint",
-        ] {
+        for target in ["jaus::service::control", "jaus_view::log", "jaus::endpoint"] {
             assert!(
                 usual.would_enable(target, &tracing::Level::WARN),
                 "{target}"
@@ -261,6 +257,6 @@ mod tests {
                 "{target}"
             );
         }
-        assert!(usual.would_enable("jaus::parts::planner", &tracing::Level::INFO));
+        assert!(usual.would_enable("jaus_vehicle::parts::planner", &tracing::Level::INFO));
     }
 }

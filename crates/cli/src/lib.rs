@@ -1,6 +1,7 @@
 //! What the programs of this project share: flags, settings files, output, exit statuses, and the
 //! [`launch`] of a ready component. For programs of your own it is a convenience, and changes as
 //! ours need it.
+#![forbid(unsafe_code)]
 #![warn(
     clippy::print_stdout,
     clippy::print_stderr,
@@ -22,4 +23,4 @@ mod systemd;
 pub use failure::{Failure, Outcome};
 pub use launch::{Ready, launch};
 
-pub use jaus::view::tree;
+pub use jaus_view::tree;

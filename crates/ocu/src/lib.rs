@@ -4,6 +4,7 @@
 //! [`Station`] is the ready component. Its desk speaks JAUS, its server speaks HTTP and WebSocket to
 //! the pages; between them go wishes one way and snapshots the other. Manual drive goes through the
 //! [`Stick`](stick::Stick), which lets go of itself when nobody pushes it.
+#![forbid(unsafe_code)]
 
 mod answer;
 #[expect(

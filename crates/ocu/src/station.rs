@@ -9,7 +9,7 @@ use super::desk::Desk;
 use super::server::{Door, Server};
 use super::token::Token;
 use jaus::link::interface;
-use jaus::parts::{Part, PartError, Seat};
+use jaus_vehicle::parts::{Part, PartError, Seat};
 
 /// An operator's station, with its page.
 #[derive(Debug, Clone)]

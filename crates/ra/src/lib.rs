@@ -13,6 +13,7 @@
 //! Ids have four octets here, [`RaId`]: subsystem, node, component and instance, where the number of
 //! a component names its type. The subsystem speaks through its *communicator* (component 35),
 //! each node through its *node manager* (component 1).
+#![forbid(unsafe_code)]
 
 pub mod carrier;
 pub mod connection;

@@ -8,11 +8,11 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use jaus::view::{Capture, Network};
 use jaus::wire::judp;
 use jaus_ra::node::{Component, Event, Node, RaNode, Settings, Subsystem};
 use jaus_ra::{Counter, RaId};
 use jaus_test_kit::evidence;
+use jaus_view::{Capture, Network};
 
 const A: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 0, 1));
 const B: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 77, 0, 2));

@@ -146,11 +146,11 @@ fn set(id: u8, element_list: Vec<ElementRec>) -> SetElement {
 #[test]
 fn a_request_is_confirmed_with_its_number_and_can_be_read_back() {
     let mut rig = rig();
-    rig.news.changed.clear();
+    rig.changed().clear();
     rig.send(CLIENT, &set(0x2C, records(&[(1, 0, 2), (2, 1, 0)])));
     let confirmed: ConfirmElementRequest = rig.answer().unwrap();
     assert_eq!(confirmed.request_id, 0x2C);
-    assert!(rig.news.changed.contains(&QueryElementCount::CODE));
+    assert!(rig.changed().contains(&QueryElementCount::CODE));
     let count: ReportElementCount = rig.ask(&QueryElementCount).unwrap();
     assert_eq!(count.element_count, 2);
     let list: ReportElementList = rig.ask(&QueryElementList).unwrap();

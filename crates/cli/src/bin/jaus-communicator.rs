@@ -9,10 +9,10 @@ use clap::Args;
 use jaus::address::JausId;
 use jaus::link::serial;
 use jaus::node::{Config, Local, units};
-use jaus::parts::Part;
-use jaus::parts::{Communicator, DEBUG_ADDRESS};
-use jaus::view::{JournalFormat, JournalSettings};
 use jaus_cli::{self, Failure, Ready};
+use jaus_vehicle::parts::Part;
+use jaus_vehicle::parts::{Communicator, DEBUG_ADDRESS};
+use jaus_view::{JournalFormat, JournalSettings};
 
 #[derive(Args)]
 struct Flags {

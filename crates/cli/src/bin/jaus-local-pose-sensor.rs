@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::parts::{Part, PoseSensor};
-use jaus::vehicle::{Pose, wrap};
 use jaus_cli::failure::Failure;
 use jaus_cli::runtime::{between, seconds};
 use jaus_cli::{Ready, launch};
+use jaus_vehicle::motion::{Pose, wrap};
+use jaus_vehicle::parts::{Part, PoseSensor};
 
 #[derive(Args)]
 struct Flags {

@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::parts::{Part, VectorDriver};
-use jaus::vehicle::Limits;
 use jaus_cli::failure::Failure;
 use jaus_cli::runtime::{between, seconds};
 use jaus_cli::{Ready, launch};
+use jaus_vehicle::motion::Limits;
+use jaus_vehicle::parts::{Part, VectorDriver};
 
 #[derive(Args)]
 struct Flags {

@@ -7,9 +7,9 @@ use std::process::ExitCode;
 use clap::Args;
 use jaus::address::JausId;
 use jaus::component::Kind;
-use jaus::parts::Part;
 use jaus_cli::{Failure, Ready, launch};
 use jaus_ocu::{Listen, Station, Token};
+use jaus_vehicle::parts::Part;
 
 #[derive(Args)]
 struct Flags {

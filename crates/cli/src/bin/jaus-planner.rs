@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::mission::{LostLink, Settings, Vehicle};
-use jaus::parts::{Part, Planner};
 use jaus_cli::failure::Failure;
 use jaus_cli::{Ready, launch, runtime};
+use jaus_vehicle::mission::{LostLink, Settings, Vehicle};
+use jaus_vehicle::parts::{Part, Planner};
 
 #[derive(Args)]
 struct Flags {

@@ -5,13 +5,13 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
-use jaus::actuator::{MotorConfig, WheelsConfig};
 use jaus::address::JausId;
-use jaus::parts::{Motors, Part, PrimitiveDriver, Stop};
-use jaus::vehicle::Limits;
 use jaus_cli::failure::Failure;
 use jaus_cli::runtime::{between, seconds};
 use jaus_cli::{Ready, launch};
+use jaus_vehicle::actuator::{MotorConfig, WheelsConfig};
+use jaus_vehicle::motion::Limits;
+use jaus_vehicle::parts::{Motors, Part, PrimitiveDriver, Stop};
 
 #[derive(Args)]
 struct Flags {
@@ -128,9 +128,9 @@ mod gpio {
     use std::time::Duration;
 
     use clap::Args;
-    use jaus::actuator::StepperConfig;
-    use jaus::parts::GpioMotors;
     use jaus_cli::runtime::between;
+    use jaus_vehicle::actuator::StepperConfig;
+    use jaus_vehicle::parts::GpioMotors;
 
     #[derive(Args)]
     #[command(next_help_heading = "Stepper motors on GPIO lines")]

@@ -11,7 +11,6 @@ use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::link::{Group, STANDARD_PORT};
 use jaus::node::{Config, units};
-use jaus::parts::Part;
 use jaus_cli::output::Output;
 use jaus_cli::runtime::seconds;
 use jaus_cli::{Failure, Ready, launch};
@@ -19,6 +18,7 @@ use jaus_ra::RaId;
 use jaus_ra::carrier::Dialect;
 use jaus_ra::gateway::{Gateway, RaGateway, Report, Settings, Show};
 use jaus_ra::ids::{self, ComponentEntry, SubsystemEntry};
+use jaus_vehicle::parts::Part;
 
 #[derive(Args)]
 struct Flags {

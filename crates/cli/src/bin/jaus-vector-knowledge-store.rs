@@ -5,12 +5,12 @@ use std::process::ExitCode;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::parts::{Broken, KnowledgeStore, Part};
-use jaus::vehicle::Frame;
-use jaus::world::{Picture, Raster};
 use jaus_cli::failure::Failure;
 use jaus_cli::runtime::between;
 use jaus_cli::{Ready, launch};
+use jaus_vehicle::motion::Frame;
+use jaus_vehicle::parts::{Broken, KnowledgeStore, Part};
+use jaus_vehicle::world::{Picture, Raster};
 
 #[derive(Args)]
 struct Flags {

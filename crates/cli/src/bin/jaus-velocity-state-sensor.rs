@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::parts::{Part, VelocitySensor};
 use jaus_cli::failure::Failure;
 use jaus_cli::runtime::{between, seconds};
 use jaus_cli::{Ready, launch};
+use jaus_vehicle::parts::{Part, VelocitySensor};
 
 #[derive(Args)]
 struct Flags {

@@ -9,8 +9,8 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::messages::core::{ConfirmEventRequest, CreateEvent};
-use jaus::view::{Capture, JAUS_PORT, Network, Timestamp};
 use jaus::wire::{Frame, judp};
+use jaus_view::{Capture, JAUS_PORT, Network, Timestamp};
 
 /// Offset of the destination in a datagram: version, then type, size and flags.
 const DESTINATION: std::ops::Range<usize> = 5..9;

@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use jaus::codec::Message;
 use jaus::messages::core::{CreateEvent, RejectEventRequest};
-use jaus::view::Dictionary;
 use jaus::wire::Frame;
 use jaus_test_kit::evidence;
+use jaus_view::Dictionary;
 use serde_json::{Value as Json, json};
 
 use crate::capture::said_by;

@@ -7,8 +7,8 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::messages::core::{CancelEvent, ConfirmEventRequest, CreateEvent};
-use jaus::view::Dictionary;
 use jaus_test_kit::evidence;
+use jaus_view::Dictionary;
 
 use crate::capture::{Said, said_by};
 use crate::client::{Client, Exchange, Pauses, is_answered};

@@ -1,7 +1,7 @@
 //! Captures with random damage: everything that can be read is, and nothing panics.
 
 use crate::support::{Message, RAW, ip_packet, pcap, pcapng};
-use jaus::view::{Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
+use jaus_view::{Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 
 /// A small generator, the same in every run (xorshift64*).
 struct Random(u64);

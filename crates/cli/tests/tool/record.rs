@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::support::{own_group, run};
 use etherparse::PacketBuilder;
-use jaus::view::{CaptureWriter, LinkType, Timestamp};
+use jaus_view::{CaptureWriter, LinkType, Timestamp};
 
 /// A file of this test's own, removed at the end.
 struct File(std::path::PathBuf);

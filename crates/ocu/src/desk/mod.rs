@@ -31,8 +31,8 @@ use super::stick::{Push, Stick};
 use super::wish::Wish;
 use jaus::address::JausId;
 use jaus::component::Component;
-use jaus::parts::PartError;
-use jaus::view::Timestamp;
+use jaus_vehicle::parts::PartError;
+use jaus_view::Timestamp;
 
 /// What becomes of a wish: done, or why not.
 pub(super) type Reply = Box<dyn FnOnce(Result<(), String>) + Send>;

@@ -27,7 +27,7 @@ use super::page::{self, File};
 use super::token::Token;
 use jaus::address::JausId;
 use jaus::node::Node;
-use jaus::view::Dictionary;
+use jaus_view::Dictionary;
 
 /// Who may come in, and whom they meet.
 pub(super) struct Door {

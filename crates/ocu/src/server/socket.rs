@@ -18,7 +18,7 @@ use crate::PageId;
 use crate::answer::Said as Answer;
 use crate::desk::{Order, Reply};
 use crate::wish::{Frame, MessageFilter, Said, Wish};
-use jaus::view::Filter;
+use jaus_view::Filter;
 
 /// The version of the protocol between page and station.
 const VERSION: u32 = 1;

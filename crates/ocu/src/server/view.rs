@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 use crate::wish::MessageFilter;
 use jaus::node::{Node, Tap, Tapped};
-use jaus::view::{Dictionary, Entry, Filter, FilterError, Links, MessageStream};
+use jaus_view::{Dictionary, Entry, Filter, FilterError, Links, MessageStream};
 
 /// What a page sees of the messages.
 pub(super) struct MessageView<'s> {

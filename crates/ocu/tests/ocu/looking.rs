@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use jaus::parts::{KnowledgeStore, Part};
 use jaus_ocu::Station;
+use jaus_vehicle::parts::{KnowledgeStore, Part};
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;

@@ -22,8 +22,8 @@ use jaus::endpoint::Received;
 use jaus::link::udp::{self, UdpLink};
 use jaus::link::{Group, Interface, Interfaces, Ip, STANDARD_PORT, Slab};
 use jaus::node::{Node, Port, Resident};
-use jaus::parts::{Part, PartError, Seat};
 use jaus::wire::Priority;
+use jaus_vehicle::parts::{Part, PartError, Seat};
 
 /// The gateway between RA systems and JAUS, as a program runs it.
 #[derive(Debug, Clone)]

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jaus::address::JausId;
-use jaus::service::mobility::Vehicle;
 use jaus::service::{Kind, Management, Service, Stack, State};
-use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_ra::gateway::{Counter, Settings, Show};
 use jaus_ra::node::Event;
 use jaus_ra::{Message, RaId};
+use jaus_vehicle::mobility::Vehicle;
+use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 
 use crate::world::{World, stack, subsystem};
 use jaus_test_kit::rover::bytes;

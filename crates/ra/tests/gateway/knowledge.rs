@@ -6,12 +6,12 @@ use bytes::{BufMut, Bytes, BytesMut};
 use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::messages::ground::{QueryVksBounds, ReportVksBounds};
-use jaus::service::ground::WorldStore;
 use jaus::service::{Event, Kind};
-use jaus::vehicle::Frame;
-use jaus::world;
 use jaus_ra::gateway::Settings;
 use jaus_ra::{Message, RaId};
+use jaus_vehicle::ground::WorldStore;
+use jaus_vehicle::motion::Frame;
+use jaus_vehicle::world;
 use redb::backends::InMemoryBackend;
 
 use crate::world::{COMMANDER, World, stack, subsystem};

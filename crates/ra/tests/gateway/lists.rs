@@ -14,11 +14,11 @@ use jaus::messages::mobility::{
     ExecuteList, QueryActiveElement, QueryTravelSpeed, ReportActiveElement, ReportTravelSpeed,
     SetGlobalWaypoint, global_waypoint_list_driver,
 };
-use jaus::service::mobility::Vehicle;
 use jaus::service::{Event, Kind, Management, Patience, Service};
-use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_ra::gateway::{Counter, Settings};
 use jaus_ra::{Message, RaId};
+use jaus_vehicle::mobility::Vehicle;
+use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 
 use crate::world::{World, stack, subsystem};
 use jaus_test_kit::rover::{Rover, SUBSYSTEM, bytes};

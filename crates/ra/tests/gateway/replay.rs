@@ -8,16 +8,16 @@ use std::time::Duration;
 
 use bytes::{Buf, Bytes, BytesMut};
 use jaus::address::JausId;
-use jaus::service::ground::WorldStore;
-use jaus::service::mobility::Vehicle;
 use jaus::service::{AccessControl, Kind, Service, Stack};
-use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
-use jaus::view::{Capture, Network};
 use jaus::wire::judp;
-use jaus::world;
 use jaus_ra::RaId;
 use jaus_ra::gateway::{Counter, Settings};
 use jaus_test_kit::evidence;
+use jaus_vehicle::ground::WorldStore;
+use jaus_vehicle::mobility::Vehicle;
+use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+use jaus_vehicle::world;
+use jaus_view::{Capture, Network};
 use redb::backends::InMemoryBackend;
 
 use crate::world::{World, address, stack};

@@ -6,11 +6,11 @@ use std::time::Duration;
 use jaus::address::JausId;
 use jaus::messages::core::{QueryTimeout, ReportTimeout, RequestControl, Resume, Standby};
 use jaus::messages::mobility::{ExecuteList, SetLocalVector, SetTravelSpeed, SetWrenchEffort};
-use jaus::service::mobility::Vehicle;
 use jaus::service::{Kind, Management, Service};
-use jaus::vehicle::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_ra::gateway::Settings;
 use jaus_ra::{Message, RaId};
+use jaus_vehicle::mobility::Vehicle;
+use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
 
 use crate::world::{COMMANDER, Power, World, stack, subsystem};
 use jaus_test_kit::rover::{Rover, SUBSYSTEM, bytes};

@@ -7,10 +7,10 @@ use std::path::Path;
 use bytes::Bytes;
 use jaus::codec::Message;
 use jaus::messages::{ra, ra33};
-use jaus::view::{Capture, Datagram, Network};
 use jaus::wire::ra::{HEADER_LEN, Header};
 use jaus::wire::{Frame, judp};
 use jaus_test_kit::evidence;
+use jaus_view::{Capture, Datagram, Network};
 
 use super::{Definitions, through_both};
 

@@ -4,9 +4,9 @@
 use std::fs::File;
 
 use bytes::Bytes;
-use jaus::view::{Capture, Dictionary, MessageLog, Network};
 use jaus::wire::judp;
 use jaus_test_kit::evidence;
+use jaus_view::{Capture, Dictionary, MessageLog, Network};
 use serde_json::Value;
 
 /// The lines of a capture as JSON.
@@ -82,7 +82,7 @@ fn shown(datagram: &Bytes) -> Value {
     let mut log = MessageLog::new(&dictionary);
     let line = log.read(
         None,
-        &jaus::view::Datagram {
+        &jaus_view::Datagram {
             source: ([10, 0, 0, 1], judp::PORT).into(),
             destination: ([10, 0, 0, 2], judp::PORT).into(),
             payload: datagram[..].into(),

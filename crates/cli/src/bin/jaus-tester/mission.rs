@@ -10,11 +10,11 @@ use std::time::{Duration, SystemTime};
 use clap::Args;
 use jaus::component::{Component, Kind};
 use jaus::node::{Tap, Tapped};
-use jaus::parts::tester::{MissionTest, figure, steps};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::Output;
 use jaus_cli::runtime;
+use jaus_vehicle::parts::tester::{MissionTest, figure, steps};
 use tokio::sync::mpsc;
 
 /// Drive a mission through all components of a vehicle, and check each answer

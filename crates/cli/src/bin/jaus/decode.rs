@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use bytes::Bytes;
 use clap::Args;
-use jaus::view::{self, Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, say};
+use jaus_view::{self, Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};
 
 use crate::definitions::Definitions;
 
@@ -138,7 +138,7 @@ fn read_hex(
         if text.trim().is_empty() {
             continue;
         }
-        match view::from_hex(&text) {
+        match jaus_view::from_hex(&text) {
             Ok(octets) => printer.print(&dictionary.line(&Bytes::from(octets)))?,
             Err(error) => {
                 let offset = error.offset as u64;

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use jaus::view::Dictionary;
 use jaus_cli::failure::Failure;
 use jaus_cli::output::say;
+use jaus_view::Dictionary;
 
 #[derive(Args)]
 pub(crate) struct Definitions {

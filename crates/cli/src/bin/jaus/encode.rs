@@ -3,9 +3,9 @@
 use std::io::{self, BufRead};
 
 use clap::Args;
-use jaus::view::{Dictionary, Line, Request, Unreadable, to_hex};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::Output;
+use jaus_view::{Dictionary, Line, Request, Unreadable, to_hex};
 
 use crate::definitions::Definitions;
 

@@ -10,11 +10,11 @@ use jaus::address::JausId;
 use jaus::codec::report_code;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::node::Port;
-use jaus::view::{Dictionary, Line, Request};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
+use jaus_view::{Dictionary, Line, Request};
 use serde::Serialize;
 use tokio::time::{Instant, timeout_at};
 

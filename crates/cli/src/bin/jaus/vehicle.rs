@@ -14,14 +14,14 @@ use jaus::component::{
     TimeOfDay,
 };
 use jaus::node::Node;
-use jaus::service::mobility::Vehicle;
 use jaus::service::{MotionPolicy, StopCause};
-use jaus::vehicle::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::Output;
 use jaus_cli::runtime::{self, Clock, between};
 use jaus_cli::tree;
+use jaus_vehicle::mobility::Vehicle;
+use jaus_vehicle::motion::{Frame, Limits, Motion, Pilot, SkidSteer, SkidSteerConfig};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::node;

@@ -65,8 +65,8 @@ fn every_message_of_the_capture_is_converted_and_comes_back() {
 
     use jaus_test_kit::evidence;
 
-    use jaus::view::{Capture, Network};
     use jaus::wire::ra::{HEADER_LEN, Header};
+    use jaus_view::{Capture, Network};
 
     let file = evidence::captures().join("openjaus33/openjaus33-opc-lo.pcap");
     let mut capture = Capture::new(std::fs::File::open(file).unwrap()).unwrap();

@@ -4,8 +4,8 @@ use std::fmt;
 use std::path::Path;
 use std::time::Duration;
 
-use jaus::parts::tester::plot::{Line, Plot};
 use jaus_cli::failure::Failure;
+use jaus_vehicle::parts::tester::plot::{Line, Plot};
 use serde::{Deserialize, Serialize};
 
 use super::Rate;

@@ -10,13 +10,13 @@ use std::time::Duration;
 use clap::Args;
 use jaus::component::{Component, Kind};
 use jaus::node::Node;
-use jaus::parts::{
-    Communicator, DEBUG_ADDRESS, PathDriver, Planner, PoseSensor, PrimitiveDriver, VectorDriver,
-    VelocitySensor,
-};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::runtime;
 use jaus_ocu::Station;
+use jaus_vehicle::parts::{
+    Communicator, DEBUG_ADDRESS, PathDriver, Planner, PoseSensor, PrimitiveDriver, VectorDriver,
+    VelocitySensor,
+};
 
 use operator::{Ending, Operator};
 use story::{Story, Who};
@@ -217,7 +217,7 @@ fn start_part(
     node: &Node,
     number: u8,
     name: &'static str,
-    part: impl jaus::parts::Part,
+    part: impl jaus_vehicle::parts::Part,
 ) -> Result<(), Failure> {
     let id = system.start(node, number, name, part)?;
     story.tell(Who::System, format_args!("starts {id}, the {name}"))

@@ -8,8 +8,8 @@ use std::{fs, process};
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::{Config, Node};
-use jaus::parts::{KnowledgeStore, Part, PartError, Seat};
 use jaus_cli::failure::Failure;
+use jaus_vehicle::parts::{KnowledgeStore, Part, PartError, Seat};
 use tokio::task::JoinSet;
 
 /// The operator's subsystem.

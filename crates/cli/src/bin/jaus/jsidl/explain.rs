@@ -8,7 +8,6 @@ use std::process::ExitCode;
 
 use bytes::Bytes;
 use clap::Args;
-use jaus::view;
 use jaus::wire::ra::RaId;
 use jaus::wire::{Frame, Version, judp};
 use jaus_cli::failure::Failure;
@@ -268,7 +267,7 @@ fn read(input: impl Read, path: &Path) -> Result<Vec<u8>, Failure> {
 /// Digits as people copy them: with blanks, commas, colons or `0x` between octets.
 fn from_hex(text: &str) -> Result<Vec<u8>, Failure> {
     let plain = text.replace("0x", " ").replace([',', ':'], " ");
-    let octets = view::from_hex(&plain).map_err(|error| {
+    let octets = jaus_view::from_hex(&plain).map_err(|error| {
         Failure::new(format!(
             "{text}: neither a file nor hexadecimal digits: {error}"
         ))

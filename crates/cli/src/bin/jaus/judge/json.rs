@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use jaus::view::{Dictionary, Line};
+use jaus_view::{Dictionary, Line};
 use serde::Serialize;
 
 use super::report::conclusion;

@@ -21,11 +21,11 @@ use std::time::Duration;
 
 use clap::Args;
 use jaus::address::JausId;
-use jaus::view::Dictionary;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
 use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
+use jaus_view::Dictionary;
 
 use panel::Panel;
 use papers::Papers;

@@ -4,10 +4,10 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use jaus::view::Dictionary;
 use jaus_cli::failure::Failure;
 use jaus_cli::output::{self, Output};
 use jaus_cli::runtime::Clock;
+use jaus_view::Dictionary;
 
 use super::report::Report;
 use super::step::{Form, Step};

@@ -12,9 +12,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use etherparse::PacketBuilder;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::node::Node;
-use jaus::view::{CaptureWriter, InterfaceNumber, LinkType, Timestamp};
 use jaus::wire::{Flags, Frame, judp};
 use jaus_cli::failure::Failure;
+use jaus_view::{CaptureWriter, InterfaceNumber, LinkType, Timestamp};
 
 /// Routers that a recorded packet may pass, for want of a better number.
 const TTL: u8 = 16;

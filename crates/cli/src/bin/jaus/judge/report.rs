@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use jaus::view::{Content, Dictionary, to_hex};
+use jaus_view::{Content, Dictionary, to_hex};
 
 use super::step::Form;
 use super::subject::Subject;

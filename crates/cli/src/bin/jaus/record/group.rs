@@ -5,8 +5,8 @@ use std::task::Poll;
 
 use jaus::link::udp::{Settings, UdpLink};
 use jaus::link::{Group, Interfaces, Slab, interface::Ip};
-use jaus::view::udp_packet;
 use jaus_cli::failure::Failure;
+use jaus_view::udp_packet;
 
 use super::Packet;
 

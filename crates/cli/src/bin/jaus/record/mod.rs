@@ -18,10 +18,10 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use bytes::Bytes;
 use clap::Args;
 use jaus::link::{Group, Interfaces};
-use jaus::view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType, Timestamp};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::say;
 use jaus_cli::runtime;
+use jaus_view::{CaptureWriter, InterfaceNumber, JAUS_PORT, LinkType, Timestamp};
 use tokio::time::{MissedTickBehavior, interval};
 
 use filter::Filter;

@@ -4,9 +4,9 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use jaus::view::{Capture, Dictionary, Entry, Filter, MessageStream, Network};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::say;
+use jaus_view::{Capture, Dictionary, Entry, Filter, MessageStream, Network};
 
 use super::{Printer, lost_in};
 

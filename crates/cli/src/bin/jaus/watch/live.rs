@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use futures_util::StreamExt;
-use jaus::view::{Entry, Filter};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::say;
 use jaus_cli::runtime;
+use jaus_view::{Entry, Filter};
 use serde_json::Value as Json;
 use tokio_tungstenite::tungstenite::{Error, Message};
 

@@ -8,10 +8,10 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use jaus::view::{Dictionary, Entry, Filter};
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, colours_wanted};
 use jaus_cli::runtime;
+use jaus_view::{Dictionary, Entry, Filter};
 
 use tally::Tally;
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use jaus::view::{Entry, Timestamp};
+use jaus_view::{Entry, Timestamp};
 
 /// Kinds that are told apart; an attacker may invent more.
 const MOST: usize = 4096;

@@ -1,0 +1,375 @@
+//! The thread that sends a stepper motor its pulses. The rest of the program cannot delay them; they
+//! end with the program, and by themselves when the program hangs and repeats no command.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "pulses are made in real time, on a thread of their own"
+)]
+
+use std::io;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use super::{Actuator, Command, Stepper, StepperConfig, StepperPoll};
+use crate::motion::CommandDeadline;
+
+/// The lines to the driver of a stepper motor.
+pub trait Lines: Send {
+    /// Which way the next pulses turn the motor.
+    ///
+    /// # Errors
+    /// If the line can not be set.
+    fn set_direction(&mut self, backwards: bool) -> io::Result<()>;
+
+    /// Begins or ends a pulse.
+    ///
+    /// # Errors
+    /// If the line can not be set.
+    fn set_step(&mut self, high: bool) -> io::Result<()>;
+}
+
+/// A stepper motor on its lines. Dropping it ramps it down to a stop, and waits for that: half a second
+/// with the default settings, and 2 s at the most.
+pub struct PulseMotor {
+    shared: Arc<Shared>,
+    steps_per_metre: f64,
+    thread: Option<JoinHandle<()>>,
+}
+
+struct Shared {
+    state: Mutex<State>,
+    news: Condvar,
+}
+
+struct State {
+    command: Command,
+    deadline: CommandDeadline,
+    steps: i64,
+    fault: Option<String>,
+    /// Since when the motor has been dropped.
+    ends: Option<Instant>,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn new(deadline: Duration) -> Self {
+        Self {
+            command: Command::STOP,
+            deadline: CommandDeadline::new(deadline),
+            steps: 0,
+            fault: None,
+            ends: None,
+        }
+    }
+
+    /// What to do now: to stop, if the last command has expired.
+    fn command_at(&mut self, now: Instant) -> Command {
+        if self.command != Command::STOP && self.deadline.has_passed(now) {
+            tracing::warn!("the motor stops: its command was not repeated");
+            self.command = Command::STOP;
+        }
+        self.command
+    }
+
+    /// Whether the motor was dropped so long ago that its ramp must be over.
+    fn has_ramped_down(&self, now: Instant) -> bool {
+        let since = |ends| now.saturating_duration_since(ends);
+        self.ends
+            .is_some_and(|ends| since(ends) > PulseMotor::LAST_RAMP)
+    }
+
+    /// When to look again: at the next pulse, or when the command expires.
+    fn wakes_at(&self, next: Option<Instant>) -> Option<Instant> {
+        let expires = self.deadline.expires_at();
+        let expires = expires.filter(|_| self.command != Command::STOP);
+        [next, expires].into_iter().flatten().min()
+    }
+}
+
+impl PulseMotor {
+    /// Between two attempts to use lines that could not be set.
+    const RETRY: Duration = Duration::from_secs(1);
+    /// A motor that was dropped is given so long for its ramp to a stop.
+    const LAST_RAMP: Duration = Duration::from_secs(2);
+    /// How long a pulse lasts at least, and how long the direction is set before it: what slow
+    /// drivers need.
+    const PULSE: Duration = Duration::from_micros(5);
+
+    /// A motor at rest, on these lines.
+    ///
+    /// # Errors
+    /// If the system has no thread left.
+    pub fn start(config: StepperConfig, lines: impl Lines + 'static) -> io::Result<Self> {
+        let shared = Arc::new(Shared {
+            state: Mutex::new(State::new(config.deadline)),
+            news: Condvar::new(),
+        });
+        let of_thread = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("pulses".to_owned())
+            .spawn(move || run(&of_thread, Stepper::new(config), lines))?;
+        Ok(Self {
+            shared,
+            steps_per_metre: config.steps_per_metre,
+            thread: Some(thread),
+        })
+    }
+}
+
+impl Actuator for PulseMotor {
+    fn handle_time(&mut self, _: Instant) {}
+
+    fn command(&mut self, command: Command) {
+        let mut state = self.shared.lock();
+        state.deadline.restart(Some(Instant::now()));
+        if state.command != command {
+            state.command = command;
+            self.shared.news.notify_one();
+        }
+    }
+
+    fn travel(&self) -> f64 {
+        self.shared.lock().steps as f64 / self.steps_per_metre
+    }
+
+    fn fault(&self) -> Option<String> {
+        let fault = self.shared.lock().fault.clone();
+        let has_ended = self.thread.as_ref().is_some_and(JoinHandle::is_finished);
+        fault.or_else(|| has_ended.then(|| "the thread that sends pulses has ended".to_owned()))
+    }
+}
+
+impl Drop for PulseMotor {
+    fn drop(&mut self) {
+        let mut state = self.shared.lock();
+        state.ends = Some(Instant::now());
+        state.command = Command::STOP;
+        drop(state);
+        self.shared.news.notify_one();
+        if let Some(thread) = self.thread.take() {
+            // A thread that has panicked sends no pulses either.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Sends pulses until the motor is dropped, and then those of the ramp to a stop. While a line cannot
+/// be set the motor stands still and has a fault.
+fn run(shared: &Shared, mut stepper: Stepper, mut lines: impl Lines) {
+    let mut direction = None;
+    let mut state = shared.lock();
+    loop {
+        let now = Instant::now();
+        stepper.command(state.command_at(now));
+        match stepper.poll(now) {
+            StepperPoll::Wait(None) if state.ends.is_some() => return,
+            _ if state.has_ramped_down(now) => return,
+            StepperPoll::Wait(next) => {
+                let wake = state.wakes_at(next);
+                state = wait_for_news(shared, state, wake, now);
+            }
+            StepperPoll::Step { backwards } => {
+                drop(state);
+                let sent = pulse(&mut lines, backwards, &mut direction);
+                state = shared.lock();
+                if let Err(error) = sent {
+                    state.fault = Some(format!("the motor's lines cannot be set: {error}"));
+                    state = mend(shared, state, &mut lines);
+                    // It begins from rest; the pulse that failed is not counted.
+                    stepper = stepper.at_rest(state.steps);
+                    direction = None;
+                } else {
+                    state.steps = stepper.steps();
+                }
+            }
+        }
+    }
+}
+
+/// Waits until the lines can be set again, or the motor is dropped. Commands that come meanwhile are
+/// void.
+fn mend<'a>(
+    shared: &'a Shared,
+    mut state: MutexGuard<'a, State>,
+    lines: &mut impl Lines,
+) -> MutexGuard<'a, State> {
+    let mut retry = Instant::now() + PulseMotor::RETRY;
+    while state.ends.is_none() {
+        let now = Instant::now();
+        if now < retry {
+            state = wait_for_news(shared, state, Some(retry), now);
+            continue;
+        }
+        drop(state);
+        let works = lines.set_step(false).is_ok();
+        state = shared.lock();
+        if works {
+            state.fault = None;
+            break;
+        }
+        retry = now + PulseMotor::RETRY;
+    }
+    state.command = Command::STOP;
+    state
+}
+
+/// Waits for a new command or the end; until `wake` at most.
+fn wait_for_news<'a>(
+    shared: &'a Shared,
+    state: MutexGuard<'a, State>,
+    wake: Option<Instant>,
+    now: Instant,
+) -> MutexGuard<'a, State> {
+    let Some(wake) = wake else {
+        let state = shared.news.wait(state);
+        return state.unwrap_or_else(PoisonError::into_inner);
+    };
+    let pause = wake.saturating_duration_since(now);
+    match shared.news.wait_timeout(state, pause) {
+        Ok((state, _)) => state,
+        Err(poisoned) => poisoned.into_inner().0,
+    }
+}
+
+fn pulse(lines: &mut impl Lines, backwards: bool, direction: &mut Option<bool>) -> io::Result<()> {
+    if *direction != Some(backwards) {
+        lines.set_direction(backwards)?;
+        *direction = Some(backwards);
+        wait(PulseMotor::PULSE);
+    }
+    lines.set_step(true)?;
+    wait(PulseMotor::PULSE);
+    lines.set_step(false)
+}
+
+/// Waits for less than a scheduler would.
+fn wait(duration: Duration) {
+    let start = Instant::now();
+    while start.elapsed() < duration {
+        std::hint::spin_loop();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chip that keeps what its lines were set to, and breaks after so many pulses.
+    #[derive(Clone)]
+    struct Chip {
+        pulses: Arc<Mutex<Vec<bool>>>,
+        backwards: bool,
+        lasts: Arc<Mutex<usize>>,
+    }
+
+    impl Chip {
+        fn lasting(lasts: usize) -> Self {
+            Self {
+                pulses: Arc::default(),
+                backwards: false,
+                lasts: Arc::new(Mutex::new(lasts)),
+            }
+        }
+    }
+
+    impl Lines for Chip {
+        fn set_direction(&mut self, backwards: bool) -> io::Result<()> {
+            self.backwards = backwards;
+            Ok(())
+        }
+
+        fn set_step(&mut self, high: bool) -> io::Result<()> {
+            let mut pulses = self.pulses.lock().unwrap();
+            if pulses.len() >= *self.lasts.lock().unwrap() {
+                return Err(io::Error::other("the chip is gone"));
+            }
+            if high {
+                pulses.push(self.backwards);
+            }
+            Ok(())
+        }
+    }
+
+    fn drive(drive: f64) -> Command {
+        Command { drive, brake: 0.0 }
+    }
+
+    /// Repeats a command, as a pilot does.
+    fn command_until(motor: &mut PulseMotor, share: f64, is_so: impl Fn(&PulseMotor) -> bool) {
+        let start = Instant::now();
+        while !is_so(motor) {
+            motor.command(drive(share));
+            assert!(start.elapsed() < Duration::from_secs(20), "waited in vain");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn pulses_come_both_ways_and_what_is_told_as_travel_is_what_was_sent() {
+        let chip = Chip::lasting(usize::MAX);
+        let mut motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
+        command_until(&mut motor, 0.2, |motor| motor.travel() > 0.02);
+        command_until(&mut motor, -0.2, |motor| motor.travel() < 0.0);
+        let travel = motor.travel();
+        drop(motor);
+        let pulses = chip.pulses.lock().unwrap();
+        let sent = pulses
+            .iter()
+            .map(|&backwards| if backwards { -1.0 } else { 1.0 });
+        let sent = sent.sum::<f64>() / StepperConfig::default().steps_per_metre;
+        assert!(
+            (sent - travel).abs() < 0.2,
+            "{sent} m sent, {travel} m told"
+        );
+        assert!(pulses.contains(&true) && pulses.contains(&false));
+    }
+
+    #[test]
+    fn no_pulse_comes_without_a_command_nor_after_the_end() {
+        let chip = Chip::lasting(usize::MAX);
+        let motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
+        drop(motor);
+        assert!(chip.pulses.lock().unwrap().is_empty());
+    }
+
+    #[test]
+    fn pulses_end_by_themselves_when_the_program_hangs() {
+        let chip = Chip::lasting(usize::MAX);
+        let mut motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
+        command_until(&mut motor, 0.2, |motor| motor.travel() > 0.02);
+        // The program hangs here: no command is repeated. 0.2 s and a ramp of 0.1 s are meant.
+        std::thread::sleep(Duration::from_secs(2));
+        let sent = chip.pulses.lock().unwrap().len();
+        std::thread::sleep(Duration::from_millis(200));
+        assert_eq!(chip.pulses.lock().unwrap().len(), sent, "it still turns");
+        command_until(&mut motor, 0.2, |motor| motor.travel() > 0.5);
+    }
+
+    #[test]
+    fn a_motor_that_is_dropped_ramps_down() {
+        let chip = Chip::lasting(usize::MAX);
+        let mut motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
+        command_until(&mut motor, 1.0, |motor| motor.travel() > 0.3);
+        let before = chip.pulses.lock().unwrap().len();
+        drop(motor);
+        // 0.77 m/s and 2 m/s²: 0.15 m. A part of it was driven before the drop was noticed.
+        let ramp = chip.pulses.lock().unwrap().len() - before;
+        assert!(ramp > 150, "{ramp} pulses");
+    }
+
+    #[test]
+    fn a_chip_that_breaks_is_a_fault_until_it_works_again() {
+        let chip = Chip::lasting(5);
+        let mut motor = PulseMotor::start(StepperConfig::default(), chip.clone()).unwrap();
+        command_until(&mut motor, 1.0, |motor| motor.fault().is_some());
+        assert!(motor.fault().unwrap().contains("the chip is gone"));
+        *chip.lasts.lock().unwrap() = usize::MAX;
+        command_until(&mut motor, 1.0, |motor| motor.fault().is_none());
+        command_until(&mut motor, 1.0, |motor| motor.travel() > 0.02);
+    }
+}

@@ -1,0 +1,487 @@
+//! Mission Planner: an operator sets a destination, approves the path, and sees how far it is.
+//!
+//! The service tells a [`Mission`] what the operator wants, and the operator how the mission is.
+//! Whoever carries the mission out holds the same [`Missions`] and is woken when there is something
+//! to do.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use crate::mission::{Destination, Mission, Path, Report, Settings};
+use jaus::address::JausId;
+use jaus::codec::{Message, ServiceId};
+use jaus::endpoint::Received;
+use jaus::messages::ground::report_planned_path::{MissionRec, PointRec};
+use jaus::messages::ground::set_destination::Approved;
+use jaus::messages::ground::{
+    ApproveMission, QueryMission, QueryPlannedPath, ReportMission, ReportPlannedPath,
+    SetDestination, StopMission, mission_planner, report_mission,
+};
+use jaus::service::{
+    Context, Handled, Hazards, Service, Standing, State, StopCause, code_of, read,
+};
+
+/// A planner's mission, shared by the service and whoever carries it out.
+#[derive(Clone)]
+pub struct Missions {
+    mission: Arc<Mutex<Mission>>,
+    wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+/// What has changed of a mission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct News {
+    /// What Report Mission tells.
+    pub mission: bool,
+    /// What Report Planned Path tells.
+    pub path: bool,
+}
+
+impl Missions {
+    /// No mission yet. `wake` is called when the operator has said something that has to be acted
+    /// upon; it must not wait for anything.
+    #[must_use]
+    pub fn new(settings: Settings, wake: impl Fn() + Send + Sync + 'static) -> Self {
+        Self {
+            mission: Arc::new(Mutex::new(Mission::new(settings))),
+            wake: Arc::new(wake),
+        }
+    }
+
+    /// Tells the mission something, or asks it; says what has changed by that.
+    pub fn tell<T>(&self, words: impl FnOnce(&mut Mission) -> T) -> (T, News) {
+        let mut mission = self.mission.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = (mission.report().clone(), Arc::clone(mission.path()));
+        let answer = words(&mut mission);
+        let news = News {
+            mission: before.0 != *mission.report(),
+            path: !Arc::ptr_eq(&before.1, mission.path()),
+        };
+        (answer, news)
+    }
+
+    /// The service over the mission.
+    #[must_use]
+    pub fn service(&self) -> MissionPlanner {
+        MissionPlanner {
+            missions: self.clone(),
+        }
+    }
+}
+
+impl std::fmt::Debug for Missions {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Missions").finish_non_exhaustive()
+    }
+}
+
+/// Takes commands from the client in control while the component is ready, and tells anyone how the
+/// mission is. The mission is stopped when the component may no longer act or another client takes
+/// control; it does not go on by itself afterwards.
+#[derive(Debug)]
+pub struct MissionPlanner {
+    missions: Missions,
+}
+
+impl MissionPlanner {
+    fn command<M: Message>(
+        &self,
+        message: &Received,
+        context: &mut Context<'_>,
+        carry_out: impl FnOnce(M, &mut Mission),
+    ) {
+        if !context.standing().acts_for(message.source) {
+            tracing::debug!(source = %message.source, message = M::NAME, "not in control");
+        } else if let Some(command) = read(message) {
+            self.tell(context, |mission| carry_out(command, mission));
+        }
+    }
+
+    fn tell(&self, context: &mut Context<'_>, words: impl FnOnce(&mut Mission)) {
+        let ((), news) = self.missions.tell(words);
+        if news.mission {
+            context.changed::<QueryMission>();
+        }
+        if news.path {
+            context.changed::<QueryPlannedPath>();
+        }
+        (self.missions.wake)();
+    }
+}
+
+impl Service for MissionPlanner {
+    fn offers(&self) -> Vec<ServiceId> {
+        vec![mission_planner::LATEST]
+    }
+
+    fn handle_message(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Handled {
+        match code_of(&message.payload) {
+            Some(SetDestination::CODE) => self.command(message, context, |command, mission| {
+                let (destination, approved) = wanted(&command);
+                mission.go_to(now, destination, approved);
+            }),
+            Some(ApproveMission::CODE) => {
+                self.command(message, context, |command: ApproveMission, mission| {
+                    if let Err(refusal) = mission.approve(now, command.mission) {
+                        tracing::info!(%refusal, "not approved");
+                    }
+                });
+            }
+            Some(StopMission::CODE) => {
+                let reason = format!("{} has stopped the mission", message.source);
+                self.command(message, context, |_: StopMission, mission| {
+                    mission.stop(&reason);
+                });
+            }
+            Some(QueryMission::CODE) => {
+                let (answer, _) = self.missions.tell(|mission| report(mission.report()));
+                context.reply(message, &answer);
+            }
+            Some(QueryPlannedPath::CODE) => {
+                let (answer, _) = self.missions.tell(|mission| {
+                    let run = mission.report().run;
+                    report_path(run.mission, mission.path())
+                });
+                context.reply(message, &answer);
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+
+    fn hazards(&self) -> Hazards {
+        Hazards {
+            acts_on: Some(SetDestination::NAME),
+            stops: true,
+            ..Hazards::default()
+        }
+    }
+
+    fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
+        // The other causes are changes of the standing, which say more.
+        if *cause == StopCause::Ended {
+            self.tell(context, |mission| mission.stop("the planner has ended"));
+        }
+    }
+
+    fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {
+        let now = *context.standing();
+        if now.stops(before) {
+            let reason = why_stopped(before, &now);
+            match (lost_client(before, &now), now.controller) {
+                (Some(client), _) => {
+                    self.tell(context, |mission| mission.lose_client(client, &reason));
+                }
+                (None, Some(_)) if before.controller.is_none() => {
+                    self.tell(context, |mission| mission.handle_new_client(&reason));
+                }
+                _ => self.tell(context, |mission| mission.stop(&reason)),
+            }
+        }
+    }
+}
+
+fn wanted(command: &SetDestination) -> (Destination, bool) {
+    let destination = Destination {
+        x: command.x,
+        y: command.y,
+        speed: command.speed.map(f64::from),
+    };
+    (destination, command.approved == Approved::YES)
+}
+
+/// The client whose control has ended, if there is nothing else that stops the planner.
+fn lost_client(before: &Standing, now: &Standing) -> Option<JausId> {
+    let is_well = matches!(now.state, State::Ready | State::Standby);
+    let client = before.controller.filter(|_| is_well)?;
+    now.controller.is_none().then_some(client.id)
+}
+
+/// Why the planner may not go on with what it was told `before`.
+fn why_stopped(before: &Standing, now: &Standing) -> String {
+    let client = |standing: &Standing| standing.controller.map(|controller| controller.id);
+    match (now.state, client(now)) {
+        (State::Emergency, _) => "the planner is in emergency".to_owned(),
+        (_, Some(id)) if client(before) != Some(id) => {
+            format!("{id} has taken control of the planner")
+        }
+        (State::Ready | State::Standby, None) if before.controller.is_some() => {
+            "control of the planner has ended".to_owned()
+        }
+        (state, _) => format!("the planner is in the state {state}"),
+    }
+}
+
+fn report(report: &Report) -> ReportMission {
+    ReportMission {
+        mission: report.run.mission,
+        stage: report_mission::Stage(report.stage as u8),
+        attempt: report.run.attempt,
+        attempts: report.attempts,
+        progress: report.progress,
+        destination_x: report.destination.x,
+        destination_y: report.destination.y,
+        remaining: report.remaining as f32,
+        reason: told(&report.reason).into(),
+    }
+}
+
+/// As much of a reason as a report can hold.
+fn told(reason: &str) -> &str {
+    let longest = (0..=MAX_REASON.min(reason.len())).rev();
+    let mut ends = longest.filter(|&end| reason.is_char_boundary(end));
+    &reason[..ends.next().unwrap_or_default()]
+}
+
+/// Octets.
+const MAX_REASON: usize = 255;
+
+fn report_path(mission: u32, path: &Path) -> ReportPlannedPath {
+    let points = path.points().iter();
+    ReportPlannedPath {
+        mission_rec: MissionRec { mission },
+        point_list: points.map(|&(x, y)| PointRec { x, y }).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+    use crate::mission::{Action, LostLink, Stage};
+    use jaus::service::rig::{CLIENT, Rig, STRANGER};
+
+    struct Desk {
+        rig: Rig,
+        missions: Missions,
+        woken: Arc<AtomicU32>,
+    }
+
+    impl Desk {
+        fn new() -> Self {
+            Self::with(Settings::default())
+        }
+
+        fn with(settings: Settings) -> Self {
+            let woken = Arc::new(AtomicU32::new(0));
+            let count = Arc::clone(&woken);
+            let wake = move || _ = count.fetch_add(1, Ordering::Relaxed);
+            let missions = Missions::new(settings, wake);
+            Self {
+                rig: Rig::new(vec![Box::new(missions.service())]),
+                missions,
+                woken,
+            }
+        }
+
+        fn go(&mut self, x: f64) {
+            let to = SetDestination {
+                x,
+                y: 2.0,
+                speed: Some(0.5),
+                ..SetDestination::default()
+            };
+            self.rig.send(CLIENT, &to);
+        }
+
+        fn report(&mut self) -> ReportMission {
+            self.rig.ask(&QueryMission {}).unwrap()
+        }
+
+        /// As far as a path that awaits approval.
+        fn plan(&mut self, points: Vec<(f64, f64)>) {
+            let now = self.rig.now;
+            let _ = self.missions.tell(|mission| {
+                let run = mission.report().run;
+                mission.handle_map(now, run, Ok(()));
+                mission.handle_path(now, run, Ok(Path::new(points)));
+            });
+        }
+    }
+
+    #[test]
+    fn a_destination_from_the_client_in_control_begins_a_mission() {
+        let mut desk = Desk::new();
+        let woken = desk.woken.load(Ordering::Relaxed);
+        desk.go(1.0);
+        assert!(desk.woken.load(Ordering::Relaxed) > woken);
+        let report = desk.report();
+        assert_eq!(report.stage, report_mission::Stage::MAP);
+        assert_eq!((report.mission, report.attempt), (1, 1));
+        assert_eq!((report.destination_x, report.destination_y), (1.0, 2.0));
+        let changed = &desk.rig.changed();
+        assert!(changed.contains(&QueryMission::CODE));
+        let (action, _) = desk.missions.tell(Mission::poll_action);
+        assert!(matches!(action, Some(Action::FetchMap(_))));
+    }
+
+    #[test]
+    fn commands_of_others_are_ignored_and_all_while_not_ready() {
+        let mut desk = Desk::new();
+        let to = SetDestination::default();
+        desk.rig.send(STRANGER, &to);
+        assert_eq!(desk.report().stage, report_mission::Stage::IDLE);
+        desk.rig.stand(State::Standby, Some(CLIENT));
+        desk.rig.send(CLIENT, &to);
+        assert_eq!(desk.report().stage, report_mission::Stage::IDLE);
+    }
+
+    #[test]
+    fn the_path_is_told_and_driven_once_it_is_approved() {
+        let mut desk = Desk::new();
+        desk.go(3.0);
+        desk.plan(vec![(0.0, 0.0), (3.0, 2.0)]);
+        let path: ReportPlannedPath = desk.rig.ask(&QueryPlannedPath {}).unwrap();
+        assert_eq!(path.mission_rec.mission, 1);
+        assert_eq!(path.point_list[1], PointRec { x: 3.0, y: 2.0 });
+        desk.rig.send(CLIENT, &ApproveMission { mission: 2 });
+        assert_eq!(
+            desk.report().stage,
+            report_mission::Stage::AWAITING_APPROVAL
+        );
+        desk.rig.send(CLIENT, &ApproveMission { mission: 1 });
+        assert_eq!(desk.report().stage, report_mission::Stage::PATH);
+    }
+
+    #[test]
+    fn it_stops_with_a_reason_when_it_may_not_go_on() {
+        for (state, client, reason) in [
+            (
+                State::Emergency,
+                Some(CLIENT),
+                "the planner is in emergency",
+            ),
+            (
+                State::Standby,
+                Some(CLIENT),
+                "the planner is in the state standby",
+            ),
+            (
+                State::Ready,
+                Some(STRANGER),
+                "42.2.1 has taken control of the planner",
+            ),
+            (State::Ready, None, "control of the planner has ended"),
+        ] {
+            let mut desk = Desk::new();
+            desk.go(3.0);
+            desk.rig.stand(state, client);
+            let report = desk.report();
+            assert_eq!(report.stage, report_mission::Stage::STOPPED);
+            assert_eq!(report.reason, reason);
+            desk.rig.stand(State::Ready, Some(CLIENT));
+            assert_eq!(desk.report().stage, report_mission::Stage::STOPPED);
+        }
+    }
+
+    /// A planner that holds a mission, or drives back, when the link is lost; it drives.
+    fn driving(lost_link: LostLink) -> Desk {
+        let mut desk = Desk::with(Settings {
+            lost_link,
+            ..Settings::default()
+        });
+        desk.go(3.0);
+        desk.rig.send(CLIENT, &ApproveMission { mission: 1 });
+        desk.plan(vec![(0.0, 0.0), (3.0, 2.0)]);
+        assert_eq!(desk.report().stage, report_mission::Stage::PATH);
+        let _ = desk.missions.tell(|mission| {
+            mission.handle_pose((0.0, 0.0));
+            mission.handle_pose((1.0, 0.0));
+        });
+        desk
+    }
+
+    #[test]
+    fn a_held_mission_goes_on_only_by_a_new_client_that_approves_it() {
+        let mut desk = driving(LostLink::Hold);
+        desk.rig.stand(State::Standby, None);
+        let report = desk.report();
+        assert_eq!(report.stage, report_mission::Stage::AWAITING_APPROVAL);
+        desk.rig.stand(State::Standby, Some(STRANGER));
+        desk.rig.stand(State::Ready, Some(STRANGER));
+        assert_eq!(
+            desk.report().stage,
+            report_mission::Stage::AWAITING_APPROVAL,
+            "not by itself"
+        );
+        desk.rig.send(STRANGER, &ApproveMission { mission: 1 });
+        assert_eq!(desk.report().stage, report_mission::Stage::MAP);
+    }
+
+    #[test]
+    fn an_emergency_ends_a_held_mission() {
+        let mut desk = driving(LostLink::Hold);
+        desk.rig.stand(State::Standby, None);
+        desk.rig.stand(State::Emergency, None);
+        assert_eq!(desk.report().stage, report_mission::Stage::STOPPED);
+    }
+
+    #[test]
+    fn a_new_lease_or_an_emergency_ends_the_way_back() {
+        for (state, client) in [
+            (State::Standby, Some(STRANGER)),
+            (State::Standby, Some(CLIENT)),
+            (State::Emergency, None),
+        ] {
+            let mut desk = driving(LostLink::Return);
+            desk.rig.stand(State::Standby, None);
+            let now = desk.rig.now;
+            let _ = desk.missions.tell(|mission| {
+                let run = mission.report().run;
+                mission.handle_lost_client(now, run, false);
+            });
+            assert_eq!(desk.report().stage, report_mission::Stage::PATH);
+            desk.rig.stand(state, client);
+            assert_eq!(desk.report().stage, report_mission::Stage::STOPPED);
+        }
+    }
+
+    #[test]
+    fn the_operator_stops_it() {
+        let mut desk = Desk::new();
+        desk.go(3.0);
+        desk.rig.send(CLIENT, &StopMission {});
+        let report = desk.report();
+        assert_eq!(report.stage, report_mission::Stage::STOPPED);
+        assert_eq!(report.reason, "42.1.1 has stopped the mission");
+    }
+
+    #[test]
+    fn a_long_reason_is_told_as_far_as_it_fits() {
+        let mut desk = Desk::new();
+        desk.go(3.0);
+        let reason = format!("x{}", "ä".repeat(200));
+        let _ = desk.missions.tell(|mission| mission.stop(&reason));
+        let told = desk.report().reason;
+        assert_eq!(told.len(), 255);
+        assert!(told.as_str().is_some_and(|told| reason.starts_with(told)));
+    }
+
+    #[test]
+    fn the_stages_have_the_numbers_of_the_report() {
+        for (stage, number) in [
+            (Stage::Idle, report_mission::Stage::IDLE),
+            (Stage::Map, report_mission::Stage::MAP),
+            (Stage::Planning, report_mission::Stage::PLANNING),
+            (
+                Stage::AwaitingApproval,
+                report_mission::Stage::AWAITING_APPROVAL,
+            ),
+            (Stage::Path, report_mission::Stage::PATH),
+            (Stage::Vector, report_mission::Stage::VECTOR),
+            (Stage::Primitive, report_mission::Stage::PRIMITIVE),
+            (Stage::Driving, report_mission::Stage::DRIVING),
+            (Stage::Arrived, report_mission::Stage::ARRIVED),
+            (Stage::Failed, report_mission::Stage::FAILED),
+            (Stage::Stopped, report_mission::Stage::STOPPED),
+        ] {
+            assert_eq!(report_mission::Stage(stage as u8), number);
+        }
+    }
+}

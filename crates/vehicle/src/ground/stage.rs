@@ -1,0 +1,172 @@
+//! Stage: how far one driver of the chain is, and why it does not go on.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use jaus::address::JausId;
+use jaus::messages::ground::{QueryStage, ReportStage, report_stage, stage};
+use jaus::service::Handlers;
+
+/// How a driver of the chain is doing, as whoever runs it says. Cheap to clone; the clones are one.
+#[derive(Debug, Clone, Default)]
+pub struct StageBoard(Arc<Mutex<StageReport>>);
+
+/// What a driver of the chain tells of itself.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct StageReport {
+    /// How far it is.
+    pub state: StageState,
+    /// How much of what was commanded is done, in percent.
+    pub progress: u8,
+    /// The component that it commands, or wants to.
+    pub next: Option<JausId>,
+    /// Why it does not go on, for people; empty if it does.
+    pub reason: String,
+}
+
+/// How far a driver is. The numbers are those of Report Stage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StageState {
+    /// Nothing is to be done.
+    #[default]
+    Idle = 0,
+    /// It takes the next driver under control.
+    Engaging = 1,
+    /// It does what was commanded.
+    Active = 2,
+    /// It can not go on. If it commands nobody it has stood down: it does not go on by itself, and
+    /// has to be commanded anew.
+    Blocked = 3,
+    /// It has done what was commanded.
+    Done = 4,
+}
+
+impl fmt::Display for StageState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Idle => "idle",
+            Self::Engaging => "engaging",
+            Self::Active => "active",
+            Self::Blocked => "blocked",
+            Self::Done => "done",
+        })
+    }
+}
+
+impl StageBoard {
+    /// The service that tells it.
+    #[must_use]
+    pub fn service(&self) -> Handlers {
+        let board = self.clone();
+        Handlers::new(stage::LATEST).answer(move |_: QueryStage| board.report().to_message())
+    }
+
+    /// What is told now.
+    #[must_use]
+    pub fn report(&self) -> StageReport {
+        self.0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+
+    /// From now on this is told; says whether it is something else than before.
+    pub fn tell(&self, report: StageReport) -> bool {
+        let mut told = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_news = *told != report;
+        *told = report;
+        is_news
+    }
+}
+
+impl StageReport {
+    /// Octets that the message has for a reason.
+    const MAX_REASON: usize = 255;
+
+    fn to_message(&self) -> ReportStage {
+        let next = self
+            .next
+            .map_or((0, 0, 0), |id| (id.subsystem(), id.node(), id.component()));
+        ReportStage {
+            state: report_stage::State(self.state as u8),
+            progress: self.progress.min(100),
+            next_subsystem_id: next.0,
+            next_node_id: next.1,
+            next_component_id: next.2,
+            reason: self.reason_that_fits().into(),
+        }
+    }
+
+    fn reason_that_fits(&self) -> &str {
+        let mut end = Self::MAX_REASON.min(self.reason.len());
+        while !self.reason.is_char_boundary(end) {
+            end -= 1;
+        }
+        &self.reason[..end]
+    }
+
+    /// Whether it has stood down, and will not go on by itself.
+    #[must_use]
+    pub fn stands_down(&self) -> bool {
+        self.state == StageState::Blocked && self.next.is_none()
+    }
+}
+
+impl From<&ReportStage> for StageReport {
+    fn from(message: &ReportStage) -> Self {
+        let next = JausId::new(
+            message.next_subsystem_id,
+            message.next_node_id,
+            message.next_component_id,
+        );
+        Self {
+            state: match message.state {
+                report_stage::State::ENGAGING => StageState::Engaging,
+                report_stage::State::ACTIVE => StageState::Active,
+                report_stage::State::BLOCKED => StageState::Blocked,
+                report_stage::State::DONE => StageState::Done,
+                _ => StageState::Idle,
+            },
+            progress: message.progress,
+            next: next.is_unicast().then_some(next),
+            reason: message.reason.as_str().unwrap_or_default().to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jaus::service::rig::Rig;
+
+    #[test]
+    fn what_is_told_is_what_is_reported() {
+        let board = StageBoard::default();
+        let mut rig = Rig::new(vec![Box::new(board.service())]);
+        let report = StageReport {
+            state: StageState::Blocked,
+            progress: 40,
+            next: Some(JausId::new(101, 2, 33)),
+            reason: "the pose is 0.8 s old".to_owned(),
+        };
+        assert!(board.tell(report.clone()));
+        assert!(!board.tell(report.clone()), "no news");
+        let message: ReportStage = rig.ask(&QueryStage {}).unwrap();
+        assert_eq!(StageReport::from(&message), report);
+        assert!(!report.stands_down());
+    }
+
+    #[test]
+    fn a_long_reason_is_told_as_far_as_it_fits() {
+        let board = StageBoard::default();
+        let mut rig = Rig::new(vec![Box::new(board.service())]);
+        board.tell(StageReport {
+            state: StageState::Blocked,
+            reason: format!("x{}", "ä".repeat(200)),
+            ..StageReport::default()
+        });
+        let message: ReportStage = rig.ask(&QueryStage {}).unwrap();
+        assert_eq!(message.reason.len(), 255);
+        assert!(StageReport::from(&message).stands_down());
+    }
+}

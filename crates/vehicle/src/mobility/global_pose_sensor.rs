@@ -1,0 +1,154 @@
+//! Global Pose Sensor: where the vehicle is on the globe, and where magnetic north is there.
+
+use super::behaviour::Behaviour;
+use super::both_versions;
+use super::cockpit::Cockpit;
+use super::exchange::Exchange;
+use super::wanted::Wanted;
+use crate::motion::GlobalPose;
+use jaus::codec::{Message, ServiceId};
+use jaus::messages::mobility::report_global_pose as fields;
+use jaus::messages::mobility::report_global_pose_ext as ext;
+use jaus::messages::mobility::set_global_pose_ext::ZPosition;
+use jaus::messages::mobility::{
+    QueryGeomagneticProperty, QueryGlobalPose, QueryGlobalPoseExt, ReportGeomagneticProperty,
+    ReportGlobalPose, ReportGlobalPoseExt, SetGeomagneticProperty, SetGlobalPose, SetGlobalPoseExt,
+    global_pose_sensor,
+};
+use jaus::service::{Context, Handled};
+
+pub(super) struct GlobalPoseSensor;
+
+impl Behaviour for GlobalPoseSensor {
+    fn offers(&self) -> Vec<ServiceId> {
+        both_versions(global_pose_sensor::V1_1).into()
+    }
+
+    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        match code {
+            QueryGlobalPose::CODE => {
+                if let Some(query) = exchange.query() {
+                    let report = report(&query, exchange);
+                    exchange.reply(&report);
+                }
+            }
+            QueryGlobalPoseExt::CODE => {
+                if let Some(query) = exchange.query() {
+                    let report = report_ext(&query, exchange);
+                    exchange.reply(&report);
+                }
+            }
+            QueryGeomagneticProperty::CODE => {
+                let mut report = ReportGeomagneticProperty::default();
+                let variation = exchange.cockpit.magnetic_variation;
+                if report.set_magnetic_variation_rad(variation).is_ok() {
+                    exchange.reply(&report);
+                }
+            }
+            SetGlobalPose::CODE => {
+                if let Some(message) = exchange.configure() {
+                    set(told(&message, &pose(exchange)), exchange);
+                }
+            }
+            SetGlobalPoseExt::CODE => {
+                if let Some(message) = exchange.configure() {
+                    set(told_ext(&message, &pose(exchange)), exchange);
+                }
+            }
+            SetGeomagneticProperty::CODE => {
+                if let Some(message) = exchange.configure::<SetGeomagneticProperty>() {
+                    exchange.cockpit.magnetic_variation = message.magnetic_variation_rad();
+                    exchange.context.changed::<QueryGeomagneticProperty>();
+                }
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+
+    fn set_up_by(&self) -> Option<&'static str> {
+        Some(SetGlobalPose::NAME)
+    }
+
+    fn handle_motion(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+        changed(context);
+    }
+}
+
+fn changed(context: &mut Context<'_>) {
+    context.changed::<QueryGlobalPose>();
+    context.changed::<QueryGlobalPoseExt>();
+}
+
+fn pose(exchange: &Exchange<'_, '_>) -> GlobalPose {
+    exchange.cockpit.pilot.global_pose()
+}
+
+fn set(pose: GlobalPose, exchange: &mut Exchange<'_, '_>) {
+    let (latitude, longitude, yaw) = (pose.latitude, pose.longitude, pose.yaw);
+    tracing::info!(source = %exchange.message.source, latitude, longitude, yaw, "global pose set");
+    exchange.cockpit.pilot.set_global_pose(pose);
+    exchange.cockpit.handle_new_frame();
+    changed(exchange.context);
+}
+
+/// A pose with what a client tells of it; what it does not tell stays.
+fn told(message: &SetGlobalPose, pose: &GlobalPose) -> GlobalPose {
+    GlobalPose {
+        latitude: message.latitude_deg().unwrap_or(pose.latitude),
+        longitude: message.longitude_deg().unwrap_or(pose.longitude),
+        altitude: message.altitude_m().unwrap_or(pose.altitude),
+        roll: message.roll_rad().unwrap_or(pose.roll),
+        pitch: message.pitch_rad().unwrap_or(pose.pitch),
+        yaw: message.yaw_rad().unwrap_or(pose.yaw),
+    }
+}
+
+fn told_ext(message: &SetGlobalPoseExt, pose: &GlobalPose) -> GlobalPose {
+    let altitude = match message.z_position {
+        Some(ZPosition::AltitudeMsl(altitude)) => altitude.value(),
+        // How high the ground or the water is here is not known.
+        _ => pose.altitude,
+    };
+    GlobalPose {
+        latitude: message.latitude_deg().unwrap_or(pose.latitude),
+        longitude: message.longitude_deg().unwrap_or(pose.longitude),
+        altitude,
+        roll: message.roll_rad().unwrap_or(pose.roll),
+        pitch: message.pitch_rad().unwrap_or(pose.pitch),
+        yaw: message.heading_rad().unwrap_or(pose.yaw),
+    }
+}
+
+fn report(query: &QueryGlobalPose, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPose {
+    let pose = pose(exchange);
+    let wanted = Wanted(query.presence_vector.into());
+    ReportGlobalPose {
+        latitude: wanted.real(0, pose.latitude, fields::Latitude::new),
+        longitude: wanted.real(1, pose.longitude, fields::Longitude::new),
+        altitude: wanted.real(2, pose.altitude, fields::Altitude::new),
+        position_rms: None,
+        roll: wanted.real(4, pose.roll, fields::Roll::new),
+        pitch: wanted.real(5, pose.pitch, fields::Pitch::new),
+        yaw: wanted.real(6, pose.yaw, fields::Yaw::new),
+        attitude_rms: None,
+        time_stamp: wanted.field(8, exchange.stamp()),
+    }
+}
+
+fn report_ext(query: &QueryGlobalPoseExt, exchange: &mut Exchange<'_, '_>) -> ReportGlobalPoseExt {
+    let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
+    let pose = pose(exchange);
+    let wanted = Wanted(query.presence_vector.into());
+    ReportGlobalPoseExt {
+        latitude: wanted.real(0, pose.latitude, ext::Latitude::new),
+        longitude: wanted.real(1, pose.longitude, ext::Longitude::new),
+        altitude_msl: wanted.real(3, pose.altitude, ext::AltitudeMsl::new),
+        roll: wanted.real(8, pose.roll, ext::Roll::new),
+        pitch: wanted.real(9, pose.pitch, ext::Pitch::new),
+        heading: wanted.real(10, pose.yaw, ext::Heading::new),
+        time_seconds: wanted.field(13, seconds),
+        time_nano_seconds: wanted.field(14, nanoseconds),
+        ..ReportGlobalPoseExt::default()
+    }
+}

@@ -1,0 +1,108 @@
+//! A waypoint on the globe, whatever message it came in.
+
+use super::wanted::Wanted;
+use crate::motion::{Frame, GlobalPose, Waypoint};
+use jaus::codec::OutOfRange;
+use jaus::messages::mobility::report_global_waypoint as fields;
+use jaus::messages::mobility::report_global_waypoint_ext as ext;
+use jaus::messages::mobility::set_global_waypoint_ext::{ZPosition, ZPositionAltitudeMsl};
+use jaus::messages::mobility::{
+    ReportGlobalWaypoint, ReportGlobalWaypointExt, SetGlobalWaypoint, SetGlobalWaypointExt,
+};
+
+/// A waypoint on the globe: degrees, metres and radians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct GlobalWaypoint {
+    latitude: f64,
+    longitude: f64,
+    altitude: Option<f64>,
+    roll: Option<f64>,
+    pitch: Option<f64>,
+    yaw: Option<f64>,
+    waypoint_tolerance: Option<f64>,
+    path_tolerance: Option<f64>,
+}
+
+impl From<SetGlobalWaypoint> for GlobalWaypoint {
+    fn from(message: SetGlobalWaypoint) -> Self {
+        Self {
+            latitude: message.latitude_deg(),
+            longitude: message.longitude_deg(),
+            altitude: message.altitude_m(),
+            roll: message.roll_rad(),
+            pitch: message.pitch_rad(),
+            yaw: message.yaw_rad(),
+            waypoint_tolerance: message.waypoint_tolerance_m(),
+            path_tolerance: message.path_tolerance_m(),
+        }
+    }
+}
+
+impl From<SetGlobalWaypointExt> for GlobalWaypoint {
+    fn from(message: SetGlobalWaypointExt) -> Self {
+        let altitude = match message.z_position {
+            Some(ZPosition::AltitudeMsl(altitude)) => Some(altitude.value()),
+            // A ground vehicle has no choice of heights.
+            _ => None,
+        };
+        Self {
+            latitude: message.latitude_deg(),
+            longitude: message.longitude_deg(),
+            altitude,
+            roll: message.roll_rad(),
+            pitch: message.pitch_rad(),
+            yaw: message.heading_rad(),
+            waypoint_tolerance: message.waypoint_tolerance_m(),
+            path_tolerance: message.path_tolerance_m(),
+        }
+    }
+}
+
+impl GlobalWaypoint {
+    /// What the vehicle is to drive to.
+    pub(super) fn waypoint(&self, frame: &Frame) -> Waypoint {
+        let place = frame.to_local(&GlobalPose {
+            latitude: self.latitude,
+            longitude: self.longitude,
+            yaw: self.yaw.unwrap_or_default(),
+            ..GlobalPose::default()
+        });
+        Waypoint {
+            x: place.x,
+            y: place.y,
+            heading: self.yaw.map(|_| place.yaw),
+            tolerance: self.waypoint_tolerance.unwrap_or(Waypoint::TOLERANCE),
+        }
+    }
+
+    /// The report of version 1.0.
+    pub(super) fn report(&self, wanted: Wanted) -> Result<ReportGlobalWaypoint, OutOfRange> {
+        let tolerance = fields::WaypointTolerance::new;
+        Ok(ReportGlobalWaypoint {
+            latitude: fields::Latitude::new(self.latitude)?,
+            longitude: fields::Longitude::new(self.longitude)?,
+            altitude: wanted.optional(0, self.altitude, fields::Altitude::new),
+            roll: wanted.optional(1, self.roll, fields::Roll::new),
+            pitch: wanted.optional(2, self.pitch, fields::Pitch::new),
+            yaw: wanted.optional(3, self.yaw, fields::Yaw::new),
+            waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
+            path_tolerance: wanted.optional(5, self.path_tolerance, fields::PathTolerance::new),
+        })
+    }
+
+    /// The report of version 1.1.
+    pub(super) fn report_ext(&self, wanted: Wanted) -> Result<ReportGlobalWaypointExt, OutOfRange> {
+        let tolerance = ext::WaypointTolerance::new;
+        let altitude = wanted.optional(0, self.altitude, ZPositionAltitudeMsl::new);
+        Ok(ReportGlobalWaypointExt {
+            latitude: ext::Latitude::new(self.latitude)?,
+            longitude: ext::Longitude::new(self.longitude)?,
+            z_position: altitude.map(ZPosition::AltitudeMsl),
+            roll: wanted.optional(1, self.roll, ext::Roll::new),
+            pitch: wanted.optional(2, self.pitch, ext::Pitch::new),
+            heading: wanted.optional(3, self.yaw, ext::Heading::new),
+            waypoint_tolerance: wanted.optional(4, self.waypoint_tolerance, tolerance),
+            path_tolerance: wanted.optional(5, self.path_tolerance, ext::PathTolerance::new),
+        })
+    }
+}

@@ -1,0 +1,54 @@
+//! The drivers that work a list off: Local and Global Waypoint List Driver, Local and Global Path
+//! Segment Driver.
+
+use std::marker::PhantomData;
+
+use super::behaviour::Behaviour;
+use super::both_versions;
+use super::cockpit::Cockpit;
+use super::exchange::Exchange;
+use super::kind::Kind;
+use super::travel;
+use jaus::codec::{Message, ServiceId};
+use jaus::messages::mobility::ExecuteList;
+use jaus::service::{Context, Elements, Handled};
+
+/// A driver to the places of one kind in a list, one after the other.
+pub(super) struct ListDriver<K>(PhantomData<K>);
+
+impl<K: Kind> ListDriver<K> {
+    /// A driver that works the vehicle's list off, which takes its places from now on.
+    pub(super) fn on(elements: &Elements) -> Self {
+        K::accept(elements);
+        Self(PhantomData)
+    }
+}
+
+impl<K: Kind> Behaviour for ListDriver<K> {
+    fn offers(&self) -> Vec<ServiceId> {
+        both_versions(K::LIST_DRIVER).into()
+    }
+
+    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        match K::handle_query(code, exchange) {
+            Handled::Yes => Handled::Yes,
+            Handled::No => travel::handle_list(code, exchange),
+        }
+    }
+
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(ExecuteList::NAME)
+    }
+
+    fn tells_end_of(&self, command: u16) -> bool {
+        travel::tells_end_of(command)
+    }
+
+    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+        cockpit.work_off(context);
+    }
+
+    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+        cockpit.abandon(context);
+    }
+}

@@ -1,0 +1,56 @@
+//! The mobility services (AS6009) over a vehicle: its sensors and its drivers.
+//!
+//! All services of one component share one [`Vehicle`], and each takes part in driving it:
+//!
+//! ```
+//! use jaus_vehicle::mobility::Vehicle;
+//! use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+//!
+//! let rover = SkidSteer::new(SkidSteerConfig::default());
+//! let vehicle = Vehicle::new(Pilot::new(rover, Frame::at(52.5, 13.4)));
+//! let services = [
+//!     vehicle.local_pose_sensor(),
+//!     vehicle.velocity_state_sensor(),
+//!     vehicle.primitive_driver(),
+//! ];
+//! ```
+//!
+//! Sensors answer anyone. Poses and waypoints are set by the client in control alone, and what
+//! moves the vehicle is obeyed only while the component is ready, too. The vehicle stops when the
+//! component may no longer act or another client takes control; it does not go on by itself
+//! afterwards.
+
+mod acceleration_state_sensor;
+mod behaviour;
+mod clock;
+mod cockpit;
+mod exchange;
+mod global_pose_sensor;
+mod global_waypoint;
+mod kind;
+mod list_driver;
+mod local_pose_sensor;
+mod local_waypoint;
+mod path_kinds;
+mod path_segment;
+mod place;
+mod primitive_driver;
+#[cfg(test)]
+mod tests;
+mod travel;
+mod vector_driver;
+mod vehicle;
+mod velocity_state_driver;
+mod velocity_state_sensor;
+mod wanted;
+mod waypoint_driver;
+mod waypoint_kinds;
+
+pub use vehicle::{OnVehicle, Vehicle};
+
+use jaus::codec::ServiceId;
+
+/// A service in its versions 1.1 and 1.0: the second has no messages that the first has not.
+const fn both_versions(newest: ServiceId) -> [ServiceId; 2] {
+    [newest, ServiceId { minor: 0, ..newest }]
+}

@@ -1,0 +1,209 @@
+//! Local and Global Vector Driver: keep a speed and a heading.
+
+use super::behaviour::Behaviour;
+use super::cockpit::Cockpit;
+use super::exchange::{Command, Exchange};
+use super::wanted::Wanted;
+use crate::mobility::travel::metres_per_second;
+use crate::motion::{Goal, Heading, Ticket};
+use jaus::codec::{Message, OutOfRange, ServiceId};
+use jaus::messages::mobility::{
+    QueryGlobalVector, QueryGlobalVectorExt, QueryLocalVector, QueryLocalVectorExt,
+    ReportGlobalVector, ReportGlobalVectorExt, ReportLocalVector, ReportLocalVectorExt,
+    SetGlobalVector, SetGlobalVectorExt, SetLocalVector, SetLocalVectorExt, global_vector_driver,
+    local_vector_driver, report_global_vector, report_global_vector_ext, report_local_vector,
+    report_local_vector_ext,
+};
+use jaus::service::{Context, Handled, Validity};
+
+/// The speed and heading that a client wants.
+#[derive(Debug, Default, Clone, Copy)]
+struct Vector {
+    /// Metres per second.
+    speed: f64,
+    /// Radians clockwise from the local X axis or from north; straight on without one.
+    heading: Option<f64>,
+    ticket: Option<Ticket>,
+}
+
+/// Keeps a heading in the local frame.
+#[derive(Default)]
+pub(super) struct LocalVectorDriver(Vector);
+
+/// Keeps a heading on the globe.
+#[derive(Default)]
+pub(super) struct GlobalVectorDriver(Vector);
+
+impl Vector {
+    /// Keeps a vector, and sets out if the vehicle is to act; `origin` says what the headings of this
+    /// driver are measured from.
+    fn set(
+        &mut self,
+        (speed, heading): (f64, Option<f64>),
+        origin: fn(f64) -> Heading,
+        acts: bool,
+        exchange: &mut Exchange<'_, '_>,
+    ) {
+        tracing::debug!(source = %exchange.message.source, speed, heading, acts, "vector set");
+        let goal = Goal::Vector {
+            speed,
+            heading: heading.map(origin),
+        };
+        *self = Self {
+            speed,
+            heading,
+            ticket: acts.then(|| exchange.pursue(goal, Validity::WhileAlive)),
+        };
+        changed(exchange.context);
+    }
+
+    /// What is in force, or is kept in standby: nothing if another driver has replaced it.
+    fn current(&self, cockpit: &Cockpit) -> Self {
+        match self.ticket {
+            Some(ticket) if !cockpit.pilot.pursues(ticket) => Self::default(),
+            _ => *self,
+        }
+    }
+}
+
+fn changed(context: &mut Context<'_>) {
+    context.changed::<QueryLocalVector>();
+    context.changed::<QueryLocalVectorExt>();
+    context.changed::<QueryGlobalVector>();
+    context.changed::<QueryGlobalVectorExt>();
+}
+
+impl Behaviour for LocalVectorDriver {
+    fn offers(&self) -> Vec<ServiceId> {
+        vec![local_vector_driver::V1_1]
+    }
+
+    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        match code {
+            SetLocalVector::CODE => {
+                if let Some(Command { message, acts }) = exchange.command::<SetLocalVector>() {
+                    let vector = (message.speed_m_per_s(), message.heading_rad());
+                    self.0.set(vector, Heading::Local, acts, exchange);
+                }
+            }
+            SetLocalVectorExt::CODE => {
+                if let Some(Command { message, acts }) = exchange.command::<SetLocalVectorExt>()
+                    && let Some(speed) = metres_per_second(message.speed)
+                {
+                    let vector = (speed, message.heading_rad());
+                    self.0.set(vector, Heading::Local, acts, exchange);
+                }
+            }
+            QueryLocalVector::CODE => {
+                if let Some(query) = exchange.query::<QueryLocalVector>() {
+                    let vector = self.0.current(exchange.cockpit);
+                    let report = local(&vector, Wanted(query.presence_vector.into()));
+                    exchange.reply_if(report);
+                }
+            }
+            QueryLocalVectorExt::CODE => {
+                if let Some(query) = exchange.query::<QueryLocalVectorExt>() {
+                    let vector = self.0.current(exchange.cockpit);
+                    let report = local_ext(&vector, Wanted(query.presence_vector.into()));
+                    exchange.reply_if(report);
+                }
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(SetLocalVector::NAME)
+    }
+
+    fn handle_stop(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+        *self = Self::default();
+        changed(context);
+    }
+}
+
+impl Behaviour for GlobalVectorDriver {
+    fn offers(&self) -> Vec<ServiceId> {
+        vec![global_vector_driver::V1_1]
+    }
+
+    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        match code {
+            SetGlobalVector::CODE => {
+                if let Some(Command { message, acts }) = exchange.command::<SetGlobalVector>() {
+                    let speed = message.speed_m_per_s();
+                    let speed = speed.unwrap_or(self.0.current(exchange.cockpit).speed);
+                    let vector = (speed, message.heading_rad());
+                    self.0.set(vector, Heading::North, acts, exchange);
+                }
+            }
+            SetGlobalVectorExt::CODE => {
+                if let Some(Command { message, acts }) = exchange.command::<SetGlobalVectorExt>()
+                    && let Some(speed) = metres_per_second(message.speed)
+                {
+                    let vector = (speed, message.heading_rad());
+                    self.0.set(vector, Heading::North, acts, exchange);
+                }
+            }
+            QueryGlobalVector::CODE => {
+                if let Some(query) = exchange.query::<QueryGlobalVector>() {
+                    let vector = self.0.current(exchange.cockpit);
+                    exchange.reply(&global(&vector, Wanted(query.presence_vector.into())));
+                }
+            }
+            QueryGlobalVectorExt::CODE => {
+                if let Some(query) = exchange.query::<QueryGlobalVectorExt>() {
+                    let vector = self.0.current(exchange.cockpit);
+                    let report = global_ext(&vector, Wanted(query.presence_vector.into()));
+                    exchange.reply_if(report);
+                }
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(SetGlobalVector::NAME)
+    }
+
+    fn handle_stop(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+        *self = Self::default();
+        changed(context);
+    }
+}
+
+fn local(vector: &Vector, wanted: Wanted) -> Result<ReportLocalVector, OutOfRange> {
+    Ok(ReportLocalVector {
+        speed: report_local_vector::Speed::new(vector.speed)?,
+        heading: wanted.optional(1, vector.heading, report_local_vector::Heading::new),
+        ..ReportLocalVector::default()
+    })
+}
+
+fn local_ext(vector: &Vector, wanted: Wanted) -> Result<ReportLocalVectorExt, OutOfRange> {
+    use report_local_vector_ext::{Heading, Speed, SpeedSpeedOverGround};
+    Ok(ReportLocalVectorExt {
+        speed: Speed::SpeedOverGround(SpeedSpeedOverGround::new(vector.speed)?),
+        heading: wanted.optional(3, vector.heading, Heading::new),
+        ..ReportLocalVectorExt::default()
+    })
+}
+
+fn global(vector: &Vector, wanted: Wanted) -> ReportGlobalVector {
+    ReportGlobalVector {
+        speed: wanted.real(0, vector.speed, report_global_vector::Speed::new),
+        heading: wanted.optional(2, vector.heading, report_global_vector::Heading::new),
+        ..ReportGlobalVector::default()
+    }
+}
+
+fn global_ext(vector: &Vector, wanted: Wanted) -> Result<ReportGlobalVectorExt, OutOfRange> {
+    use report_global_vector_ext::{Heading, Speed, SpeedSpeedOverGround};
+    Ok(ReportGlobalVectorExt {
+        speed: Speed::SpeedOverGround(SpeedSpeedOverGround::new(vector.speed)?),
+        heading: wanted.optional(3, vector.heading, Heading::new),
+        ..ReportGlobalVectorExt::default()
+    })
+}

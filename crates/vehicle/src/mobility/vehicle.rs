@@ -1,0 +1,371 @@
+//! The vehicle that all mobility services of a component share, and each of them as a component
+//! offers it.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use super::acceleration_state_sensor::AccelerationStateSensor;
+use super::behaviour::Behaviour;
+use super::clock::SampleClock;
+use super::cockpit::Cockpit;
+use super::exchange::Exchange;
+use super::global_pose_sensor::GlobalPoseSensor;
+use super::list_driver::ListDriver;
+use super::local_pose_sensor::LocalPoseSensor;
+use super::path_kinds::{GlobalPath, LocalPath};
+use super::primitive_driver::PrimitiveDriver;
+use super::vector_driver::{GlobalVectorDriver, LocalVectorDriver};
+use super::velocity_state_driver::VelocityStateDriver;
+use super::velocity_state_sensor::VelocityStateSensor;
+use super::waypoint_driver::WaypointDriver;
+use super::waypoint_kinds::{Global, Local};
+use crate::motion::{GlobalPose, Motion, Pilot};
+use jaus::address::JausId;
+use jaus::codec::ServiceId;
+use jaus::endpoint::Received;
+use jaus::service::{
+    Context, Elements, Handled, Hazards, ListManager, MotionPolicy, Service, Standing, StopCause,
+    TimeOfDay, code_of,
+};
+
+/// A vehicle as the mobility services see it. Cheap to clone; the clones are one vehicle.
+#[derive(Clone)]
+pub struct Vehicle {
+    cockpit: Arc<Mutex<Cockpit>>,
+}
+
+impl Vehicle {
+    /// A vehicle that nobody drives yet, and that does not know what time it is: its reports carry
+    /// no time stamps.
+    #[must_use]
+    pub fn new(pilot: Pilot) -> Self {
+        Self {
+            cockpit: Arc::new(Mutex::new(Cockpit::new(pilot))),
+        }
+    }
+
+    /// Stamps its reports with the times at which their samples were taken. Share the time with the
+    /// component's [`Time`](jaus::service::Time) service, so that Set Time sets the stamps, too.
+    #[must_use]
+    pub fn with_clock(self, time: TimeOfDay) -> Self {
+        self.lock().clock = Some(SampleClock::new(time));
+        self
+    }
+
+    /// What becomes of efforts and velocities that their client does not repeat.
+    #[must_use]
+    pub fn motion_policy(self, policy: MotionPolicy) -> Self {
+        self.lock().guard.set_policy(policy);
+        self
+    }
+
+    /// Moves on to `now`, for readers outside of the component; not beyond the end of the command in
+    /// force, which the component alone can see to.
+    pub fn handle_time(&self, now: Instant) {
+        self.lock().advance_within(now);
+    }
+
+    /// Stops, whatever it was commanded to do.
+    pub fn stop(&self) {
+        self.lock().halt(&StopCause::Requested);
+    }
+
+    /// Whether it has something to do that is not done.
+    #[must_use]
+    pub fn is_under_way(&self) -> bool {
+        self.lock().pilot.is_under_way()
+    }
+
+    /// Whether it has done what it was driven to do.
+    #[must_use]
+    pub fn has_arrived(&self) -> bool {
+        let cockpit = self.lock();
+        cockpit.pilot.is_there() && cockpit.travel.active().is_none()
+    }
+
+    /// How much of the list that it works off lies behind it, in percent.
+    #[must_use]
+    pub fn progress(&self) -> u8 {
+        self.lock().progress()
+    }
+
+    /// Why it was stopped last, unless it was commanded again since.
+    #[must_use]
+    pub fn last_stop(&self) -> Option<StopCause> {
+        self.lock().guard.last_stop().cloned()
+    }
+
+    /// Where it was last and how it moved.
+    #[must_use]
+    pub fn motion(&self) -> Motion {
+        self.lock().pilot.motion()
+    }
+
+    /// Where on the globe it was last.
+    #[must_use]
+    pub fn global_pose(&self) -> GlobalPose {
+        self.lock().pilot.global_pose()
+    }
+
+    /// Velocity State Sensor: tells how fast it moves.
+    #[must_use]
+    pub fn velocity_state_sensor(&self) -> OnVehicle {
+        self.service(VelocityStateSensor)
+    }
+
+    /// Acceleration State Sensor: tells how its velocity changes.
+    #[must_use]
+    pub fn acceleration_state_sensor(&self) -> OnVehicle {
+        self.service(AccelerationStateSensor)
+    }
+
+    /// Local Pose Sensor: tells where it is in its local frame, and lets the client in control
+    /// say where that is.
+    #[must_use]
+    pub fn local_pose_sensor(&self) -> OnVehicle {
+        self.service(LocalPoseSensor)
+    }
+
+    /// Global Pose Sensor: tells where it is on the globe, and lets the client in control say
+    /// where that is.
+    #[must_use]
+    pub fn global_pose_sensor(&self) -> OnVehicle {
+        self.service(GlobalPoseSensor)
+    }
+
+    /// Primitive Driver: uses its drives and brakes without feedback.
+    #[must_use]
+    pub fn primitive_driver(&self) -> OnVehicle {
+        self.service(PrimitiveDriver::default())
+    }
+
+    /// Local Waypoint Driver: drives to one waypoint in the local frame.
+    #[must_use]
+    pub fn local_waypoint_driver(&self) -> OnVehicle {
+        self.service(WaypointDriver::<Local>::new())
+    }
+
+    /// Global Waypoint Driver: drives to one waypoint on the globe.
+    #[must_use]
+    pub fn global_waypoint_driver(&self) -> OnVehicle {
+        self.service(WaypointDriver::<Global>::new())
+    }
+
+    /// List Manager: keeps the list of the list drivers, one for all of them. It takes what they
+    /// can drive to.
+    #[must_use]
+    pub fn list_manager(&self) -> ListManager {
+        ListManager::new(self.elements())
+    }
+
+    /// Local Waypoint List Driver: drives to waypoints in the local frame, one after the other.
+    /// Needs the [`list_manager`](Self::list_manager) beside it.
+    #[must_use]
+    pub fn local_waypoint_list_driver(&self) -> OnVehicle {
+        self.service(ListDriver::<Local>::on(&self.elements()))
+    }
+
+    /// Global Waypoint List Driver: drives to waypoints on the globe, one after the other. Needs
+    /// the [`list_manager`](Self::list_manager) beside it.
+    #[must_use]
+    pub fn global_waypoint_list_driver(&self) -> OnVehicle {
+        self.service(ListDriver::<Global>::on(&self.elements()))
+    }
+
+    /// Velocity State Driver: keeps a velocity.
+    #[must_use]
+    pub fn velocity_state_driver(&self) -> OnVehicle {
+        self.service(VelocityStateDriver::default())
+    }
+
+    /// Local Vector Driver: keeps a speed and a heading in the local frame.
+    #[must_use]
+    pub fn local_vector_driver(&self) -> OnVehicle {
+        self.service(LocalVectorDriver::default())
+    }
+
+    /// Global Vector Driver: keeps a speed and a heading on the globe.
+    #[must_use]
+    pub fn global_vector_driver(&self) -> OnVehicle {
+        self.service(GlobalVectorDriver::default())
+    }
+
+    /// Local Path Segment Driver: drives along curves in the local frame, one after the other.
+    /// Needs the [`list_manager`](Self::list_manager) beside it.
+    #[must_use]
+    pub fn local_path_segment_driver(&self) -> OnVehicle {
+        self.service(ListDriver::<LocalPath>::on(&self.elements()))
+    }
+
+    /// Global Path Segment Driver: drives along curves on the globe, one after the other. Needs
+    /// the [`list_manager`](Self::list_manager) beside it.
+    #[must_use]
+    pub fn global_path_segment_driver(&self) -> OnVehicle {
+        self.service(ListDriver::<GlobalPath>::on(&self.elements()))
+    }
+
+    fn elements(&self) -> Elements {
+        self.lock().elements.clone()
+    }
+
+    fn service(&self, behaviour: impl Behaviour + 'static) -> OnVehicle {
+        OnVehicle {
+            vehicle: self.clone(),
+            behaviour: Box::new(behaviour),
+            only_newest: false,
+            steps: 0,
+            stops: self.lock().stops,
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Cockpit> {
+        self.cockpit.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl std::fmt::Debug for Vehicle {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Vehicle")
+            .field("motion", &self.motion())
+            .finish()
+    }
+}
+
+/// A mobility service of a [`Vehicle`], to be offered by a component.
+pub struct OnVehicle {
+    vehicle: Vehicle,
+    behaviour: Box<dyn Behaviour>,
+    only_newest: bool,
+    /// The step of the vehicle that was looked at last.
+    steps: u64,
+    /// The stop of the vehicle that was followed last.
+    stops: u64,
+}
+
+impl OnVehicle {
+    /// Lists only the newest version, whose messages include those of the older ones.
+    ///
+    /// What a component tells about its services should fit into one packet, because some peers
+    /// (JAUS++) cannot read longer messages of others. A component with many services saves room
+    /// like this.
+    #[must_use]
+    pub const fn only_newest(mut self) -> Self {
+        self.only_newest = true;
+        self
+    }
+}
+
+impl std::fmt::Debug for OnVehicle {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("OnVehicle")
+            .field("offers", &self.offers())
+            .finish()
+    }
+}
+
+impl Service for OnVehicle {
+    fn offers(&self) -> Vec<ServiceId> {
+        let mut offers = self.behaviour.offers();
+        if self.only_newest {
+            offers.truncate(1);
+        }
+        offers
+    }
+
+    fn handle_message(
+        &mut self,
+        now: Instant,
+        message: &Received,
+        context: &mut Context<'_>,
+    ) -> Handled {
+        let Some(code) = code_of(&message.payload) else {
+            return Handled::No;
+        };
+        let mut cockpit = self.vehicle.lock();
+        follow(
+            now,
+            &mut cockpit,
+            &mut self.stops,
+            self.behaviour.as_mut(),
+            context,
+        );
+        let mut exchange = Exchange {
+            now,
+            cockpit: &mut cockpit,
+            message,
+            context,
+        };
+        self.behaviour.handle(code, &mut exchange)
+    }
+
+    fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {
+        let mut cockpit = self.vehicle.lock();
+        follow(
+            now,
+            &mut cockpit,
+            &mut self.stops,
+            self.behaviour.as_mut(),
+            context,
+        );
+        let steps = cockpit.pilot.steps();
+        if self.steps != steps {
+            self.steps = steps;
+            self.behaviour.handle_motion(&mut cockpit, context);
+        }
+    }
+
+    fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
+        let mut cockpit = self.vehicle.lock();
+        cockpit.halt(cause);
+        self.stops = cockpit.stops;
+        self.behaviour.handle_stop(&mut cockpit, context);
+    }
+
+    /// What was kept in standby does not come into force when the component is made ready.
+    fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {
+        if context.standing().may_act() && !before.may_act() {
+            let mut cockpit = self.vehicle.lock();
+            self.behaviour.handle_stop(&mut cockpit, context);
+        }
+    }
+
+    fn depends_on(&self) -> Option<JausId> {
+        self.vehicle.lock().guard.depends_on()
+    }
+
+    fn is_moving(&self) -> bool {
+        self.vehicle.lock().guard.is_active()
+    }
+
+    fn hazards(&self) -> Hazards {
+        Hazards {
+            acts_on: self.behaviour.acts_on(),
+            set_up_by: self.behaviour.set_up_by(),
+            stops: true,
+        }
+    }
+
+    fn tells_end_of(&self, command: u16) -> bool {
+        self.behaviour.tells_end_of(command)
+    }
+
+    fn poll_timeout(&self) -> Option<Instant> {
+        let cockpit = self.vehicle.lock();
+        let ends = [cockpit.pilot.poll_timeout(), cockpit.guard.expires_at()];
+        ends.into_iter().flatten().min().or(cockpit.next_look())
+    }
+}
+
+/// Moves the vehicle on to `now`, and has a service follow if that stopped it.
+fn follow(
+    now: Instant,
+    cockpit: &mut Cockpit,
+    stops: &mut u64,
+    behaviour: &mut dyn Behaviour,
+    context: &mut Context<'_>,
+) {
+    cockpit.advance(now, context);
+    if std::mem::replace(stops, cockpit.stops) != cockpit.stops {
+        behaviour.handle_stop(cockpit, context);
+    }
+}

@@ -1,0 +1,266 @@
+//! Velocity State Driver: keeps a velocity, within limits that clients may narrow.
+
+use super::behaviour::Behaviour;
+use super::both_versions;
+use super::cockpit::Cockpit;
+use super::exchange::Exchange;
+use super::wanted::Wanted;
+use crate::motion::{Acceleration, Goal, Limits, Ticket, Velocity};
+use jaus::codec::{Message, ServiceId};
+use jaus::messages::mobility::report_acceleration_limit as acceleration;
+use jaus::messages::mobility::report_velocity_command as command;
+use jaus::messages::mobility::report_velocity_command_ext as ext;
+use jaus::messages::mobility::{
+    QueryAccelerationLimit, QueryVelocityCommand, QueryVelocityCommandExt, ReportAccelerationLimit,
+    ReportVelocityCommand, ReportVelocityCommandExt, SetAccelerationLimit, SetVelocityCommand,
+    SetVelocityCommandExt, velocity_state_driver,
+};
+use jaus::service::{Context, Handled, State, Validity};
+
+/// The velocity that a client wants, and the one to fall back to.
+#[derive(Default)]
+pub(super) struct VelocityStateDriver {
+    current: Velocity,
+    default: Velocity,
+    ticket: Option<Ticket>,
+}
+
+/// Which velocity a message is about. Through still air or water it makes no difference whether
+/// that is over ground (0 to 3) or relative to the medium (4 to 7).
+#[derive(Clone, Copy, PartialEq)]
+enum Which {
+    Current,
+    Greatest,
+    Least,
+    Default,
+}
+
+impl Which {
+    const fn of(command_type: u8) -> Option<Self> {
+        Some(match command_type {
+            0 | 4 => Self::Current,
+            1 | 5 => Self::Greatest,
+            2 | 6 => Self::Least,
+            3 | 7 => Self::Default,
+            _ => return None,
+        })
+    }
+}
+
+/// Command type of Set Acceleration Limit: for speeding up.
+const SPEEDING_UP: u8 = 1;
+/// Command type of Set Acceleration Limit: for slowing down.
+const SLOWING_DOWN: u8 = 2;
+
+impl Behaviour for VelocityStateDriver {
+    fn offers(&self) -> Vec<ServiceId> {
+        both_versions(velocity_state_driver::V1_1).into()
+    }
+
+    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        match code {
+            SetVelocityCommand::CODE => {
+                if let Some(message) = exchange.configure::<SetVelocityCommand>() {
+                    let wanted = |now: Velocity| Velocity {
+                        x: message.velocity_x_m_per_s().unwrap_or(now.x),
+                        yaw: message.yaw_rate_rad_per_s().unwrap_or(now.yaw),
+                        ..now
+                    };
+                    self.set(message.command_type.0, wanted, exchange);
+                }
+            }
+            SetVelocityCommandExt::CODE => {
+                if let Some(message) = exchange.configure::<SetVelocityCommandExt>() {
+                    let wanted = |now: Velocity| Velocity {
+                        x: message.velocity_x_m_per_s().unwrap_or(now.x),
+                        yaw: message.yaw_rate_rad_per_s().unwrap_or(now.yaw),
+                        ..now
+                    };
+                    self.set(message.command_type.0, wanted, exchange);
+                }
+            }
+            SetAccelerationLimit::CODE => {
+                if let Some(message) = exchange.configure() {
+                    limit_acceleration(&message, exchange);
+                }
+            }
+            QueryVelocityCommand::CODE => {
+                if let Some(query) = exchange.query() {
+                    self.report(&query, exchange);
+                }
+            }
+            QueryVelocityCommandExt::CODE => {
+                if let Some(query) = exchange.query() {
+                    self.report_ext(&query, exchange);
+                }
+            }
+            QueryAccelerationLimit::CODE => {
+                if let Some(query) = exchange.query() {
+                    report_limit(&query, exchange);
+                }
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(SetVelocityCommand::NAME)
+    }
+
+    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+        self.current = Velocity::default();
+        self.ticket = None;
+        if context.standing().state == State::Initialize {
+            self.default = Velocity::default();
+            cockpit.pilot.reset_limits();
+        }
+        changed(context);
+    }
+}
+
+fn changed(context: &mut Context<'_>) {
+    context.changed::<QueryVelocityCommand>();
+    context.changed::<QueryVelocityCommandExt>();
+    context.changed::<QueryAccelerationLimit>();
+}
+
+impl VelocityStateDriver {
+    /// Takes a velocity command. What it does not name stays as it is. To drive, the component
+    /// must be ready; limits may be set at any time.
+    fn set(
+        &mut self,
+        command_type: u8,
+        wanted: impl Fn(Velocity) -> Velocity,
+        exchange: &mut Exchange<'_, '_>,
+    ) {
+        let source = exchange.message.source;
+        let Some(which) = Which::of(command_type) else {
+            tracing::debug!(%source, command_type, "unknown kind of velocity command");
+            return;
+        };
+        let velocity = wanted(self.velocity(which, exchange.cockpit));
+        let pilot = &mut exchange.cockpit.pilot;
+        let limits = *pilot.limits();
+        match which {
+            Which::Current => {
+                let acts = exchange.context.standing().acts_for(source)
+                    && !exchange.cockpit.is_in_trouble();
+                tracing::debug!(%source, x = velocity.x, yaw = velocity.yaw, acts, "velocity set");
+                self.current = velocity;
+                let goal = Goal::Velocity(velocity);
+                self.ticket = acts.then(|| exchange.pursue(goal, Validity::Brief));
+            }
+            Which::Greatest => pilot.set_limits(Limits {
+                speed: velocity.x.max(0.0),
+                yaw_rate: velocity.yaw.max(0.0),
+                ..limits
+            }),
+            Which::Least => pilot.set_limits(Limits {
+                reverse: (-velocity.x).max(0.0),
+                ..limits
+            }),
+            Which::Default => self.default = velocity,
+        }
+        changed(exchange.context);
+    }
+
+    fn velocity(&self, which: Which, cockpit: &Cockpit) -> Velocity {
+        let limits = cockpit.pilot.limits();
+        match which {
+            Which::Current => match self.ticket {
+                Some(ticket) if !cockpit.pilot.pursues(ticket) => Velocity::default(),
+                _ => self.current,
+            },
+            Which::Greatest => Velocity::forward(limits.speed, limits.yaw_rate),
+            Which::Least => Velocity::forward(-limits.reverse, -limits.yaw_rate),
+            Which::Default => self.default,
+        }
+    }
+
+    fn report(&self, query: &QueryVelocityCommand, exchange: &mut Exchange<'_, '_>) {
+        let Some(which) = Which::of(query.command_type) else {
+            return;
+        };
+        let velocity = self.velocity(which, exchange.cockpit);
+        let wanted = Wanted(query.presence_vector.into());
+        exchange.reply(&ReportVelocityCommand {
+            command_type: command::CommandType(query.command_type),
+            velocity_x: wanted.real(0, velocity.x, command::VelocityX::new),
+            velocity_y: wanted.real(1, velocity.y, command::VelocityY::new),
+            velocity_z: wanted.real(2, velocity.z, command::VelocityZ::new),
+            roll_rate: wanted.real(3, velocity.roll, command::RollRate::new),
+            pitch_rate: wanted.real(4, velocity.pitch, command::PitchRate::new),
+            yaw_rate: wanted.real(5, velocity.yaw, command::YawRate::new),
+        });
+    }
+
+    fn report_ext(&self, query: &QueryVelocityCommandExt, exchange: &mut Exchange<'_, '_>) {
+        let Some(which) = Which::of(query.command_type) else {
+            return;
+        };
+        let velocity = self.velocity(which, exchange.cockpit);
+        let wanted = Wanted(query.presence_vector.into());
+        exchange.reply(&ReportVelocityCommandExt {
+            command_type: ext::CommandType(query.command_type),
+            velocity_x: wanted.real(0, velocity.x, ext::VelocityX::new),
+            velocity_y: wanted.real(1, velocity.y, ext::VelocityY::new),
+            velocity_z: wanted.real(2, velocity.z, ext::VelocityZ::new),
+            roll_rate: wanted.real(3, velocity.roll, ext::RollRate::new),
+            pitch_rate: wanted.real(4, velocity.pitch, ext::PitchRate::new),
+            yaw_rate: wanted.real(5, velocity.yaw, ext::YawRate::new),
+        });
+    }
+}
+
+/// Narrows the acceleration. A limit for slowing down may come with either sign. One of 0 would
+/// leave the vehicle without brakes, and is ignored.
+fn limit_acceleration(message: &SetAccelerationLimit, exchange: &mut Exchange<'_, '_>) {
+    let pilot = &mut exchange.cockpit.pilot;
+    let limits = *pilot.limits();
+    let along = message.acceleration_x_m_per_s2().map(f64::abs);
+    let along = along.filter(|&along| along > LEAST_ACCELERATION);
+    let about = message.yaw_acceleration_rad_per_s2().map(f64::abs);
+    let about = about.filter(|&about| about > LEAST_ACCELERATION);
+    let yaw_acceleration = about.unwrap_or(limits.yaw_acceleration);
+    match message.command_type.0 {
+        SPEEDING_UP => pilot.set_limits(Limits {
+            acceleration: along.unwrap_or(limits.acceleration),
+            yaw_acceleration,
+            ..limits
+        }),
+        SLOWING_DOWN => pilot.set_limits(Limits {
+            deceleration: along.unwrap_or(limits.deceleration),
+            yaw_acceleration,
+            ..limits
+        }),
+        _ => return,
+    }
+    changed(exchange.context);
+}
+
+const LEAST_ACCELERATION: f64 = 0.01;
+
+fn report_limit(query: &QueryAccelerationLimit, exchange: &mut Exchange<'_, '_>) {
+    let limits = *exchange.cockpit.pilot.limits();
+    let (x, yaw) = match query.command_type {
+        SPEEDING_UP => (limits.acceleration, limits.yaw_acceleration),
+        SLOWING_DOWN => (-limits.deceleration, -limits.yaw_acceleration),
+        _ => return,
+    };
+    let limit = Acceleration {
+        x,
+        yaw,
+        ..Acceleration::default()
+    };
+    let wanted = Wanted(query.presence_vector.into());
+    exchange.reply(&ReportAccelerationLimit {
+        command_type: acceleration::CommandType(query.command_type),
+        acceleration_x: wanted.real(0, limit.x, acceleration::AccelerationX::new),
+        acceleration_y: wanted.real(1, limit.y, acceleration::AccelerationY::new),
+        acceleration_z: wanted.real(2, limit.z, acceleration::AccelerationZ::new),
+        roll_acceleration: wanted.real(3, limit.roll, acceleration::RollAcceleration::new),
+        pitch_acceleration: wanted.real(4, limit.pitch, acceleration::PitchAcceleration::new),
+        yaw_acceleration: wanted.real(5, limit.yaw, acceleration::YawAcceleration::new),
+    });
+}

@@ -1,0 +1,73 @@
+//! Local and Global Waypoint Driver: drive to one waypoint.
+
+use std::marker::PhantomData;
+
+use super::behaviour::Behaviour;
+use super::both_versions;
+use super::cockpit::{Cockpit, changed};
+use super::exchange::{Command, Exchange};
+use super::kind::Waypoints;
+use super::place::Place;
+use super::travel;
+use jaus::codec::{Message, ServiceId};
+use jaus::service::{Context, Handled};
+
+/// A driver to waypoints of one kind.
+pub(super) struct WaypointDriver<K>(PhantomData<K>);
+
+impl<K: Waypoints> WaypointDriver<K> {
+    pub(super) const fn new() -> Self {
+        Self(PhantomData)
+    }
+}
+
+impl<K: Waypoints> Behaviour for WaypointDriver<K> {
+    fn offers(&self) -> Vec<ServiceId> {
+        both_versions(K::DRIVER).into()
+    }
+
+    fn handle(&mut self, code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        if code == K::Set::CODE {
+            set(exchange.command::<K::Set>(), exchange);
+        } else if code == K::SetExt::CODE {
+            set(exchange.command::<K::SetExt>(), exchange);
+        } else if K::handle_query(code, exchange) == Handled::No {
+            return travel::handle_speed(code, exchange);
+        }
+        Handled::Yes
+    }
+
+    fn acts_on(&self) -> Option<&'static str> {
+        Some(K::Set::NAME)
+    }
+
+    fn tells_end_of(&self, command: u16) -> bool {
+        command == K::Set::CODE || command == K::SetExt::CODE
+    }
+
+    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+        cockpit.work_off(context);
+    }
+
+    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+        cockpit.abandon(context);
+    }
+}
+
+/// Takes a waypoint; with a travel speed, the vehicle sets out at once.
+fn set<M: Message + Into<Place>>(command: Option<Command<M>>, exchange: &mut Exchange<'_, '_>) {
+    let Some(Command { message, acts }) = command else {
+        return;
+    };
+    let place = message.into();
+    let source = exchange.message.source;
+    if !exchange.cockpit.can_reach(&place) {
+        tracing::warn!(%source, ?place, "waypoint ignored: it is out of reach");
+        return;
+    }
+    tracing::info!(%source, ?place, "waypoint set");
+    let cockpit = &mut exchange.cockpit;
+    cockpit.set_place(place, M::CODE, acts, exchange.context);
+    travel::accept(exchange);
+    changed(exchange.context);
+}

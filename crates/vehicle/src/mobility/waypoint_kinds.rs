@@ -1,0 +1,95 @@
+//! Waypoints in the local frame and on the globe, as the drivers to them take and tell them.
+
+use super::exchange::Exchange;
+use super::kind::{Kind, Waypoints};
+use super::place::Place;
+use super::wanted::Wanted;
+use jaus::codec::{Message, ServiceId};
+use jaus::messages::mobility::{
+    QueryGlobalWaypoint, QueryGlobalWaypointExt, QueryLocalWaypoint, QueryLocalWaypointExt,
+    SetGlobalWaypoint, SetGlobalWaypointExt, SetLocalWaypoint, SetLocalWaypointExt,
+    global_waypoint_driver, global_waypoint_list_driver, local_waypoint_driver,
+    local_waypoint_list_driver,
+};
+use jaus::service::{Elements, Handled};
+
+/// Waypoints on the globe.
+pub(super) struct Global;
+
+impl Waypoints for Global {
+    const DRIVER: ServiceId = global_waypoint_driver::V1_1;
+    type Set = SetGlobalWaypoint;
+    type SetExt = SetGlobalWaypointExt;
+}
+
+impl Kind for Global {
+    const LIST_DRIVER: ServiceId = global_waypoint_list_driver::V1_1;
+
+    fn accept(elements: &Elements) {
+        accept::<SetGlobalWaypoint>(elements);
+        accept::<SetGlobalWaypointExt>(elements);
+    }
+
+    fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        let Some(Place::Global(waypoint)) = exchange.cockpit.place() else {
+            return Handled::No;
+        };
+        match code {
+            QueryGlobalWaypoint::CODE => {
+                if let Some(query) = exchange.query::<QueryGlobalWaypoint>() {
+                    exchange.reply_if(waypoint.report(Wanted(query.presence_vector.into())));
+                }
+            }
+            QueryGlobalWaypointExt::CODE => {
+                if let Some(query) = exchange.query::<QueryGlobalWaypointExt>() {
+                    exchange.reply_if(waypoint.report_ext(Wanted(query.presence_vector.into())));
+                }
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+}
+
+/// Waypoints in the local frame.
+pub(super) struct Local;
+
+impl Waypoints for Local {
+    const DRIVER: ServiceId = local_waypoint_driver::V1_1;
+    type Set = SetLocalWaypoint;
+    type SetExt = SetLocalWaypointExt;
+}
+
+impl Kind for Local {
+    const LIST_DRIVER: ServiceId = local_waypoint_list_driver::V1_1;
+
+    fn accept(elements: &Elements) {
+        accept::<SetLocalWaypoint>(elements);
+        accept::<SetLocalWaypointExt>(elements);
+    }
+
+    fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
+        let Some(Place::Local(waypoint)) = exchange.cockpit.place() else {
+            return Handled::No;
+        };
+        match code {
+            QueryLocalWaypoint::CODE => {
+                if let Some(query) = exchange.query::<QueryLocalWaypoint>() {
+                    exchange.reply_if(waypoint.report(Wanted(query.presence_vector.into())));
+                }
+            }
+            QueryLocalWaypointExt::CODE => {
+                if let Some(query) = exchange.query::<QueryLocalWaypointExt>() {
+                    exchange.reply_if(waypoint.report_ext(Wanted(query.presence_vector.into())));
+                }
+            }
+            _ => return Handled::No,
+        }
+        Handled::Yes
+    }
+}
+
+/// Has a list take a waypoint that is in reach.
+fn accept<M: Message + Clone + Into<Place>>(elements: &Elements) {
+    elements.accept_if(|message: &M| message.clone().into().is_in_reach());
+}

@@ -1,0 +1,142 @@
+//! From a wanted velocity to efforts: what should do, and more of it as long as it does not.
+
+use std::time::{Duration, Instant};
+
+use super::{Effort, Limits, Velocity};
+
+/// Pushes a vehicle to a velocity: feed-forward of the effort that keeps it, and proportional to
+/// what is still missing. What is wanted changes no faster than the limits allow.
+#[derive(Debug, Clone)]
+pub struct Throttle {
+    limits: Limits,
+    ramp: Option<(Instant, Velocity)>,
+}
+
+impl Throttle {
+    /// Effort for a missing velocity, as a share of the effort that would keep it.
+    const GAIN: f64 = 0.6;
+    /// The longest time that the ramp makes up for at once.
+    const LONGEST_STEP: Duration = Duration::from_millis(200);
+
+    /// For a vehicle whose full effort reaches the speed and the yaw rate of its limits.
+    #[must_use]
+    pub const fn new(limits: Limits) -> Self {
+        Self { limits, ramp: None }
+    }
+
+    /// Begins anew with the velocity that is measured then.
+    pub const fn reset(&mut self) {
+        self.ramp = None;
+    }
+
+    /// The effort at `now`, for a velocity that is wanted and one that is measured.
+    pub fn push(&mut self, now: Instant, wanted: Velocity, measured: &Velocity) -> Effort {
+        let limits = self.limits;
+        let wanted = limits.clamp(wanted);
+        let (before, last) = self.ramp.unwrap_or((now, *measured));
+        let step = now
+            .saturating_duration_since(before)
+            .min(Self::LONGEST_STEP);
+        let seconds = step.as_secs_f64();
+        let slows = wanted.x.abs() < last.x.abs() || wanted.x * last.x < 0.0;
+        let rate = if slows {
+            limits.deceleration
+        } else {
+            limits.acceleration
+        };
+        let ramped = Velocity::forward(
+            approach(last.x, wanted.x, rate * seconds),
+            approach(last.yaw, wanted.yaw, limits.yaw_acceleration * seconds),
+        );
+        self.ramp = Some((now, ramped));
+        Effort {
+            forward: share(ramped.x, measured.x, limits.speed, limits.reverse),
+            turn: share(ramped.yaw, measured.yaw, limits.yaw_rate, limits.yaw_rate),
+            ..Effort::default()
+        }
+    }
+}
+
+/// The share of the full effort for a wanted and a measured speed; full effort reaches another speed
+/// forward than backward.
+fn share(wanted: f64, measured: f64, ahead: f64, back: f64) -> f64 {
+    let missing = wanted - measured;
+    let pushed = wanted + Throttle::GAIN * missing;
+    let full = if pushed < 0.0 { back } else { ahead };
+    let effort = pushed / full.max(f64::MIN_POSITIVE);
+    // What is not a number pushes nothing.
+    if effort.is_nan() {
+        0.0
+    } else {
+        effort.clamp(-1.0, 1.0)
+    }
+}
+
+/// A value closer to a goal by at most `most`.
+fn approach(value: f64, goal: f64, most: f64) -> f64 {
+    value + (goal - value).clamp(-most, most)
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "any moment will do as the beginning of virtual time"
+)]
+mod tests {
+    use super::*;
+    use crate::motion::{Drive, Platform, SkidSteer, SkidSteerConfig};
+
+    /// Drives for some seconds with what was measured a tenth of a second ago.
+    fn drive(wanted: Velocity, strength: f64, seconds: f64) -> Velocity {
+        let mut rover = SkidSteer::new(SkidSteerConfig::default());
+        let mut throttle = Throttle::new(Limits::default());
+        let mut now = Instant::now();
+        let mut measured = vec![Velocity::default(); 3];
+        for _ in 0..(seconds * 20.0) as u32 {
+            let late = measured.remove(0);
+            let mut effort = throttle.push(now, wanted, &late);
+            effort.forward *= strength;
+            rover.drive(Drive::Effort(effort));
+            now += Duration::from_millis(50);
+            rover.handle_time(now);
+            measured.push(rover.motion().velocity);
+        }
+        rover.motion().velocity
+    }
+
+    #[test]
+    fn a_velocity_is_reached_and_kept() {
+        let velocity = drive(Velocity::forward(1.0, 0.5), 1.0, 10.0);
+        assert!((velocity.x - 1.0).abs() < 0.05, "{velocity:?}");
+        assert!((velocity.yaw - 0.5).abs() < 0.05, "{velocity:?}");
+    }
+
+    #[test]
+    fn a_weak_motor_is_driven_harder() {
+        // With the same effort it would come to 0.7 m/s.
+        let velocity = drive(Velocity::forward(1.0, 0.0), 0.7, 10.0);
+        assert!(velocity.x > 0.75, "{velocity:?}");
+    }
+
+    #[test]
+    fn what_is_wanted_comes_no_faster_than_the_limits_allow() {
+        let mut throttle = Throttle::new(Limits::default());
+        let now = Instant::now();
+        let wanted = Velocity::forward(2.0, 0.0);
+        assert_eq!(
+            throttle.push(now, wanted, &Velocity::default()).forward,
+            0.0
+        );
+        let soon = now + Duration::from_millis(100);
+        let effort = throttle.push(soon, wanted, &Velocity::default());
+        assert!((effort.forward - 0.08).abs() < 1e-9, "{effort:?}");
+    }
+
+    #[test]
+    fn what_is_not_known_pushes_nothing() {
+        let mut throttle = Throttle::new(Limits::default());
+        let unknown = Velocity::forward(f64::NAN, 0.0);
+        let effort = throttle.push(Instant::now(), Velocity::forward(1.0, 0.0), &unknown);
+        assert_eq!(effort.forward, 0.0);
+    }
+}

@@ -1,0 +1,74 @@
+//! When a fault is a failure of the component, and when that is over.
+
+use std::time::{Duration, Instant};
+
+use jaus::component::Condition;
+
+/// Keeps a component's Failure in step with what it lacks.
+#[derive(Debug, Default)]
+pub(in crate::parts) struct FaultMonitor {
+    since: Option<Instant>,
+    /// Why the component has failed.
+    failure: Option<String>,
+}
+
+impl FaultMonitor {
+    /// What is missing for longer than this while the vehicle should move is a failure.
+    pub(in crate::parts) const LIMIT: Duration = Duration::from_secs(2);
+
+    /// Something has been missing at `now` for `why`. Returns what to report of the component after
+    /// `limit`, once.
+    pub(in crate::parts) fn lacks(
+        &mut self,
+        now: Instant,
+        why: &str,
+        limit: Duration,
+    ) -> Option<Condition> {
+        let since = *self.since.get_or_insert(now);
+        if self.failure.is_some() || now.saturating_duration_since(since) < limit {
+            return None;
+        }
+        tracing::error!("failure: {why}");
+        self.failure = Some(why.to_owned());
+        Some(Condition::Failed)
+    }
+
+    /// Nothing is missing. Returns what to report of a component that had failed.
+    pub(in crate::parts) fn is_over(&mut self) -> Option<Condition> {
+        self.since = None;
+        let failure = self.failure.take()?;
+        tracing::warn!("no failure any more: {failure}");
+        Some(Condition::Initialized)
+    }
+
+    /// Why the component has failed, while it has.
+    pub(in crate::parts) fn failure(&self) -> Option<&str> {
+        self.failure.as_deref()
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "any moment will do as the beginning of virtual time"
+)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_outage_beyond_the_limit_is_a_failure_until_it_is_over() {
+        let mut monitor = FaultMonitor::default();
+        let start = Instant::now();
+        let limit = FaultMonitor::LIMIT;
+        assert_eq!(monitor.lacks(start, "no pose", limit), None);
+        assert_eq!(monitor.is_over(), None);
+        let later = start + limit;
+        assert_eq!(monitor.lacks(later, "no pose", limit), None, "another one");
+        let failed = monitor.lacks(later + limit, "no pose", limit);
+        assert_eq!(failed, Some(Condition::Failed));
+        assert_eq!(monitor.failure(), Some("no pose"));
+        assert_eq!(monitor.lacks(later + limit, "no pose", limit), None, "once");
+        assert_eq!(monitor.is_over(), Some(Condition::Initialized));
+        assert_eq!((monitor.is_over(), monitor.failure()), (None, None));
+    }
+}

@@ -1,0 +1,382 @@
+//! The way from one driver to the next: found, taken under control, resumed, commanded, watched, and
+//! given back.
+//!
+//! Commands are acknowledged, one at a time: while one is on its way the later ones wait, and only the
+//! latest of them is sent. When the next driver was started again, or can not be reached for a
+//! moment, the way is made anew. When it was stopped by an emergency or taken over, the driver stands
+//! down: it gives up what it was told, and waits to be told anew.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here the driver gets its time, and waits for it"
+)]
+
+use std::convert::Infallible;
+use std::time::{Duration, Instant};
+
+use tokio::time::{Interval, MissedTickBehavior, interval, sleep, timeout};
+
+use super::helm::{Helm, Order, Plan};
+use super::verdict::{Told, Verdict, judge};
+use super::{FaultMonitor, Watchman};
+use crate::ground::{StageBoard, StageReport, StageState};
+use crate::mobility::Vehicle;
+use crate::motion::Motion;
+use crate::parts::PartError;
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::component::{
+    Audience, Component, Control, ControlError, ControlRefused, ManageError, QueryError, State,
+};
+use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
+use jaus::messages::ground::{QueryStage, ReportStage};
+
+/// How a driver talks to the next one.
+pub(in crate::parts) trait Language: Send + 'static {
+    /// What it commands with.
+    type Command: Message + Send + Sync;
+    /// The service of the next driver …
+    const URN: &'static str;
+    /// … and what people call it.
+    const NAME: &'static str;
+    /// Between two commands.
+    const PAUSE: Duration;
+
+    /// The command that carries out an order.
+    fn command(&mut self, now: Instant, order: Order, motion: &Motion) -> Self::Command;
+
+    /// The command to stand still.
+    fn halt(&mut self) -> Self::Command;
+}
+
+/// A driver's way to the next one.
+pub(in crate::parts) struct Next<L> {
+    pub(in crate::parts) component: Component,
+    pub(in crate::parts) vehicle: Vehicle,
+    pub(in crate::parts) helm: Helm,
+    pub(in crate::parts) board: StageBoard,
+    pub(in crate::parts) language: L,
+    /// The authority with which the next one is controlled.
+    pub(in crate::parts) authority: u8,
+    /// For how long its commanders must have said nothing before it listens to them again after it
+    /// has stood down.
+    pub(in crate::parts) settling: Duration,
+    /// Notes sensors that are missing while the vehicle should move.
+    pub(in crate::parts) sensors: FaultMonitor,
+}
+
+/// How the way to the next driver has ended.
+enum End {
+    /// There is nothing more to be done.
+    Rest,
+    /// It can be made anew.
+    Anew { peer: Option<JausId>, why: String },
+    /// Somebody meant it.
+    StandDown(String),
+}
+
+impl<L: Language> Next<L> {
+    /// The next driver is kept so long when there is nothing to do.
+    const LINGER: Duration = Duration::from_millis(500);
+    /// A command that is not acknowledged in so long is given up for a later one.
+    const PATIENCE: Duration = Duration::from_millis(400);
+    /// Without any acknowledgement for so long the way is made anew.
+    const SILENCE: Duration = Duration::from_secs(2);
+    /// The first and the longest pause before the way is made anew.
+    const PAUSES: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(2));
+
+    /// Runs until the component has stopped; the owner notices that by other means, too.
+    pub(in crate::parts) async fn run(mut self) -> Result<Infallible, PartError> {
+        let mut ticks = interval(L::PAUSE);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut watchman = Watchman::default();
+        let mut down: Option<String> = None;
+        let mut pause = Self::PAUSES.0;
+        loop {
+            self.rest(&mut ticks, &mut watchman, down.take()).await;
+            let begun = Instant::now();
+            match self.work(&mut ticks, &mut watchman).await {
+                End::Rest => pause = Self::PAUSES.0,
+                End::Anew { peer, why } => {
+                    if begun.elapsed() > Self::PAUSES.1 {
+                        pause = Self::PAUSES.0;
+                    }
+                    // Blocked without a next one would mean that it has stood down.
+                    let state = peer.map_or(StageState::Engaging, |_| StageState::Blocked);
+                    self.tell(state, peer, why).await;
+                    sleep(pause).await;
+                    pause = (pause * 2).min(Self::PAUSES.1);
+                }
+                End::StandDown(why) => {
+                    tracing::warn!("stands down: {why}");
+                    self.stand_down(&mut ticks, &mut watchman, &why).await;
+                    down = Some(why);
+                    pause = Self::PAUSES.0;
+                }
+            }
+        }
+    }
+
+    /// Waits for an order. Why it stood down is told until somebody else commands it, or it is resumed.
+    async fn rest(
+        &mut self,
+        ticks: &mut Interval,
+        watchman: &mut Watchman,
+        mut down: Option<String>,
+    ) {
+        let before = self.component.standing();
+        while self.helm.plan(Instant::now()) == Plan::Rest {
+            let standing = self.component.standing();
+            watchman.note(standing);
+            if standing.controller != before.controller {
+                down = None;
+            }
+            self.check_sensors(None).await;
+            if let Some(failure) = self.sensors.failure() {
+                let reason = format!("failure: {failure}");
+                self.tell(StageState::Blocked, self.find(), reason).await;
+            } else if let Some(reason) = down.as_deref().or(watchman.emergency()) {
+                self.tell_down(reason).await;
+            } else if let Some(cause) = self.vehicle.last_stop() {
+                let why = format!("stopped: {cause}");
+                self.tell(StageState::Idle, None, why).await;
+            } else if self.vehicle.has_arrived() {
+                self.tell(StageState::Done, None, String::new()).await;
+            } else {
+                self.tell(StageState::Idle, None, String::new()).await;
+            }
+            ticks.tick().await;
+        }
+    }
+
+    /// Gives up what it was told, until whoever tells it has been silent for a while or is another.
+    async fn stand_down(&self, ticks: &mut Interval, watchman: &mut Watchman, why: &str) {
+        let controller = self.component.standing().controller;
+        self.vehicle.stop();
+        let mut since = Instant::now();
+        while since.elapsed() < self.settling {
+            let standing = self.component.standing();
+            watchman.note(standing);
+            self.tell_down(why).await;
+            ticks.tick().await;
+            if standing.controller != controller {
+                return;
+            }
+            if self.vehicle.is_under_way() {
+                self.vehicle.stop();
+                since = Instant::now();
+            }
+        }
+    }
+
+    /// Takes the next driver under control and commands it, to whatever end.
+    async fn work(&mut self, ticks: &mut Interval, watchman: &mut Watchman) -> End {
+        let Some(peer) = self.find() else {
+            let why = format!("no {} is known", L::NAME);
+            return End::Anew { peer: None, why };
+        };
+        self.tell(StageState::Engaging, Some(peer), String::new())
+            .await;
+        let control = match self.engage(peer).await {
+            Ok(control) => control,
+            Err(end) => return end,
+        };
+        tracing::info!("{peer} obeys");
+        let component = self.component.clone();
+        let end = tokio::select! {
+            end = self.command(&control, ticks, watchman) => end,
+            end = supervise(&component, peer) => end,
+        };
+        // Who has gone is not waited for.
+        let _ = timeout(Self::PATIENCE, control.release()).await;
+        end
+    }
+
+    fn find(&self) -> Option<JausId> {
+        let subsystem = self.component.id().subsystem();
+        let providers = Audience::providers(L::URN).in_subsystem(subsystem);
+        self.component.members(providers).first().copied()
+    }
+
+    async fn engage(&self, peer: JausId) -> Result<Control, End> {
+        let anew = |why: String| End::Anew {
+            peer: Some(peer),
+            why,
+        };
+        let control = match self.component.control(peer, self.authority).await {
+            Ok(control) => control,
+            Err(ControlError::Refused {
+                why: ControlRefused::NotAvailable,
+                ..
+            }) => {
+                // Not in a failure either, but that ends by itself.
+                return Err(match examine(&self.component, peer).await {
+                    Ok(Verdict::Anew) => anew(format!("{peer} has failed, or was started again")),
+                    _ => End::StandDown(format!(
+                        "{peer} cannot be controlled, for instance because of an emergency"
+                    )),
+                });
+            }
+            Err(error) => {
+                return Err(match examine(&self.component, peer).await {
+                    Ok(Verdict::StandDown(why)) => anew(why),
+                    _ => anew(error.to_string()),
+                });
+            }
+        };
+        match control.resume().await {
+            Ok(()) => Ok(control),
+            Err(ManageError::State { found, .. }) if found == State::Emergency as u8 => {
+                Err(End::StandDown(format!("{peer} is stopped by an emergency")))
+            }
+            Err(error) => Err(anew(error.to_string())),
+        }
+    }
+
+    /// Commands the next driver as long as there is something to do.
+    async fn command(
+        &mut self,
+        control: &Control,
+        ticks: &mut Interval,
+        watchman: &mut Watchman,
+    ) -> End {
+        let peer = control.peer();
+        let mut busy = Instant::now();
+        let mut acknowledged = Instant::now();
+        loop {
+            watchman.note(self.component.standing());
+            let now = Instant::now();
+            let command = match self.helm.plan(now) {
+                Plan::Go(order, motion) => {
+                    busy = now;
+                    self.check_sensors(None).await;
+                    self.tell(StageState::Active, Some(peer), String::new())
+                        .await;
+                    self.language.command(now, order, &motion)
+                }
+                Plan::Wait(why) => {
+                    busy = now;
+                    self.check_sensors(Some(&why)).await;
+                    self.tell(StageState::Blocked, Some(peer), why).await;
+                    self.language.halt()
+                }
+                Plan::Rest if now - busy > Self::LINGER => return End::Rest,
+                Plan::Rest => {
+                    if self.vehicle.has_arrived() {
+                        self.tell(StageState::Done, None, String::new()).await;
+                    }
+                    self.language.halt()
+                }
+            };
+            match timeout(Self::PATIENCE, control.deliver(&command)).await {
+                Ok(Ok(())) => acknowledged = Instant::now(),
+                Ok(Err(ControlError::Lost { why, .. })) => {
+                    let why = format!("control over {peer} is lost: {why}");
+                    return self.after_loss(peer, why).await;
+                }
+                Ok(Err(_)) | Err(_) if acknowledged.elapsed() > Self::SILENCE => {
+                    let why = format!("{peer} does not acknowledge commands");
+                    return End::Anew {
+                        peer: Some(peer),
+                        why,
+                    };
+                }
+                Ok(Err(error)) => tracing::debug!(%error, "not delivered"),
+                Err(_) => tracing::debug!(%peer, "not acknowledged in time"),
+            }
+            ticks.tick().await;
+        }
+    }
+
+    /// What sensors lack for too long while the vehicle should move is a failure of the component,
+    /// which stops and gives control up. It is over when they report again, and the component waits
+    /// in Standby.
+    async fn check_sensors(&mut self, lack: Option<&str>) {
+        let now = Instant::now();
+        let condition = match lack {
+            Some(why) => self.sensors.lacks(now, why, FaultMonitor::LIMIT),
+            None if self.sensors.failure().is_some() && self.helm.lack(now).is_some() => None,
+            None => self.sensors.is_over(),
+        };
+        if let Some(condition) = condition {
+            self.component.set_condition(condition).await;
+        }
+    }
+
+    /// Finds out why control was lost.
+    async fn after_loss(&self, peer: JausId, why: String) -> End {
+        match examine(&self.component, peer).await {
+            Ok(Verdict::StandDown(why)) => End::StandDown(why),
+            _ => End::Anew {
+                peer: Some(peer),
+                why,
+            },
+        }
+    }
+
+    /// Tells that it has stood down: blocked, and commanding nobody.
+    async fn tell_down(&self, why: &str) {
+        self.tell(StageState::Blocked, None, why.to_owned()).await;
+    }
+
+    async fn tell(&self, state: StageState, next: Option<JausId>, reason: String) {
+        let progress = match state {
+            StageState::Done => 100,
+            StageState::Active | StageState::Blocked => self.vehicle.progress(),
+            StageState::Idle | StageState::Engaging => 0,
+        };
+        let before = self.board.report();
+        let report = StageReport {
+            state,
+            progress,
+            next,
+            reason,
+        };
+        if before.state != state || (before.reason.is_empty() && !report.reason.is_empty()) {
+            match report.reason.as_str() {
+                "" => tracing::info!("{state}"),
+                reason => tracing::info!("{state}: {reason}"),
+            }
+        }
+        if self.board.tell(report) {
+            self.component.changed::<QueryStage>().await;
+        }
+    }
+}
+
+/// Between two looks at how the next driver is.
+const LOOK: Duration = Duration::from_millis(250);
+
+/// Watches the next driver until there is something the matter with it.
+async fn supervise(component: &Component, peer: JausId) -> End {
+    // What it said of itself before it was resumed does not count.
+    sleep(2 * LOOK).await;
+    loop {
+        sleep(LOOK).await;
+        match examine(component, peer).await {
+            // That it is silent the commands notice.
+            Ok(Verdict::GoOn) | Err(_) => {}
+            Ok(Verdict::Anew) => {
+                let why = format!("{peer} has failed, or was started again");
+                return End::Anew {
+                    peer: Some(peer),
+                    why,
+                };
+            }
+            Ok(Verdict::StandDown(why)) => return End::StandDown(why),
+        }
+    }
+}
+
+/// Asks the next driver how it is.
+async fn examine(component: &Component, peer: JausId) -> Result<Verdict, QueryError> {
+    let status: ReportStatus = component.query(peer, &QueryStatus {}).await?;
+    let control: ReportControl = component.query(peer, &QueryControl {}).await?;
+    let stage: ReportStage = component.query(peer, &QueryStage {}).await?;
+    let controller = JausId::new(control.subsystem_id, control.node_id, control.component_id);
+    let told = Told {
+        status: status.status.0,
+        controller: controller.is_unicast().then_some(controller),
+        stage: StageReport::from(&stage),
+    };
+    Ok(judge(component.id(), peer, &told))
+}

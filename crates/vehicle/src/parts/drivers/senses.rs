@@ -1,0 +1,149 @@
+//! Reports of whoever offers a service in the own subsystem: found, followed, and found again.
+
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here it is noted when reports come"
+)]
+
+use std::convert::Infallible;
+use std::time::Instant;
+
+use super::Helm;
+use super::freshness::time_in_month;
+use crate::parts::PartError;
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::component::{Audience, Component, GroupSubscription, GroupUpdate, When};
+use jaus::messages::mobility::{
+    QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState, local_pose_sensor,
+    velocity_state_sensor,
+};
+
+/// The reports of one sensor of the own subsystem, whichever that is at the time.
+///
+/// If there are several, the first that reports is listened to until it is silent.
+pub(in crate::parts) struct Sense<R> {
+    reports: GroupSubscription<R>,
+    source: Option<JausId>,
+    /// Whether the source was lost since the last report.
+    was_lost: bool,
+    what: &'static str,
+}
+
+impl<R: Message> Sense<R> {
+    /// Begins to look for providers of a service, and to listen to one; people know it as `what`.
+    pub(in crate::parts) fn of<Q: Message>(
+        component: &Component,
+        urn: &'static str,
+        query: &Q,
+        hz: f64,
+        what: &'static str,
+    ) -> Result<Self, PartError> {
+        let providers = Audience::providers(urn).in_subsystem(component.id().subsystem());
+        let reports = component.subscribe_all(providers, query, When::hz(hz));
+        Ok(Self {
+            reports: reports.map_err(|error| PartError::Broken(error.to_string()))?,
+            source: None,
+            was_lost: false,
+            what,
+        })
+    }
+
+    /// Waits for the next report. Nothing is lost if the returned future is dropped.
+    pub(in crate::parts) async fn next(&mut self) -> Result<R, PartError> {
+        loop {
+            let next = self.reports.next().await;
+            let (source, update) = next.ok_or(PartError::NodeStopped)?;
+            match update {
+                GroupUpdate::Report(report) => {
+                    if self.source.is_none() {
+                        tracing::info!("{} from {source}", self.what);
+                        self.source = Some(source);
+                    }
+                    if self.source == Some(source) {
+                        return Ok(report);
+                    }
+                }
+                GroupUpdate::Down { why, .. } if self.source == Some(source) => {
+                    tracing::info!("no {} from {source}: {why}", self.what);
+                    self.source = None;
+                    self.was_lost = true;
+                }
+                GroupUpdate::Gone if self.source == Some(source) => {
+                    tracing::info!("no {} from {source}: it is gone", self.what);
+                    self.source = None;
+                    self.was_lost = true;
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+impl<R: Message> Sense<R> {
+    /// Whether the source was lost since this was asked last, so that the next report may be of
+    /// another one, with another clock.
+    pub(in crate::parts) const fn take_loss(&mut self) -> bool {
+        std::mem::replace(&mut self.was_lost, false)
+    }
+}
+
+impl Sense<ReportLocalPose> {
+    /// X, Y, yaw and time stamp.
+    const FIELDS: u16 = 0b1_0100_0011;
+
+    /// The pose in the local frame.
+    pub(in crate::parts) fn pose(component: &Component, hz: f64) -> Result<Self, PartError> {
+        let query = QueryLocalPose {
+            presence_vector: Self::FIELDS,
+        };
+        Self::of(component, local_pose_sensor::URN, &query, hz, "pose")
+    }
+
+    /// Hands all reports to a helm.
+    pub(in crate::parts) async fn steer(mut self, helm: &Helm) -> Result<Infallible, PartError> {
+        loop {
+            let report = self.next().await?;
+            let now = Instant::now();
+            if self.take_loss() {
+                helm.handle_pose(now, None, None);
+            }
+            let place = report.x_m().zip(report.y_m()).zip(report.yaw_rad());
+            let stamp = report.time_stamp.and_then(time_in_month);
+            helm.handle_pose(now, stamp, place.map(|((x, y), yaw)| (x, y, yaw)));
+        }
+    }
+}
+
+impl Sense<ReportVelocityState> {
+    /// Velocity along X, yaw rate and time stamp.
+    const FIELDS: u16 = 0b1_0100_0001;
+
+    /// The velocity along and about the vehicle's own axes.
+    pub(in crate::parts) fn velocity(component: &Component, hz: f64) -> Result<Self, PartError> {
+        let query = QueryVelocityState {
+            presence_vector: Self::FIELDS,
+        };
+        Self::of(
+            component,
+            velocity_state_sensor::URN,
+            &query,
+            hz,
+            "velocity",
+        )
+    }
+
+    /// Hands all reports to a helm.
+    pub(in crate::parts) async fn steer(mut self, helm: &Helm) -> Result<Infallible, PartError> {
+        loop {
+            let report = self.next().await?;
+            let now = Instant::now();
+            if self.take_loss() {
+                helm.handle_velocity(now, None, None);
+            }
+            let velocity = report.velocity_x_m_per_s().zip(report.yaw_rate_rad_per_s());
+            let stamp = report.time_stamp.and_then(time_in_month);
+            helm.handle_velocity(now, stamp, velocity);
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! The vector knowledge store: objects and maps for all parts of a vehicle, kept in a file.
+
+use std::convert::Infallible;
+use std::path::{Path, PathBuf};
+
+use bytes::Bytes;
+use tokio::sync::mpsc;
+
+use super::{Part, PartError, Seat};
+use crate::ground::WorldStore;
+use crate::motion::Frame;
+use crate::world::{Change, Done, OpenError, Picture, Raster, World};
+use jaus::component::Component;
+
+/// Keeps the world of a vehicle and tells of it.
+///
+/// It offers Vector Knowledge Store and Raster Maps, to anyone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnowledgeStore {
+    /// The file. It is made if it is not there.
+    pub file: PathBuf,
+    /// What to do with a file that is damaged.
+    pub broken: Broken,
+    /// A map to begin with, unless there is one of its name already.
+    pub map: Option<(Raster, Picture)>,
+    /// Where the local frame is on the globe, for maps as objects.
+    pub frame: Frame,
+}
+
+/// What to do with a file that is damaged or no store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Broken {
+    /// Not to run; the file stays as it is.
+    #[default]
+    Refuse,
+    /// To keep it under another name and begin with an empty store.
+    SetAside,
+}
+
+impl Default for KnowledgeStore {
+    fn default() -> Self {
+        Self {
+            file: PathBuf::from(Self::FILE),
+            broken: Broken::default(),
+            map: None,
+            frame: Frame::default(),
+        }
+    }
+}
+
+impl KnowledgeStore {
+    /// What the file is called where nothing else is said.
+    pub const FILE: &'static str = "knowledge-store.redb";
+
+    /// The map of 16 x 16 cells that a vehicle is shown on, around the origin of the local frame.
+    #[must_use]
+    pub fn demo_map() -> (Raster, Picture) {
+        let picture = Picture::demo();
+        let raster = picture.at("traversability".to_owned(), 1.0, (-8.0, -8.0));
+        (raster, picture)
+    }
+
+    fn open(&self) -> Result<World, PartError> {
+        let mut world = match World::open(&self.file) {
+            Err(error @ OpenError::Broken { .. }) if self.broken == Broken::SetAside => {
+                set_aside(&self.file, &error)?;
+                World::open(&self.file)
+            }
+            opened => opened,
+        }
+        .map_err(|error| PartError::Broken(advice(&error)))?;
+        if let Some((raster, picture)) = &self.map {
+            import(&mut world, raster, picture)?;
+        }
+        tell(&self.file, &world);
+        Ok(world)
+    }
+}
+
+impl Part for KnowledgeStore {
+    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+        let frame = self.frame;
+        let opening = tokio::task::spawn_blocking(move || self.open());
+        let world = opening.await.map_err(|_| PartError::NodeStopped)??;
+        let (fail, mut failures) = mpsc::unbounded_channel();
+        let store = WorldStore::new(world, frame, move |error| {
+            // Without a listener the part has ended already.
+            let _ = fail.send(error.to_string());
+        });
+        let component = seat
+            .component("Vector Knowledge Store")
+            .offer(store.vector_knowledge_store())
+            .offer(store.raster_maps())
+            .live_on(seat.port)?;
+        // Whoever holds the store beside the component would keep the file open after its end.
+        drop(store);
+        tokio::select! {
+            failure = failures.recv() => Err(failure.map_or(PartError::NodeStopped, PartError::Broken)),
+            () = gone(&component) => Err(PartError::NodeStopped),
+        }
+    }
+}
+
+/// Returns once the component has stopped.
+async fn gone(component: &Component) {
+    let mut standing = component.watch_standing();
+    while standing.changed().await.is_ok() {}
+}
+
+fn import(world: &mut World, raster: &Raster, picture: &Picture) -> Result<(), PartError> {
+    let name = &raster.name;
+    if world.rasters().values().any(|it| it.name == *name) {
+        tracing::info!("there is a map \"{name}\" already, which stays as it is");
+        return Ok(());
+    }
+    let cells = Bytes::copy_from_slice(&picture.cells);
+    let change = Change::AddRaster(raster.clone(), cells);
+    let results = world.apply(vec![change]);
+    let mut results = results.map_err(|error| PartError::Broken(error.to_string()))?;
+    match results.pop() {
+        Some(Err(refusal)) => Err(PartError::Broken(format!("the map \"{name}\": {refusal}"))),
+        Some(Ok(Done::Raster(map, _))) => {
+            tracing::info!(
+                "{map}: \"{name}\", {} x {} cells",
+                raster.rows,
+                raster.columns
+            );
+            Ok(())
+        }
+        _ => Ok(()),
+    }
+}
+
+fn tell(file: &Path, world: &World) {
+    let (objects, maps) = (world.objects().len(), world.rasters().len());
+    tracing::info!("{}: {objects} objects, {maps} maps", file.display());
+}
+
+/// What is wrong, and what can be done about it.
+fn advice(error: &OpenError) -> String {
+    match error {
+        OpenError::Broken { .. } => format!(
+            "{error}; the file is left as it is: put a copy in its place, or begin anew with \
+             --set-broken-aside, which keeps it under another name"
+        ),
+        _ => error.to_string(),
+    }
+}
+
+/// Gives the file a name that no other one has.
+fn set_aside(file: &Path, error: &OpenError) -> Result<(), PartError> {
+    let name = |number: u32| {
+        let mut name = file.as_os_str().to_owned();
+        name.push(format!(".broken-{number}"));
+        PathBuf::from(name)
+    };
+    let free = (1..=9999).map(name).find(|it| !it.exists());
+    let Some(aside) = free else {
+        return Err(PartError::Broken(format!(
+            "{error}; there are 9999 files set aside already: move them away"
+        )));
+    };
+    std::fs::rename(file, &aside).map_err(|error| {
+        PartError::Broken(format!("{}: can not be set aside: {error}", file.display()))
+    })?;
+    tracing::warn!("{error}; it is kept as {}", aside.display());
+    Ok(())
+}

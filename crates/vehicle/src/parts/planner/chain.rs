@@ -1,0 +1,172 @@
+//! Watches a driver of the chain: how its stage is, who controls it, and whether it has been stopped.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here a lost driver is waited for"
+)]
+
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+
+use super::find;
+use crate::mission::{Link, LinkState, Point};
+use crate::parts::PartError;
+use crate::parts::drivers::Sense;
+use jaus::address::JausId;
+use jaus::component::{Component, Subscription, Update, When};
+use jaus::messages::core::report_status::Status;
+use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
+use jaus::messages::ground::report_stage::State;
+use jaus::messages::ground::{QueryStage, ReportStage, stage};
+use jaus::messages::mobility::{
+    ReportLocalPose, local_path_segment_driver, local_vector_driver, primitive_driver,
+};
+
+/// What has become of a driver of the chain.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum News {
+    /// Where the vehicle is in the local frame.
+    Pose(Point),
+    /// It was found, or lost.
+    Found(Link, Option<JausId>),
+    /// Its stage, and how much of what it was told is done, from 0 to 100 %.
+    Stage(Link, LinkState, u8),
+    /// Who controls it.
+    Controller(Link, Option<JausId>),
+    /// It has been stopped by an emergency.
+    Emergency(Link),
+    /// It has stood down, for a reason that somebody had: it commands nobody any more.
+    StoodDown(Link, String),
+}
+
+/// Between two attempts to subscribe.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// The service that makes a component this driver, beside Stage.
+pub(in crate::parts) const fn service(link: Link) -> &'static str {
+    match link {
+        Link::Path => local_path_segment_driver::URN,
+        Link::Vector => local_vector_driver::URN,
+        Link::Primitive => primitive_driver::URN,
+    }
+}
+
+/// Watches a driver, whoever it is, and goes on when it is another one. Ends when the component
+/// has stopped.
+pub(super) async fn watch(component: &Component, link: Link, tell: &mpsc::Sender<News>) {
+    while let Some(peer) = find(component, &[service(link), stage::URN]).await {
+        tracing::info!("the {link} is {peer}");
+        if tell.send(News::Found(link, Some(peer))).await.is_err() {
+            return;
+        }
+        watch_peer(component, link, peer, tell).await;
+        let lost = [
+            News::Found(link, None),
+            News::Stage(link, LinkState::Silent, 0),
+        ];
+        for news in lost {
+            if tell.send(news).await.is_err() {
+                return;
+            }
+        }
+        tokio::time::sleep(PAUSE).await;
+    }
+}
+
+/// Follows the pose of the vehicle. Ends when the component has stopped.
+pub(super) async fn follow(
+    mut poses: Sense<ReportLocalPose>,
+    tell: &mpsc::Sender<News>,
+) -> Result<(), PartError> {
+    loop {
+        let report = poses.next().await?;
+        if let Some(point) = report.x_m().zip(report.y_m())
+            && tell.send(News::Pose(point)).await.is_err()
+        {
+            return Ok(());
+        }
+    }
+}
+
+/// Watches one component until it is lost.
+async fn watch_peer(
+    component: &Component,
+    link: Link,
+    peer: JausId,
+    tell: &mpsc::Sender<News>,
+) -> Option<()> {
+    let mut stages: Subscription<ReportStage> = component
+        .subscribe(peer, &QueryStage {}, When::OnChange)
+        .await
+        .ok()?;
+    let mut controls: Subscription<ReportControl> = component
+        .subscribe(peer, &QueryControl {}, When::OnChange)
+        .await
+        .ok()?;
+    let mut states: Subscription<ReportStatus> = component
+        .subscribe(peer, &QueryStatus {}, When::OnChange)
+        .await
+        .ok()?;
+    loop {
+        let news = tokio::select! {
+            stage = stages.next() => match stage? {
+                Update::Report(report) => stage_news(link, &report),
+                Update::Up => stage_news(link, &ask(component, peer, &QueryStage {}).await?),
+                Update::Down { .. } => return None,
+            },
+            control = controls.next() => match control? {
+                Update::Report(report) => News::Controller(link, controller(&report)),
+                Update::Up => {
+                    let report = ask(component, peer, &QueryControl {}).await?;
+                    News::Controller(link, controller(&report))
+                }
+                Update::Down { .. } => return None,
+            },
+            state = states.next() => match state? {
+                Update::Report(report) if report.status == Status::EMERGENCY => {
+                    News::Emergency(link)
+                }
+                Update::Report(_) | Update::Up => continue,
+                Update::Down { .. } => return None,
+            },
+        };
+        tell.send(news).await.ok()?;
+    }
+}
+
+async fn ask<R: jaus::codec::Message, Q: jaus::codec::Message>(
+    component: &Component,
+    peer: JausId,
+    query: &Q,
+) -> Option<R> {
+    component.query(peer, query).await.ok()
+}
+
+fn stage_news(link: Link, report: &ReportStage) -> News {
+    // The last one of the chain commands nobody in any case.
+    let commands = report.next_subsystem_id != 0 || link == Link::Primitive;
+    if report.state == State::BLOCKED && !commands {
+        let reason = report.reason.to_string_lossy().into_owned();
+        return News::StoodDown(link, reason);
+    }
+    News::Stage(link, state(report), report.progress)
+}
+
+/// How a driver is, as it reports.
+pub(super) fn state(report: &ReportStage) -> LinkState {
+    match report.state {
+        State::IDLE => LinkState::Idle,
+        State::ENGAGING => LinkState::Engaging,
+        State::ACTIVE => LinkState::Active,
+        State::DONE => LinkState::Done,
+        State::BLOCKED if report.reason.is_empty() => LinkState::Blocked("blocked".to_owned()),
+        State::BLOCKED => LinkState::Blocked(report.reason.to_string_lossy().into_owned()),
+        State(other) => LinkState::Blocked(format!("in the unknown state {other}")),
+    }
+}
+
+/// Who is in control.
+pub(in crate::parts) fn controller(report: &ReportControl) -> Option<JausId> {
+    let id = JausId::new(report.subsystem_id, report.node_id, report.component_id);
+    id.is_unicast().then_some(id)
+}

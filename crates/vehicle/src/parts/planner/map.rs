@@ -1,0 +1,145 @@
+//! Fetches the map from the knowledge store, in tiles, and the pose from the pose sensor.
+
+use std::sync::Arc;
+
+use super::{find_soon, hand_over::in_words};
+use crate::mission::{Point, Terrain};
+use jaus::address::JausId;
+use jaus::component::Component;
+use jaus::messages::ground::report_raster_maps::MapRec;
+use jaus::messages::ground::{
+    QueryRasterCells, QueryRasterMaps, ReportRasterCells, ReportRasterMaps, raster_maps,
+};
+use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
+
+/// The most cells that are asked for at once.
+const TILE: usize = 1 << 16;
+/// How often a map is asked for that changes meanwhile.
+const TRIES: u32 = 3;
+
+/// A map as it was at some time.
+#[derive(Debug, Clone)]
+pub(in crate::parts) struct Map {
+    store: JausId,
+    about: MapRec,
+    pub(in crate::parts) terrain: Arc<Terrain>,
+}
+
+/// The map that is called so, or the only one; `known` if it has not changed.
+pub(super) async fn fetch(
+    component: &Component,
+    name: &str,
+    known: Option<Map>,
+) -> Result<Map, String> {
+    let store = find_soon(component, &[raster_maps::URN], "knowledge store").await?;
+    fetch_from(component, store, name, known).await
+}
+
+/// The same of a store that is known.
+pub(in crate::parts) async fn fetch_from(
+    component: &Component,
+    store: JausId,
+    name: &str,
+    known: Option<Map>,
+) -> Result<Map, String> {
+    for _ in 0..TRIES {
+        let report: ReportRasterMaps = component
+            .query(store, &QueryRasterMaps {})
+            .await
+            .map_err(in_words)?;
+        let about = choose(report.map_list, name, store)?;
+        if let Some(known) = known
+            .as_ref()
+            .filter(|known| known.store == store && known.about == about)
+        {
+            return Ok(known.clone());
+        }
+        if let Some(cells) = fetch_cells(component, store, &about).await? {
+            tracing::info!(
+                "map \"{}\" of {store}, {} x {} cells, revision {}",
+                about.name.to_string_lossy(),
+                about.rows,
+                about.columns,
+                about.revision
+            );
+            let corner = (about.x, about.y);
+            let cell = f64::from(about.cell_size);
+            let terrain = Terrain::new(about.rows, about.columns, cell, corner, cells);
+            return Ok(Map {
+                store,
+                about,
+                terrain: Arc::new(terrain.map_err(in_words)?),
+            });
+        }
+    }
+    Err(format!(
+        "the map of {store} has changed again and again while it was fetched"
+    ))
+}
+
+fn choose(maps: Vec<MapRec>, name: &str, store: JausId) -> Result<MapRec, String> {
+    let names: Vec<_> = maps
+        .iter()
+        .map(|map| format!("\"{}\"", map.name.to_string_lossy()))
+        .take(8)
+        .collect();
+    let only = maps.len() == 1;
+    let mut maps = maps.into_iter();
+    match maps.find(|map| map.name == *name || only) {
+        Some(map) => Ok(map),
+        None if names.is_empty() => Err(format!(
+            "{store} has no map: create one that is called \"{name}\""
+        )),
+        None => Err(format!(
+            "{store} has no map that is called \"{name}\", but {}: create one, or choose one of \
+             these with --map",
+            names.join(", ")
+        )),
+    }
+}
+
+/// All cells; `None` if they changed meanwhile.
+async fn fetch_cells(
+    component: &Component,
+    store: JausId,
+    about: &MapRec,
+) -> Result<Option<Vec<u8>>, String> {
+    let columns = usize::from(about.columns);
+    let at_once = (TILE / columns.max(1)).clamp(1, usize::from(u16::MAX)) as u16;
+    let mut cells = Vec::new();
+    let mut row = 0;
+    while row < about.rows {
+        let rows = at_once.min(about.rows - row);
+        let query = QueryRasterCells {
+            map: about.map,
+            row,
+            column: 0,
+            rows,
+            columns: about.columns,
+        };
+        let tile: ReportRasterCells = component.query(store, &query).await.map_err(in_words)?;
+        let is_asked =
+            (tile.map, tile.row, tile.rows, tile.columns) == (about.map, row, rows, about.columns);
+        let is_full = tile.cells.len() == usize::from(rows) * columns;
+        if !is_asked || !is_full || tile.revision != about.revision {
+            return Ok(None);
+        }
+        cells.extend_from_slice(&tile.cells);
+        row += rows;
+    }
+    Ok(Some(cells))
+}
+
+/// Where the vehicle is.
+pub(super) async fn fetch_pose(component: &Component) -> Result<Point, String> {
+    let services = [local_pose_sensor::URN];
+    let sensor = find_soon(component, &services, "local pose sensor").await?;
+    let query = QueryLocalPose {
+        presence_vector: X_AND_Y,
+    };
+    let pose: ReportLocalPose = component.query(sensor, &query).await.map_err(in_words)?;
+    let place = pose.x_m().zip(pose.y_m());
+    place.ok_or_else(|| format!("{sensor} does not tell where the vehicle is: set its pose"))
+}
+
+const X_AND_Y: u16 = 0b11;

@@ -1,0 +1,186 @@
+//! The small file in which the pose sensor keeps where the vehicle is, together with the wheels'
+//! counts that belong to it. It is replaced as a whole, so that a power cut leaves the old or the new.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::io;
+use std::path::Path;
+
+use tokio::fs::{self, File};
+use tokio::io::AsyncWriteExt;
+
+use super::PartError;
+use crate::motion::{Pose, WheelCount};
+
+/// What is kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Kept {
+    pub(super) pose: Pose,
+    pub(super) count: WheelCount,
+}
+
+/// The longest file that is read: several times what is written.
+const MOST: u64 = 4096;
+
+impl Kept {
+    /// Whether it tells another place or counter; a later time alone is not worth writing.
+    pub(super) fn differs(&self, other: &Self) -> bool {
+        let count = WheelCount {
+            time_ms: self.count.time_ms,
+            ..other.count
+        };
+        self.pose != other.pose || self.count != count
+    }
+
+    fn text(&self) -> String {
+        let Self { pose, count } = self;
+        let mut text = String::from("# Where the vehicle is, kept by jaus-local-pose-sensor.\n");
+        let numbers = [
+            ("x", pose.x),
+            ("y", pose.y),
+            ("z", pose.z),
+            ("roll", pose.roll),
+            ("pitch", pose.pitch),
+            ("yaw", pose.yaw),
+            ("left", count.left),
+            ("right", count.right),
+            ("track", count.track),
+            ("start", count.start.into()),
+            ("time_ms", count.time_ms.into()),
+        ];
+        for (key, number) in numbers {
+            // Writing to a string can not fail.
+            let _ = writeln!(text, "{key} = {number:?}");
+        }
+        text
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let lines = text.lines().map(str::trim);
+        let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
+        let mut numbers = BTreeMap::new();
+        for line in lines {
+            let pair = line.split_once('=').and_then(|(key, number)| {
+                let number: f64 = number.trim().parse().ok()?;
+                number.is_finite().then(|| (key.trim(), number))
+            });
+            let (key, number) = pair.ok_or_else(|| format!("\"{line}\" is no number"))?;
+            numbers.insert(key, number);
+        }
+        let number = |key: &str| {
+            let number = numbers.get(key).copied();
+            number.ok_or_else(|| format!("{key} is missing"))
+        };
+        Ok(Self {
+            pose: Pose {
+                x: number("x")?,
+                y: number("y")?,
+                z: number("z")?,
+                roll: number("roll")?,
+                pitch: number("pitch")?,
+                yaw: number("yaw")?,
+            },
+            count: WheelCount {
+                left: number("left")?,
+                right: number("right")?,
+                track: number("track")?,
+                start: number("start")? as u32,
+                time_ms: number("time_ms")? as u32,
+            },
+        })
+    }
+}
+
+/// Reads the file; `None` if there is none yet.
+pub(super) async fn read(file: &Path) -> Result<Option<Kept>, PartError> {
+    let broken = |why: String| {
+        PartError::Broken(format!(
+            "{}: {why}; put it right, or delete it to begin at the start pose",
+            file.display()
+        ))
+    };
+    let length = match fs::metadata(file).await {
+        Ok(found) => found.len(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(broken(error.to_string())),
+    };
+    if length > MOST {
+        return Err(broken(format!(
+            "is {length} octets long, and can not be a pose"
+        )));
+    }
+    let text = fs::read_to_string(file).await;
+    let text = text.map_err(|error| broken(error.to_string()))?;
+    Kept::parse(&text).map(Some).map_err(broken)
+}
+
+/// Replaces the file.
+pub(super) async fn write(file: &Path, kept: &Kept) -> Result<(), PartError> {
+    let written = replace(file, &kept.text()).await;
+    written.map_err(|error| {
+        PartError::Broken(format!(
+            "the pose can not be kept in {}: {error}",
+            file.display()
+        ))
+    })
+}
+
+async fn replace(file: &Path, text: &str) -> io::Result<()> {
+    let mut name = file.as_os_str().to_owned();
+    name.push(".new");
+    let new = Path::new(&name);
+    let mut writer = File::create(new).await?;
+    writer.write_all(text.as_bytes()).await?;
+    // Without this a power cut after the renaming could leave an empty file.
+    writer.sync_data().await?;
+    fs::rename(new, file).await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KEPT: Kept = Kept {
+        pose: Pose {
+            x: 1.25,
+            y: -3.0e-7,
+            z: 0.0,
+            roll: 0.0,
+            pitch: 0.0,
+            yaw: 2.5,
+        },
+        count: WheelCount {
+            start: u32::MAX,
+            time_ms: 4_000_000_000,
+            left: 123.456,
+            right: -0.1,
+            track: 0.5,
+        },
+    };
+
+    #[test]
+    fn what_is_written_is_read_again_to_the_last_bit() {
+        assert_eq!(Kept::parse(&KEPT.text()), Ok(KEPT));
+    }
+
+    #[test]
+    fn a_damaged_file_is_refused_with_the_reason() {
+        for (text, why) in [
+            ("", "x is missing"),
+            ("x = one", "\"x = one\" is no number"),
+            ("x = NaN", "\"x = NaN\" is no number"),
+            ("nonsense", "\"nonsense\" is no number"),
+        ] {
+            assert_eq!(Kept::parse(text), Err(why.to_owned()), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_later_time_alone_is_nothing_new() {
+        let mut later = KEPT;
+        later.count.time_ms = 5;
+        assert!(!KEPT.differs(&later));
+        later.count.left = 0.0;
+        assert!(KEPT.differs(&later));
+    }
+}

@@ -1,0 +1,199 @@
+//! The local pose sensor: where the vehicle is, reckoned from the travel of its wheels.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here the sensor gets its time, and waits for it"
+)]
+
+use std::convert::Infallible;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use tokio::time::timeout;
+
+use super::drivers::{Freshness, Sense};
+use super::keeper::{Keeper, keeper};
+use super::pose_file::{self, Kept};
+use super::{Part, PartError, Seat};
+use crate::mobility::Vehicle;
+use crate::motion::{DeadReckoning, Frame, Motion, Observed, Pilot, Pose, WheelCount};
+use jaus::component::{AccessControl, Component};
+use jaus::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
+use jaus::messages::mobility::{QueryLocalPose, QueryLocalPoseExt};
+
+/// Reckons where the vehicle is from where it was and what its wheels have travelled since.
+///
+/// It offers Local Pose Sensor; a client in control may tell it the pose. While the wheels can not
+/// be heard its reports leave the pose out. What it knows it keeps in a small file, so that it goes
+/// on from there when it is started again, as if it had been there all the time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseSensor {
+    /// The file; without one it begins at `start` whenever it is started.
+    pub file: Option<PathBuf>,
+    /// Where it begins if nothing is kept.
+    pub start: Pose,
+    /// How often the wheels are asked for, in hertz.
+    pub hz: f64,
+    /// The pose is not known any more when the wheels have not been heard for so long.
+    pub silence: Duration,
+}
+
+impl Default for PoseSensor {
+    fn default() -> Self {
+        Self {
+            file: None,
+            start: Pose::default(),
+            hz: 25.0,
+            silence: Duration::from_millis(300),
+        }
+    }
+}
+
+impl Part for PoseSensor {
+    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+        let reckoning = self.begin().await?;
+        let observed = Observed::new(standing(unknown(), None));
+        let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
+            .with_clock(super::host_clock());
+        let component = seat
+            .component("Local Pose Sensor")
+            .access_control(AccessControl::new())
+            .offer(vehicle.local_pose_sensor())
+            .live_on(seat.port)?;
+        let query = QueryWheelOdometry {};
+        let counts = Sense::of(
+            &component,
+            wheel_odometry::URN,
+            &query,
+            self.hz,
+            "wheel travel",
+        )?;
+        let (keeper, kept) = keeper();
+        let sensor = Running {
+            component,
+            observed,
+            reckoning,
+            keeper: self.file.is_some().then_some(keeper),
+            kept: None,
+        };
+        let reckoning = sensor.reckon(counts, self.silence);
+        let Some(file) = &self.file else {
+            return reckoning.await;
+        };
+        // A disk that stalls must delay no pose.
+        let writing = kept.write(PAUSE, async |kept: Kept| {
+            pose_file::write(file, &kept).await
+        });
+        tokio::select! {
+            end = reckoning => end,
+            () = writing => Err(PartError::NodeStopped),
+        }
+    }
+}
+
+/// The file is written at most so often: what is driven meanwhile is in the wheels' counts.
+const PAUSE: Duration = Duration::from_millis(500);
+
+impl PoseSensor {
+    async fn begin(&self) -> Result<DeadReckoning, PartError> {
+        let kept = match &self.file {
+            Some(file) => pose_file::read(file).await?,
+            None => None,
+        };
+        let Some(Kept { pose, count }) = kept else {
+            return Ok(DeadReckoning::at(self.start));
+        };
+        tracing::info!("goes on at x {:.2} m, y {:.2} m", pose.x, pose.y);
+        Ok(DeadReckoning::resume(pose, count))
+    }
+}
+
+struct Running {
+    component: Component,
+    observed: Observed,
+    reckoning: DeadReckoning,
+    keeper: Option<Keeper<Kept>>,
+    /// What was handed over to be written last.
+    kept: Option<Kept>,
+}
+
+impl Running {
+    async fn reckon(
+        mut self,
+        mut counts: Sense<ReportWheelOdometry>,
+        silence: Duration,
+    ) -> Result<Infallible, PartError> {
+        let mut freshness = Freshness::default();
+        let mut sampled_at = None;
+        loop {
+            let heard = timeout(silence, counts.next()).await;
+            let now = Instant::now();
+            if counts.take_loss() {
+                freshness.forget();
+            }
+            self.take_told();
+            let pose = match heard {
+                Ok(report) => {
+                    let count = WheelCount::from(&report?);
+                    let read_at = Duration::from_millis(count.time_ms.into());
+                    self.reckoning.handle_count(count);
+                    if let Some(at) = freshness.handle(now, Some(read_at)) {
+                        sampled_at = Some(at);
+                    }
+                    self.reckoning.pose()
+                }
+                Err(_) => {
+                    sampled_at = Some(now);
+                    unknown()
+                }
+            };
+            self.observed.set(standing(pose, sampled_at));
+            self.component.changed::<QueryLocalPose>().await;
+            self.component.changed::<QueryLocalPoseExt>().await;
+            self.keep();
+        }
+    }
+
+    /// Takes the pose that a client has set, if one has.
+    fn take_told(&mut self) {
+        if let Some(pose) = self.observed.take_told() {
+            self.reckoning.set_pose(pose);
+            let pose = self.reckoning.pose();
+            tracing::info!("was told to be at x {:.2} m, y {:.2} m", pose.x, pose.y);
+        }
+    }
+
+    /// Has the pose written if it is another one.
+    fn keep(&mut self) {
+        let (Some(keeper), Some(count)) = (&self.keeper, self.reckoning.count()) else {
+            return;
+        };
+        let kept = Kept {
+            pose: self.reckoning.pose(),
+            count,
+        };
+        if self.kept.is_none_or(|before| before.differs(&kept)) {
+            self.kept = Some(kept);
+            keeper.keep(kept);
+        }
+    }
+}
+
+fn standing(pose: Pose, sampled_at: Option<Instant>) -> Motion {
+    Motion {
+        pose,
+        sampled_at,
+        ..Motion::default()
+    }
+}
+
+/// What is not known is not reported.
+fn unknown() -> Pose {
+    Pose {
+        x: f64::NAN,
+        y: f64::NAN,
+        z: f64::NAN,
+        roll: f64::NAN,
+        pitch: f64::NAN,
+        yaw: f64::NAN,
+    }
+}

@@ -1,0 +1,333 @@
+//! The primitive driver: wrench efforts to two wheel drives, and how far the wheels have travelled.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here the motors are looked after in real time"
+)]
+
+use std::convert::Infallible;
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::time::{Duration, Instant};
+
+use tokio::time::{MissedTickBehavior, interval};
+
+use super::drivers::{FaultMonitor, Watchman, guard, shut_down};
+use super::stop_line::StopLine;
+use super::{Part, PartError, Seat};
+use crate::actuator::{
+    Actuator, Interlock, MotorConfig, Odometer, SimulatedMotor, StopFile, StopInput, Wheels,
+    WheelsConfig,
+};
+use crate::ground::{StageBoard, StageReport, StageState, WheelOdometry};
+use crate::mobility::Vehicle;
+use crate::motion::{Frame, Pilot};
+use jaus::component::{Component, Condition, State};
+use jaus::messages::ground::QueryStage;
+use jaus::service::{MotionPolicy, StopCause};
+
+/// Drives the wheels of a vehicle as it is told, and stops them when it is not told any more. While a
+/// motor has a fault both sides stand still and the component is in Failure.
+///
+/// With a stop input, an open line stops the motors at once and sets the component's emergency. A line
+/// that is closed again ends all emergencies: the operator on the spot has seen to it. The component is
+/// in Standby then, and nothing moves before it is resumed.
+///
+/// It offers Primitive Driver, Wheel Odometry and Stage, behind Management and Access Control.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PrimitiveDriver {
+    /// What turns the wheels.
+    pub motors: Motors,
+    /// The stop input, if there is one.
+    pub stop: Option<Stop>,
+    /// The vehicle that the wheels carry.
+    pub wheels: WheelsConfig,
+    /// The motors stop when no effort has come for so long.
+    pub silence: Duration,
+    /// After how many seconds control ends unless its client asks for it again; 0 for never.
+    pub control_timeout: u8,
+}
+
+/// What turns the wheels of both sides.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Motors {
+    /// Simulated ones, the right one with the next seed after the left one's.
+    Simulated(MotorConfig),
+    /// Stepper motors on lines of a GPIO chip.
+    #[cfg(all(feature = "gpio", target_os = "linux"))]
+    Gpio(GpioMotors),
+}
+
+/// What stops the vehicle on the vehicle itself.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Stop {
+    /// A simulated input, which is pressed while a file exists.
+    File(std::path::PathBuf),
+    /// A normally closed contact between a line of a GPIO chip and ground.
+    #[cfg(all(feature = "gpio", target_os = "linux"))]
+    Gpio {
+        /// The chip, such as `/dev/gpiochip0`.
+        chip: std::path::PathBuf,
+        /// The line.
+        line: u32,
+    },
+}
+
+impl Stop {
+    fn open(&self) -> Result<Box<dyn StopInput>, PartError> {
+        match self {
+            Self::File(path) => Ok(Box::new(StopFile(path.clone()))),
+            #[cfg(all(feature = "gpio", target_os = "linux"))]
+            Self::Gpio { chip, line } => match crate::actuator::GpioStop::open(chip, *line) {
+                Ok(input) => Ok(Box::new(input)),
+                Err(error) => Err(PartError::Broken(error.to_string())),
+            },
+        }
+    }
+}
+
+/// The hardware of a primitive driver.
+pub struct Hardware {
+    /// What turns the wheels of the left side.
+    pub left: Box<dyn Actuator>,
+    /// What turns the wheels of the right side.
+    pub right: Box<dyn Actuator>,
+    /// The stop input, if there is one.
+    pub stop: Option<Box<dyn StopInput>>,
+}
+
+impl std::fmt::Debug for Hardware {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Hardware")
+            .field("has_stop", &self.stop.is_some())
+            .finish_non_exhaustive()
+    }
+}
+
+/// Two stepper motors on a GPIO chip.
+#[cfg(all(feature = "gpio", target_os = "linux"))]
+#[derive(Debug, Clone, PartialEq)]
+pub struct GpioMotors {
+    /// The chip, such as `/dev/gpiochip0`.
+    pub chip: std::path::PathBuf,
+    /// How both motors drive their wheels.
+    pub stepper: crate::actuator::StepperConfig,
+    /// The lines of the left motor: pulses and direction.
+    pub left: (u32, u32),
+    /// The same for the right motor, which is mounted the other way round.
+    pub right: (u32, u32),
+}
+
+impl Default for PrimitiveDriver {
+    fn default() -> Self {
+        Self {
+            motors: Motors::Simulated(MotorConfig::default()),
+            stop: None,
+            wheels: WheelsConfig::default(),
+            silence: Duration::from_millis(500),
+            control_timeout: 3,
+        }
+    }
+}
+
+impl Motors {
+    fn start(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
+        match self {
+            Self::Simulated(config) => {
+                let right = MotorConfig {
+                    seed: config.seed.wrapping_add(1),
+                    ..*config
+                };
+                Ok([*config, right].map(|config| Box::new(SimulatedMotor::new(config)) as _))
+            }
+            #[cfg(all(feature = "gpio", target_os = "linux"))]
+            Self::Gpio(motors) => motors.start(),
+        }
+    }
+}
+
+#[cfg(all(feature = "gpio", target_os = "linux"))]
+impl GpioMotors {
+    fn start(&self) -> Result<[Box<dyn Actuator>; 2], PartError> {
+        let start = |(step, direction), reversed| -> Result<Box<dyn Actuator>, PartError> {
+            let broken = |why: String| PartError::Broken(why);
+            let lines = crate::actuator::GpioLines::open(&self.chip, step, direction, reversed);
+            let lines = lines.map_err(|error| broken(error.to_string()))?;
+            let motor = crate::actuator::PulseMotor::start(self.stepper, lines);
+            let motor = motor.map_err(|error| broken(format!("no thread for pulses: {error}")))?;
+            Ok(Box::new(motor))
+        };
+        Ok([start(self.left, false)?, start(self.right, true)?])
+    }
+}
+
+impl Part for PrimitiveDriver {
+    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+        let [left, right] = self.motors.start()?;
+        let stop = self.stop.as_ref().map(Stop::open).transpose()?;
+        self.run_on(Hardware { left, right, stop }, seat).await
+    }
+}
+
+impl PrimitiveDriver {
+    /// The same on hardware of your own, instead of [`motors`](Self::motors) and
+    /// [`stop`](Self::stop).
+    ///
+    /// # Errors
+    /// Why it cannot go on.
+    pub async fn run_on(self, hardware: Hardware, seat: Seat) -> Result<Infallible, PartError> {
+        let Hardware { left, right, stop } = hardware;
+        let interlock = Interlock::default();
+        let stop = stop.map(|input| StopLine::start(input, interlock.clone()));
+        let stop = stop
+            .transpose()
+            .map_err(|error| PartError::Broken(format!("no thread for the stop input: {error}")))?;
+        let odometer = Odometer::new(random());
+        let wheels = Wheels::new(left, right, self.wheels, odometer.clone());
+        let wheels = wheels.with_interlock(interlock.clone());
+        let pilot = Pilot::new(wheels, Frame::default());
+        let policy = MotionPolicy::Expire(self.silence);
+        let vehicle = Vehicle::new(pilot).motion_policy(policy);
+        let board = StageBoard::default();
+        let component = seat
+            .component("Primitive Driver")
+            .management(guard(self.control_timeout))
+            .offer(vehicle.primitive_driver())
+            .offer(WheelOdometry::new(odometer.clone(), vehicle.clone()))
+            .offer(board.service())
+            .live_on(seat.port)?;
+        let driver = Running {
+            component,
+            vehicle,
+            odometer,
+            board,
+            interlock,
+            stop,
+            stopped: false,
+        };
+        let component = driver.component.clone();
+        tokio::select! {
+            end = driver.watch() => end,
+            end = shut_down(&component) => end,
+        }
+    }
+}
+
+/// Names a counter of wheel travel.
+fn random() -> u32 {
+    // The keys of a hasher are random, and nothing more is wanted than that restarts differ.
+    RandomState::new().build_hasher().finish() as u32
+}
+
+/// Waits until a stop input is opened or closed, if there is one.
+async fn pressed(stop: &mut Option<StopLine>) {
+    match stop {
+        Some(stop) => stop.changed().await,
+        None => std::future::pending().await,
+    }
+}
+
+struct Running {
+    component: Component,
+    vehicle: Vehicle,
+    odometer: Odometer,
+    board: StageBoard,
+    interlock: Interlock,
+    stop: Option<StopLine>,
+    /// Whether the stop input has set an emergency that lasts.
+    stopped: bool,
+}
+
+impl Running {
+    /// Between two looks at how the driver is.
+    const LOOK: Duration = Duration::from_millis(100);
+
+    async fn watch(mut self) -> Result<Infallible, PartError> {
+        let mut standings = self.component.watch_standing();
+        let mut watchman = Watchman::default();
+        let mut faults = FaultMonitor::default();
+        let mut looks = interval(Self::LOOK);
+        looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        loop {
+            watchman.note(*standings.borrow_and_update());
+            self.check_stop().await;
+            self.check_motors(&mut faults).await;
+            if self.board.tell(self.stage(&watchman)) {
+                self.component.changed::<QueryStage>().await;
+            }
+            tokio::select! {
+                changed = standings.changed() => changed.map_err(|_| PartError::NodeStopped)?,
+                () = pressed(&mut self.stop) => {}
+                _ = looks.tick() => {}
+            }
+        }
+    }
+
+    /// An open stop input is an emergency of the component as long as it lasts, and the end of all
+    /// emergencies when it is closed again.
+    async fn check_stop(&mut self) {
+        let Some(stop) = &mut self.stop else {
+            return;
+        };
+        let open = stop.pressed();
+        // The interlock keeps also a press that was shorter than a look.
+        if self.interlock.is_open() && !self.stopped {
+            let why = open.as_deref().unwrap_or("the stop input was pressed");
+            tracing::warn!("emergency: {why}");
+            self.stopped = true;
+        }
+        if !self.stopped {
+            return;
+        }
+        if self.component.standing().state != State::Emergency {
+            self.vehicle.stop();
+            if let Err(error) = self.component.set_emergency(self.component.id()).await {
+                tracing::warn!("the emergency is not set yet: {error}");
+            }
+        } else if open.is_none() {
+            tracing::warn!("the stop input is closed again: all emergencies end");
+            self.component.set_condition(Condition::Safe).await;
+            self.stopped = false;
+            // Nothing moves before the component is resumed.
+            self.interlock.close();
+        }
+    }
+
+    /// A motor's fault is a failure as long as it lasts.
+    async fn check_motors(&self, faults: &mut FaultMonitor) {
+        // Also at rest, when nothing else reads the motors.
+        self.vehicle.handle_time(Instant::now());
+        let condition = match self.odometer.fault() {
+            Some(fault) => faults.lacks(Instant::now(), &fault, Duration::ZERO),
+            None => faults.is_over(),
+        };
+        if let Some(condition) = condition {
+            self.component.set_condition(condition).await;
+        }
+    }
+
+    fn stage(&self, watchman: &Watchman) -> StageReport {
+        let told = |state, reason: String| StageReport {
+            state,
+            reason,
+            ..StageReport::default()
+        };
+        if let Some(fault) = self.odometer.fault() {
+            return told(StageState::Blocked, fault);
+        }
+        if let Some(reason) = watchman.emergency() {
+            return told(StageState::Blocked, reason.to_owned());
+        }
+        if let Some(StopCause::Fault(fault)) = self.vehicle.last_stop() {
+            return told(StageState::Blocked, fault);
+        }
+        if let Some(cause) = self.vehicle.last_stop() {
+            let reason = format!("stopped: {cause}");
+            return told(StageState::Idle, reason);
+        }
+        match self.vehicle.is_under_way() {
+            true => told(StageState::Active, String::new()),
+            false => told(StageState::Idle, String::new()),
+        }
+    }
+}

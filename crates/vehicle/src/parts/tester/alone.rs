@@ -1,0 +1,135 @@
+//! A whole vehicle in one process: each of its parts on a node of its own, on loopback, so that what
+//! they say to each other passes the same transport as between boards.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use tokio::task::{AbortHandle, JoinSet};
+
+use crate::parts::{
+    KnowledgeStore, Part, PartError, PathDriver, Planner, PoseSensor, PrimitiveDriver, Seat,
+    VectorDriver, VelocitySensor,
+};
+use jaus::component::Kind;
+use jaus::node::{Config, Node, StartError};
+
+/// The parts of a vehicle that a mission needs, running.
+#[derive(Debug)]
+pub struct Alone {
+    subsystem: u16,
+    /// Where the store keeps its file and the pose sensor its pose.
+    directory: PathBuf,
+    running: BTreeMap<u8, (Node, AbortHandle)>,
+    tasks: JoinSet<PartError>,
+}
+
+/// Why a part does not run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AloneError {
+    /// Its node does not start.
+    #[error(transparent)]
+    Start(#[from] StartError),
+    /// Its component can not be attached.
+    #[error(transparent)]
+    Attach(#[from] jaus::node::AttachError),
+}
+
+impl Alone {
+    /// The parts, by the numbers of their components: primitive driver, planner, local pose sensor,
+    /// velocity state sensor, vector driver, path segment driver, knowledge store.
+    pub const PARTS: [u8; 7] = [33, 36, 41, 42, 44, 48, 61];
+
+    /// Starts all parts, each as component C on node C of a subsystem; what they keep goes into a
+    /// directory.
+    ///
+    /// # Errors
+    /// If a node does not start.
+    ///
+    /// # Panics
+    /// Outside of a tokio runtime.
+    pub fn start(subsystem: u16, directory: impl Into<PathBuf>) -> Result<Self, AloneError> {
+        let mut alone = Self {
+            subsystem,
+            directory: directory.into(),
+            running: BTreeMap::new(),
+            tasks: JoinSet::new(),
+        };
+        for number in Self::PARTS {
+            alone.start_part(number)?;
+        }
+        Ok(alone)
+    }
+
+    /// Starts a part, for instance one that was stopped.
+    ///
+    /// # Errors
+    /// If its node does not start.
+    pub fn start_part(&mut self, number: u8) -> Result<(), AloneError> {
+        let node = Node::start(Config::loopback(self.subsystem, number))?;
+        let seat = Seat {
+            port: node.attach(number)?,
+            node: Some(node.clone()),
+            kind: Kind::Vehicle,
+            name: "Tested".to_owned(),
+        };
+        let task = match number {
+            33 => self.spawn(PrimitiveDriver::default(), seat),
+            36 => self.spawn(Planner::default(), seat),
+            41 => self.spawn(PoseSensor::default(), seat),
+            42 => self.spawn(VelocitySensor::default(), seat),
+            44 => self.spawn(VectorDriver::default(), seat),
+            48 => self.spawn(PathDriver::default(), seat),
+            _ => {
+                let store = KnowledgeStore {
+                    file: self.directory.join(KnowledgeStore::FILE),
+                    map: Some(KnowledgeStore::demo_map()),
+                    ..KnowledgeStore::default()
+                };
+                self.spawn(store, seat)
+            }
+        };
+        self.running.insert(number, (node, task));
+        Ok(())
+    }
+
+    fn spawn(&mut self, part: impl Part, seat: Seat) -> AbortHandle {
+        self.tasks.spawn(async move {
+            let Err(error) = part.run(seat).await;
+            error
+        })
+    }
+
+    /// Ends a part at once, as if its process were killed.
+    pub async fn kill(&mut self, number: u8) {
+        if let Some((node, task)) = self.running.remove(&number) {
+            task.abort();
+            node.shutdown().await;
+        }
+    }
+
+    /// The nodes of the parts that run.
+    pub fn nodes(&self) -> impl Iterator<Item = &Node> {
+        self.running.values().map(|(node, _)| node)
+    }
+
+    /// Waits until a part can not go on, and says why; for ever while all do.
+    pub async fn broken(&mut self) -> PartError {
+        loop {
+            match self.tasks.join_next().await {
+                Some(Ok(error)) => return error,
+                // It was killed.
+                Some(Err(_)) => {}
+                None => std::future::pending().await,
+            }
+        }
+    }
+
+    /// Ends all parts, and their nodes after them.
+    pub async fn end(mut self) {
+        self.tasks.shutdown().await;
+        for (node, _) in self.running.into_values() {
+            node.shutdown().await;
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! The local vector driver: keeps a speed and a heading by commanding the primitive driver.
+
+use std::convert::Infallible;
+use std::time::{Duration, Instant};
+
+use super::drivers::{
+    FaultMonitor, Helm, HelmSettings, Language, Next, Order, Sense, guard, shut_down,
+};
+use super::{Part, PartError, Seat};
+use crate::ground::StageBoard;
+use crate::mobility::Vehicle;
+use crate::motion::{Effort, Frame, Limits, Motion, Pilot, Throttle};
+use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
+
+/// Keeps the speed and the heading that it is told, by efforts of the primitive driver, with what
+/// the pose and the velocity sensor report.
+///
+/// It offers Local Vector Driver and Stage, behind Management and Access Control. Primitive driver
+/// and sensors are found in its own subsystem.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VectorDriver {
+    /// What the vehicle can do at most; speed and yaw rate are those of full effort.
+    pub limits: Limits,
+    /// After it has stood down it obeys again when it has not been commanded for so long.
+    pub silence: Duration,
+    /// It stops when pose or velocity are older than this.
+    pub stale: Duration,
+    /// The authority with which it controls the primitive driver.
+    pub authority: u8,
+    /// After how many seconds control ends unless its client asks for it again; 0 for never.
+    pub control_timeout: u8,
+}
+
+impl Default for VectorDriver {
+    fn default() -> Self {
+        Self {
+            limits: Limits::default(),
+            silence: Duration::from_secs(1),
+            stale: Duration::from_millis(600),
+            authority: 100,
+            control_timeout: 3,
+        }
+    }
+}
+
+impl VectorDriver {
+    /// How often the sensors are asked to report, in hertz.
+    const HZ: f64 = 25.0;
+}
+
+impl Part for VectorDriver {
+    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+        let helm = Helm::new(HelmSettings {
+            limits: self.limits,
+            stale: self.stale,
+            by_heading: false,
+        });
+        let pilot = Pilot::new(helm.clone(), Frame::default());
+        let vehicle = Vehicle::new(pilot);
+        let board = StageBoard::default();
+        let component = seat
+            .component("Local Vector Driver")
+            .management(guard(self.control_timeout))
+            .offer(vehicle.local_vector_driver())
+            .offer(board.service())
+            .live_on(seat.port)?;
+        let poses = Sense::pose(&component, Self::HZ)?;
+        let velocities = Sense::velocity(&component, Self::HZ)?;
+        let own = component.clone();
+        let next = Next {
+            component,
+            vehicle,
+            helm: helm.clone(),
+            board,
+            language: Efforts(Throttle::new(self.limits)),
+            authority: self.authority,
+            settling: self.silence,
+            sensors: FaultMonitor::default(),
+        };
+        tokio::select! {
+            end = poses.steer(&helm) => end,
+            end = velocities.steer(&helm) => end,
+            end = next.run() => end,
+            end = shut_down(&own) => end,
+        }
+    }
+}
+
+/// Speaks to the primitive driver.
+struct Efforts(Throttle);
+
+impl Language for Efforts {
+    type Command = SetWrenchEffort;
+    const URN: &'static str = primitive_driver::URN;
+    const NAME: &'static str = "primitive driver";
+    const PAUSE: Duration = Duration::from_millis(50);
+
+    fn command(&mut self, now: Instant, order: Order, motion: &Motion) -> SetWrenchEffort {
+        let Order::Velocity(wanted) = order else {
+            return self.halt();
+        };
+        effort(&self.0.push(now, wanted, &motion.velocity))
+    }
+
+    fn halt(&mut self) -> SetWrenchEffort {
+        self.0.reset();
+        effort(&Effort {
+            brake: 1.0,
+            turn_brake: 1.0,
+            ..Effort::default()
+        })
+    }
+}
+
+fn effort(effort: &Effort) -> SetWrenchEffort {
+    use jaus::messages::mobility::set_wrench_effort as fields;
+    SetWrenchEffort {
+        propulsive_linear_effort_x: fields::PropulsiveLinearEffortX::new(100.0 * effort.forward)
+            .ok(),
+        propulsive_rotational_effort_z: fields::PropulsiveRotationalEffortZ::new(
+            100.0 * effort.turn,
+        )
+        .ok(),
+        resistive_linear_effort_x: fields::ResistiveLinearEffortX::new(100.0 * effort.brake).ok(),
+        resistive_rotational_effort_z: fields::ResistiveRotationalEffortZ::new(
+            100.0 * effort.turn_brake,
+        )
+        .ok(),
+        ..SetWrenchEffort::default()
+    }
+}

@@ -1,0 +1,70 @@
+//! The whole chain with all its real parts, each on a node of its own: the tester's mission, and
+//! what becomes of it when a part dies on the way.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use jaus::component::{Component, Kind};
+use jaus::node::{Config, Node};
+use jaus_vehicle::parts::tester::steps::{Step, all_pass};
+use jaus_vehicle::parts::tester::{Alone, MissionTest};
+
+/// A directory of a test's own, which goes with it.
+struct Directory(PathBuf);
+
+impl Directory {
+    fn new(name: &str) -> Self {
+        let name = format!("jaus-mission-{name}-{}", std::process::id());
+        let path = std::env::temp_dir().join(name);
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+}
+
+impl Drop for Directory {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+async fn tester(subsystem: u16) -> (Node, Component) {
+    let node = Node::start(Config::loopback(subsystem, 1)).unwrap();
+    let tester = Component::builder(Kind::OperatorControlUnit, "Tester");
+    let tester = tester.attach(&node, 77).unwrap();
+    (node, tester)
+}
+
+fn told(steps: &[Step]) -> String {
+    let lines: Vec<_> = steps.iter().map(ToString::to_string).collect();
+    lines.join("\n")
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_mission_goes_through_the_whole_chain_though_the_path_driver_dies_on_the_way() {
+    let directory = Directory::new("restart");
+    let mut alone = Alone::start(1111, &directory.0).unwrap();
+    let (node, tester) = tester(1112).await;
+    let test = MissionTest {
+        subsystem: 1111,
+        patience: Duration::from_secs(30),
+        speed: 0.3,
+        ..MissionTest::default()
+    };
+    let (tell, mut told_so_far) = tokio::sync::mpsc::unbounded_channel();
+    let running = test.run(&tester, move |step| tell.send(step.name.clone()).unwrap());
+    let killing = async {
+        while let Some(step) = told_so_far.recv().await {
+            if step.starts_with("each driver is commanded") {
+                alone.kill(48).await;
+                alone.start_part(48).unwrap();
+                break;
+            }
+        }
+    };
+    let (steps, ()) = tokio::join!(running, killing);
+    assert!(all_pass(&steps), "{}", told(&steps));
+    drop(tester);
+    node.shutdown().await;
+    alone.end().await;
+}

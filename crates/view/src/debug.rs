@@ -1,0 +1,242 @@
+//! The debug view: what passes a node, for viewers on this host, over HTTP and WebSocket.
+//!
+//! | path | what |
+//! |---|---|
+//! | `/messages` | a WebSocket that sends every message as a JSON object, one a frame; the [`Filter`]'s terms are its parameters: `/messages?message=Velocity&field=velocity_x>1` |
+//! | `/tree` | what discovery has found, as JSON |
+//!
+//! It can only be looked at: what a viewer sends is not read. A viewer that is too slow loses
+//! messages and is told how many by `{"lost":N}`; the traffic never waits. Since a page of any web site
+//! can ask a browser to connect to this host, requests of other sites' pages are refused.
+
+use std::convert::Infallible;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::{Query, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::get;
+use axum::{Json, Router};
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt, StreamExt};
+use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
+
+use super::{Dictionary, Filter, Links, MessageStream, tree};
+use jaus::component::Component;
+use jaus::node::{Node, Tap, Tapped};
+
+/// Viewers at a time.
+pub const MOST_VIEWERS: usize = 16;
+/// Passages that may wait for one viewer.
+const WAITING: usize = 1024;
+/// Messages that are sent together, if they are there.
+const TOGETHER: usize = 64;
+/// The longest frame that a viewer may send: it has nothing to say.
+const LONGEST: usize = 1024;
+/// A viewer that takes nothing for so long has gone.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// What passes a node, to be looked at.
+#[derive(Debug, Clone)]
+pub struct DebugView(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    node: Node,
+    component: Component,
+    dictionary: Dictionary,
+    viewers: Arc<Semaphore>,
+}
+
+impl DebugView {
+    /// A view of `node` and of what `component`, which lives on it, has found.
+    #[must_use]
+    pub fn new(node: Node, component: Component) -> Self {
+        Self(Arc::new(Inner {
+            node,
+            component,
+            dictionary: Dictionary::new(),
+            viewers: Arc::new(Semaphore::new(MOST_VIEWERS)),
+        }))
+    }
+
+    /// The paths, to be served alone or among others.
+    pub fn router(self) -> Router {
+        Router::new()
+            .route("/messages", get(messages))
+            .route("/tree", get(show_tree))
+            .with_state(self)
+    }
+
+    /// Serves viewers at an address; ends only when that is not possible any more.
+    ///
+    /// # Errors
+    /// What the operating system says.
+    pub async fn serve(self, listener: TcpListener) -> std::io::Result<Infallible> {
+        axum::serve(listener, self.router()).await?;
+        Err(std::io::ErrorKind::ConnectionAborted.into())
+    }
+}
+
+async fn show_tree(State(DebugView(view)): State<DebugView>, headers: HeaderMap) -> Response {
+    if let Err(refusal) = check_site(&headers) {
+        return refusal.into_response();
+    }
+    let nobody = jaus::address::JausId::new(0, 0, 0);
+    Json(tree::json(&view.component.directory(), nobody)).into_response()
+}
+
+async fn messages(
+    State(DebugView(view)): State<DebugView>,
+    Query(terms): Query<Vec<(String, String)>>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    if let Err(refusal) = check_site(&headers) {
+        return refusal.into_response();
+    }
+    let mut filter = Filter::default();
+    for (key, value) in &terms {
+        if let Err(error) = filter.add(key, value) {
+            return (StatusCode::BAD_REQUEST, error.to_string()).into_response();
+        }
+    }
+    let Ok(place) = view.viewers.clone().try_acquire_owned() else {
+        let words = format!("{MOST_VIEWERS} viewers look on already");
+        return (StatusCode::SERVICE_UNAVAILABLE, words).into_response();
+    };
+    let upgrade = upgrade.max_message_size(LONGEST).max_frame_size(LONGEST);
+    upgrade.on_upgrade(async move |socket| {
+        let (sender, receiver) = socket.split();
+        tokio::select! {
+            () = show(&view, filter, sender) => {}
+            () = until_gone(receiver) => {}
+        }
+        drop(place);
+    })
+}
+
+/// Sends what passes, until the viewer or the node has gone.
+async fn show(view: &Inner, filter: Filter, mut sender: SplitSink<WebSocket, Message>) {
+    let mut tap = view.node.tap(WAITING);
+    let mut links = Links::of(view.node.clone());
+    let mut stream = MessageStream::new(&view.dictionary, filter);
+    while let Some(first) = tap.next().await {
+        let texts = read_on(first, &mut tap, &mut links, &mut stream);
+        if texts.is_empty() {
+            // There may be much that does not pass the filter: others have their turn.
+            tokio::task::yield_now().await;
+            continue;
+        }
+        let send = async {
+            for text in texts {
+                sender.feed(Message::text(text)).await?;
+            }
+            sender.flush().await
+        };
+        #[expect(clippy::disallowed_methods, reason = "viewers live in real time")]
+        let sent = tokio::time::timeout(PATIENCE, send).await;
+        if !matches!(sent, Ok(Ok(()))) {
+            return;
+        }
+    }
+    // It has gone, at worst.
+    let _ = sender.close().await;
+}
+
+/// What is there to be sent now.
+fn read_on(
+    first: Tapped,
+    tap: &mut Tap,
+    links: &mut Links,
+    stream: &mut MessageStream<'_>,
+) -> Vec<String> {
+    let mut texts = Vec::new();
+    let more = std::iter::from_fn(|| tap.try_next());
+    for tapped in std::iter::once(first).chain(more).take(TOGETHER) {
+        match tapped {
+            Tapped::Lost(count) => texts.push(format!("{{\"lost\":{count}}}")),
+            Tapped::Passage(passage) => {
+                let entries = stream.read_passage(&passage, links);
+                texts.extend(entries.iter().map(super::Entry::to_json));
+            }
+        }
+    }
+    texts
+}
+
+/// Waits until the viewer has gone; whatever it says is passed over.
+async fn until_gone(mut receiver: SplitStream<WebSocket>) {
+    while let Some(Ok(message)) = receiver.next().await {
+        if matches!(message, Message::Close(_)) {
+            return;
+        }
+    }
+}
+
+/// Refuses what another site's page has asked a browser to do.
+///
+/// A browser names the page's site in `Origin`; that must be where it connects to. And a name that leads
+/// to this host by a foreign name server is none of ours: the host must be an address or `localhost`.
+fn check_site(headers: &HeaderMap) -> Result<(), (StatusCode, &'static str)> {
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    let Some(origin) = text(header::ORIGIN) else {
+        return Ok(());
+    };
+    let host = text(header::HOST).unwrap_or_default();
+    let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
+    let is_known = name == "localhost"
+        || name
+            .trim_matches(['[', ']'])
+            .parse::<std::net::IpAddr>()
+            .is_ok();
+    let same = origin
+        .split_once("://")
+        .is_some_and(|(_, site)| site == host);
+    if is_known && same {
+        Ok(())
+    } else {
+        Err((
+            StatusCode::FORBIDDEN,
+            "this is not for pages of other sites",
+        ))
+    }
+}
+
+/// Opens the address of a debug view.
+///
+/// # Errors
+/// What the operating system says.
+pub async fn listen(address: SocketAddr) -> std::io::Result<TcpListener> {
+    TcpListener::bind(address).await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn is_allowed(host: &'static str, origin: Option<&'static str>) -> bool {
+        let mut headers = HeaderMap::new();
+        headers.insert(header::HOST, host.parse().unwrap());
+        if let Some(origin) = origin {
+            headers.insert(header::ORIGIN, origin.parse().unwrap());
+        }
+        check_site(&headers).is_ok()
+    }
+
+    #[test]
+    fn pages_of_other_sites_are_refused() {
+        assert!(is_allowed("127.0.0.1:8794", None), "no browser");
+        assert!(is_allowed("127.0.0.1:8794", Some("http://127.0.0.1:8794")));
+        assert!(is_allowed("localhost:8794", Some("http://localhost:8794")));
+        assert!(is_allowed("[::1]:8794", Some("http://[::1]:8794")));
+        assert!(!is_allowed("127.0.0.1:8794", Some("http://evil.example")));
+        assert!(!is_allowed("127.0.0.1:8794", Some("null")));
+        let rebound = "http://evil.example:8794";
+        assert!(!is_allowed("evil.example:8794", Some(rebound)));
+    }
+}

@@ -1,0 +1,198 @@
+//! One layout of a message: what it is called, which services define it so, and how its octets and
+//! its JSON are made of one another.
+
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use jsidl::dynamic;
+use jsidl::model::{Id, Message, Version};
+use serde::{Deserialize, Serialize};
+use serde_json::Value as Json;
+
+use super::Unreadable;
+use jaus::codec::view::Value;
+use jaus::codec::{AnyMessage, DecodeError, MessageInfo, ServiceId};
+
+/// One layout of a message, and the services that define it so, the newest first.
+#[derive(Debug)]
+pub(super) struct Definition {
+    pub(super) services: Vec<Id>,
+    codec: Codec,
+}
+
+#[derive(Debug)]
+enum Codec {
+    Generated(&'static MessageInfo),
+    /// A generated type of the Reference Architecture, read with its peers' habits in mind.
+    Ra(&'static MessageInfo),
+    Dynamic(Arc<Message>),
+}
+
+/// A message's fields, which serialize as people see them.
+#[derive(Debug, Clone, Serialize)]
+#[serde(untagged)]
+#[non_exhaustive]
+pub enum Body {
+    /// Read by a generated type.
+    Generated(Value),
+    /// Read by a definition loaded at run time.
+    Dynamic(Json),
+}
+
+/// A service as people name it: `urn:jaus:jss:core:Events`, or with its version
+/// `urn:jaus:jss:core:Events@1.0`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ServiceName {
+    /// The URN.
+    pub urn: String,
+    /// The version; any, if not given.
+    pub version: Option<Version>,
+}
+
+impl ServiceName {
+    pub(super) fn matches(&self, service: &Id) -> bool {
+        *self.urn == *service.urn
+            && self
+                .version
+                .is_none_or(|version| version == service.version)
+    }
+}
+
+impl fmt::Display for ServiceName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.urn)?;
+        self.version
+            .map_or(Ok(()), |version| write!(f, "@{version}"))
+    }
+}
+
+impl FromStr for ServiceName {
+    type Err = Unreadable;
+
+    fn from_str(text: &str) -> Result<Self, Unreadable> {
+        let (urn, version) = match text.split_once('@') {
+            Some((urn, version)) => (urn, Some(parse_version(version)?)),
+            None => (text, None),
+        };
+        Ok(Self {
+            urn: urn.to_owned(),
+            version,
+        })
+    }
+}
+
+/// `1.0`
+pub(super) fn parse_version(text: &str) -> Result<Version, Unreadable> {
+    let parsed = text.split_once('.').and_then(|(major, minor)| {
+        Some(Version {
+            major: major.parse().ok()?,
+            minor: minor.parse().ok()?,
+        })
+    });
+    parsed.ok_or_else(|| {
+        Unreadable::new(format!("\"{text}\" is not a version; write it like 1.0"), 0)
+    })
+}
+
+impl Definition {
+    /// A generated type.
+    pub(super) fn generated(info: &'static MessageInfo) -> Self {
+        Self::of_type(info, Codec::Generated(info))
+    }
+
+    /// A generated type of the Reference Architecture.
+    pub(super) fn ra(info: &'static MessageInfo) -> Self {
+        Self::of_type(info, Codec::Ra(info))
+    }
+
+    fn of_type(info: &MessageInfo, codec: Codec) -> Self {
+        let id = |id: &ServiceId| Id {
+            urn: id.urn.into(),
+            version: Version {
+                major: id.major,
+                minor: id.minor,
+            },
+        };
+        Self {
+            services: info.services.iter().map(id).collect(),
+            codec,
+        }
+    }
+
+    /// A message of a service that was loaded at run time.
+    pub(super) fn dynamic(service: &Id, message: &Arc<Message>) -> Self {
+        Self {
+            services: vec![service.clone()],
+            codec: Codec::Dynamic(Arc::clone(message)),
+        }
+    }
+
+    /// Whether this is tried before a definition that was loaded with a service of this version.
+    pub(super) fn comes_before(&self, version: Version) -> bool {
+        let newest = self.services.iter().map(|service| service.version).max();
+        matches!(self.codec, Codec::Dynamic(_)) && newest >= Some(version)
+    }
+
+    /// The generated type, or the definition that was loaded.
+    fn info(&self) -> Result<&'static MessageInfo, &Message> {
+        match &self.codec {
+            Codec::Generated(info) => Ok(info),
+            Codec::Ra(info) => Ok(info),
+            Codec::Dynamic(message) => Err(message),
+        }
+    }
+
+    pub(super) fn belongs_to(&self, service: &ServiceName) -> bool {
+        self.services.iter().any(|known| service.matches(known))
+    }
+
+    pub(super) fn name(&self) -> &str {
+        match self.info() {
+            Ok(info) => info.name,
+            Err(message) => &message.name,
+        }
+    }
+
+    pub(super) fn code(&self) -> u16 {
+        match self.info() {
+            Ok(info) => info.code,
+            Err(message) => message.code,
+        }
+    }
+
+    pub(super) fn decode(&self, octets: &Bytes) -> Result<Body, Unreadable> {
+        let generated = |message: Result<Box<dyn AnyMessage>, DecodeError>| match message {
+            Ok(message) => Ok(Body::Generated(message.view())),
+            Err(error) => Err(Unreadable::new(error.to_string(), error.offset())),
+        };
+        match &self.codec {
+            Codec::Generated(info) => generated((info.decode)(octets)),
+            Codec::Ra(info) => generated(jaus::messages::ra::forgiving(octets, info.decode)),
+            Codec::Dynamic(message) => {
+                let value = dynamic::decode(message, octets)
+                    .map_err(|error| Unreadable::new(error.to_string(), error.offset))?;
+                dynamic::to_json(message, &value)
+                    .map(Body::Dynamic)
+                    .map_err(|error| Unreadable::new(error.to_string(), 0))
+            }
+        }
+    }
+
+    pub(super) fn encode(&self, body: &Json) -> Result<Bytes, String> {
+        match self.info() {
+            Ok(info) => {
+                let named = |problem: String| format!("{}: {problem}", info.name);
+                let body = Value::deserialize(body).map_err(|error| named(error.to_string()))?;
+                let message = (info.from_view)(&body).map_err(|error| named(error.to_string()))?;
+                message.encode().map_err(|error| error.to_string())
+            }
+            Err(message) => {
+                let value = dynamic::from_json(message, body).map_err(|error| error.to_string())?;
+                let octets = dynamic::encode(message, &value).map_err(|error| error.to_string())?;
+                Ok(octets.into())
+            }
+        }
+    }
+}

@@ -1,0 +1,492 @@
+//! Which definition a message is read and written by: the generated types, and definitions loaded
+//! at run time.
+
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+use bytes::Bytes;
+use jsidl::model::{Id, Service, Version};
+use jsidl::{Diagnostics, Loaded, Loader};
+
+use super::definition::{Body, Definition, ServiceName};
+use super::{Line, Request};
+use jaus::messages;
+
+/// Message definitions by code and by name.
+///
+/// Where several definitions share a code, they are tried in a stated order: those loaded at run
+/// time, then the generated ones; within each, newer versions first. The first that fits exactly
+/// is taken. [`prefer`](Self::prefer) settles the matter by naming a service.
+///
+/// ```
+/// use jaus_view::Dictionary;
+///
+/// let dictionary = Dictionary::new();
+/// let reading = dictionary.read(&vec![0x00, 0x2B, 0x02].into());
+/// assert_eq!(reading.message, Some("QueryIdentification"));
+/// ```
+#[derive(Debug)]
+pub struct Dictionary {
+    by_code: BTreeMap<u16, Vec<Definition>>,
+    /// The Reference Architecture's, whose codes are those of other layouts in `by_code`.
+    ra: BTreeMap<u16, Definition>,
+    preferred: Vec<ServiceName>,
+    /// Whether all of `ra` is preferred.
+    prefers_ra: bool,
+}
+
+/// How much of a name must be right for it to be taken for a slip: 1 is all of it.
+const ALIKE: f64 = 0.75;
+
+/// What [`Dictionary::load`] did.
+#[derive(Debug)]
+pub struct Added {
+    /// How many messages were added, those counted twice that a service both receives and sends.
+    pub messages: usize,
+    /// What is wrong with the definitions.
+    pub diagnostics: Diagnostics,
+}
+
+/// What the dictionary knows about octets.
+#[derive(Debug, Clone)]
+pub struct Reading<'d> {
+    /// The message code, unless there are fewer than two octets.
+    pub code: Option<u16>,
+    /// The message's name, if the code is known.
+    pub message: Option<&'d str>,
+    /// The URN of a service that defines it.
+    pub service: Option<&'d str>,
+    /// That service's version, if the definition is not the one that is tried first.
+    pub version: Option<Version>,
+    /// The fields.
+    pub body: Result<Body, Unreadable>,
+}
+
+/// Why octets cannot be read, or JSON cannot be written, as a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unreadable {
+    /// A sentence.
+    pub problem: String,
+    /// Where: the octet, counted from the first of the message code, or the column of a line.
+    pub offset: usize,
+}
+
+impl Unreadable {
+    pub(super) fn new(problem: impl Into<String>, offset: usize) -> Self {
+        Self {
+            problem: problem.into(),
+            offset,
+        }
+    }
+}
+
+impl fmt::Display for Unreadable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.problem)
+    }
+}
+
+impl std::error::Error for Unreadable {}
+
+impl Default for Dictionary {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Dictionary {
+    /// Every AS5669A message that this crate was generated with.
+    pub fn new() -> Self {
+        let mut by_code: BTreeMap<u16, Vec<Definition>> = BTreeMap::new();
+        // The registry has the newest of the types with one code first.
+        for info in messages::registry().iter() {
+            let definition = Definition::generated(info);
+            by_code.entry(info.code).or_default().push(definition);
+        }
+        Self {
+            by_code,
+            ra: BTreeMap::new(),
+            preferred: Vec::new(),
+            prefers_ra: false,
+        }
+    }
+
+    /// Everything that comes with this crate: also the sets whose features are off, read by their
+    /// definitions at run time, and the messages of the Reference Architecture, which small programs
+    /// need not carry. It costs some milliseconds and a few MiB.
+    pub fn complete() -> Self {
+        let mut dictionary = Self::new();
+        dictionary.ra = reference_architecture();
+        dictionary.load::<&Path>([]);
+        dictionary
+    }
+
+    /// Adds the definitions in files and directories, which may refer to one another and to the
+    /// definitions that come with this crate; those are added too, after all others. A service with
+    /// the URN and version of one that is already here takes its place. What has a mistake is left
+    /// out and named in the diagnostics.
+    pub fn load<P: AsRef<Path>>(&mut self, paths: impl IntoIterator<Item = P>) -> Added {
+        let mut loader = Loader::new();
+        for path in paths {
+            loader.path(path);
+        }
+        loader.catalogue();
+        let Loaded {
+            library,
+            diagnostics,
+        } = loader.load();
+        let (mut ours, theirs): (Vec<_>, Vec<_>) =
+            library.services().partition(|it| comes_with_us(it));
+        for service in &theirs {
+            self.add(service);
+        }
+        ours.retain(|service| !self.knows(&service.id));
+        ours.sort_by_key(|service| Reverse(service.id.version));
+        for service in &ours {
+            self.add_last(service);
+        }
+        Added {
+            messages: theirs.iter().flat_map(|s| s.messages()).count(),
+            diagnostics,
+        }
+    }
+
+    fn knows(&self, service: &Id) -> bool {
+        let mut services = self.by_code.values().flatten().flat_map(|d| &d.services);
+        services.any(|known| known == service)
+    }
+
+    fn add_last(&mut self, service: &Service) {
+        for message in service.messages() {
+            let known = self.by_code.entry(message.code).or_default();
+            known.push(Definition::dynamic(&service.id, message));
+        }
+    }
+
+    fn add(&mut self, service: &Service) {
+        self.forget(&service.id);
+        for message in service.messages() {
+            let known = self.by_code.entry(message.code).or_default();
+            // Before the generated ones, and before older versions.
+            let place = known.partition_point(|other| other.comes_before(service.id.version));
+            known.insert(place, Definition::dynamic(&service.id, message));
+        }
+    }
+
+    /// Drops a service, and the definitions that no other service has.
+    fn forget(&mut self, service: &Id) {
+        for definitions in self.by_code.values_mut() {
+            definitions
+                .iter_mut()
+                .for_each(|d| d.services.retain(|s| s != service));
+            definitions.retain(|d| !d.services.is_empty());
+        }
+    }
+
+    /// Takes this service's definitions wherever it has any, instead of trying others.
+    ///
+    /// # Errors
+    /// If no definition here belongs to such a service.
+    pub fn prefer(&mut self, service: ServiceName) -> Result<(), Unreadable> {
+        let definitions = || self.by_code.values().flatten().chain(self.ra.values());
+        let all = || definitions().flat_map(|d| &d.services);
+        if all().any(|known| service.matches(known)) {
+            self.preferred.push(service);
+            return Ok(());
+        }
+        let wanted = service.urn.to_lowercase();
+        let (family, wanted) = wanted.rsplit_once(':').unwrap_or(("", &wanted));
+        let similar = all().filter(|known| known.urn.to_lowercase().contains(wanted));
+        // One of the same family, else the standard's, and the one that has little else in its name.
+        let similar = similar.min_by_key(|known| {
+            let urn = known.urn.to_lowercase();
+            let is_kin = urn.starts_with(family);
+            (!is_kin, !urn.starts_with("urn:jaus:"), urn.len())
+        });
+        Err(Unreadable::new(
+            match similar {
+                Some(similar) => format!(
+                    "there is no service {service}; perhaps {}@{} is meant",
+                    similar.urn, similar.version
+                ),
+                None => format!("there is no service {service}"),
+            },
+            0,
+        ))
+    }
+
+    /// Takes the Reference Architecture's definitions wherever it has any, for messages without a
+    /// header, which would tell.
+    pub fn prefer_reference_architecture(&mut self) {
+        self.prefers_ra = true;
+    }
+
+    /// The Reference Architecture's definition for a code, if that is preferred.
+    fn preferred_ra(&self, code: u16) -> Option<&Definition> {
+        let preferred = |it: &Id| self.prefers_ra || self.is_preferred(it);
+        let known = self.ra.get(&code);
+        known.filter(|definition| definition.services.iter().any(preferred))
+    }
+
+    /// The name of the messages with this code, if it is known.
+    pub fn name_of(&self, code: u16) -> Option<&str> {
+        self.candidates(code).next().map(Definition::name)
+    }
+
+    /// Looks the message up by its code, and takes its fields apart.
+    pub fn read(&self, octets: &Bytes) -> Reading<'_> {
+        let Some(code) = octets.first_chunk().map(|&code| u16::from_le_bytes(code)) else {
+            let count = octets.len();
+            let problem =
+                format!("a message begins with the two octets of its code, here are {count}");
+            return Reading::unknown(None, Unreadable::new(problem, 0));
+        };
+        if let Some(definition) = self.preferred_ra(code) {
+            return self.reading(code, 0, definition, definition.decode(octets));
+        }
+        let mut failure = None;
+        for (rank, definition) in self.candidates(code).enumerate() {
+            match definition.decode(octets) {
+                Ok(body) => return self.reading(code, rank, definition, Ok(body)),
+                Err(unreadable) => {
+                    failure.get_or_insert((definition, unreadable));
+                }
+            }
+        }
+        match failure {
+            Some((definition, unreadable)) => self.reading(code, 0, definition, Err(unreadable)),
+            None => {
+                let problem = format!(
+                    "no definition here has the message code {code:04X}h; load one that has it"
+                );
+                Reading::unknown(Some(code), Unreadable::new(problem, 0))
+            }
+        }
+    }
+
+    /// Looks a message of the Reference Architecture up; `None` if its code is unknown there.
+    pub(super) fn read_ra(&self, octets: &Bytes) -> Option<Reading<'_>> {
+        let code = u16::from_le_bytes(*octets.first_chunk()?);
+        let definition = self.ra.get(&code)?;
+        Some(self.reading(code, 0, definition, definition.decode(octets)))
+    }
+
+    /// The name of the Reference Architecture's message with this code.
+    pub(super) fn ra_name_of(&self, code: u16) -> Option<&str> {
+        self.ra.get(&code).map(Definition::name)
+    }
+
+    /// The message as a line without transport keys.
+    pub fn line(&self, octets: &Bytes) -> Line<'_> {
+        Line::of_reading(None, self.read(octets), octets)
+    }
+
+    fn reading<'d>(
+        &self,
+        code: u16,
+        rank: usize,
+        definition: &'d Definition,
+        body: Result<Body, Unreadable>,
+    ) -> Reading<'d> {
+        let service = definition
+            .services
+            .iter()
+            .find(|service| self.is_preferred(service))
+            .or(definition.services.first());
+        Reading {
+            code: Some(code),
+            message: Some(definition.name()),
+            service: service.map(|service| &*service.urn),
+            version: service.map(|service| service.version).filter(|_| rank > 0),
+            body,
+        }
+    }
+
+    /// The definitions to try for a code, best first.
+    fn candidates(&self, code: u16) -> impl Iterator<Item = &Definition> {
+        let definitions = self.by_code.get(&code).map_or(&[][..], Vec::as_slice);
+        let preferred = |d: &Definition| d.services.iter().any(|s| self.is_preferred(s));
+        let some_preferred = definitions.iter().any(preferred);
+        definitions
+            .iter()
+            .filter(move |definition| !some_preferred || preferred(definition))
+    }
+
+    fn is_preferred(&self, service: &Id) -> bool {
+        self.preferred.iter().any(|name| name.matches(service))
+    }
+}
+
+impl Dictionary {
+    /// Whether a message of this name is defined.
+    pub fn defines(&self, message: &str) -> bool {
+        let mut all = self.by_code.values().flatten();
+        all.any(|definition| definition.name() == message)
+    }
+
+    /// Makes the octets of a message out of what people write.
+    ///
+    /// # Errors
+    /// If no definition is meant, or the body does not fit it.
+    pub fn write(&self, request: &Request) -> Result<Bytes, Unreadable> {
+        let mut failure = None;
+        for definition in self.requested(request)? {
+            match definition.encode(&request.body) {
+                Ok(octets) => return Ok(octets),
+                Err(problem) => {
+                    failure.get_or_insert(problem);
+                }
+            }
+        }
+        let problem = failure.unwrap_or_else(|| format!("{request} is not defined here"));
+        Err(Unreadable::new(problem, 0))
+    }
+
+    /// The definitions that a request may mean, best first; at least one.
+    fn requested(&self, request: &Request) -> Result<Vec<&Definition>, Unreadable> {
+        if let Some(of_ra) = self.requested_of_ra(request) {
+            return Ok(vec![of_ra]);
+        }
+        let codes = match request.code {
+            Some(code) => vec![code],
+            None => self.by_code.keys().copied().collect(),
+        };
+        let of_name: Vec<_> = codes
+            .into_iter()
+            .flat_map(|code| self.candidates(code))
+            .filter(|d| {
+                request
+                    .message
+                    .as_deref()
+                    .is_none_or(|name| name == d.name())
+            })
+            .collect();
+        if of_name.is_empty() {
+            return Err(Unreadable::new(self.advice(request), 0));
+        }
+        let Some(service) = &request.service else {
+            return Ok(of_name);
+        };
+        let of_service = of_name.iter().copied().filter(|d| d.belongs_to(service));
+        let of_service: Vec<_> = of_service.collect();
+        if of_service.is_empty() {
+            let services = of_name.iter().flat_map(|d| &d.services);
+            let services: Vec<_> = services
+                .map(|s| format!("{}@{}", s.urn, s.version))
+                .collect();
+            let problem = format!(
+                "{service} does not define {request}; it is in {}",
+                services.join(", ")
+            );
+            return Err(Unreadable::new(problem, 0));
+        }
+        Ok(of_service)
+    }
+
+    /// The definition of the Reference Architecture that a request means: it names the service, or
+    /// these definitions are preferred.
+    fn requested_of_ra(&self, request: &Request) -> Option<&Definition> {
+        let is_it = |it: &&Definition| {
+            request.code.is_none_or(|code| code == it.code())
+                && request
+                    .message
+                    .as_deref()
+                    .is_none_or(|name| name == it.name())
+                && match &request.service {
+                    Some(service) => it.belongs_to(service),
+                    None => self.preferred_ra(it.code()).is_some(),
+                }
+        };
+        self.ra.values().find(is_it)
+    }
+
+    /// What to say about a message that is not here.
+    fn advice(&self, request: &Request) -> String {
+        let all = || self.by_code.values().flatten();
+        let Some(name) = request.message.as_deref() else {
+            return format!("no definition here has {request}");
+        };
+        if let Some(known) = all().find(|d| d.name() == name) {
+            return format!("{name} has the code {:04X}h", known.code());
+        }
+        let lower = name.to_lowercase();
+        let similar = all().filter_map(|definition| {
+            let known = definition.name().to_lowercase();
+            let likeness = strsim::normalized_damerau_levenshtein(&known, &lower);
+            let alike = likeness > ALIKE || known.contains(&lower) || lower.contains(&known);
+            alike.then_some((likeness, definition.name()))
+        });
+        match similar.max_by(|(one, _), (other, _)| one.total_cmp(other)) {
+            Some((_, similar)) => format!("there is no message {name}; perhaps {similar} is meant"),
+            None => format!(
+                "there is no message {name} here; if a service of your own defines it, \
+                 that definition must be loaded too"
+            ),
+        }
+    }
+}
+
+impl<'d> Reading<'d> {
+    fn unknown(code: Option<u16>, unreadable: Unreadable) -> Self {
+        Self {
+            code,
+            message: None,
+            service: None,
+            version: None,
+            body: Err(unreadable),
+        }
+    }
+}
+
+/// The Reference Architecture's messages.
+fn reference_architecture() -> BTreeMap<u16, Definition> {
+    let infos = messages::ra_registry().iter();
+    infos
+        .map(|info| (info.code, Definition::ra(info)))
+        .collect()
+}
+
+/// Whether a service is one of those that come with the crate.
+fn comes_with_us(service: &Service) -> bool {
+    jsidl::catalogue::find(&service.id)
+        .is_some_and(|entry| *service.location.file == *Path::new("catalogue").join(entry.path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_message_that_comes_with_the_crate_is_known_whatever_the_features() {
+        let mut loader = Loader::new();
+        loader.catalogue();
+        let dictionary = Dictionary::complete();
+        let services: Vec<_> = loader.load().library.services().cloned().collect();
+        assert!(services.len() > 130);
+        for service in services {
+            for message in service.messages() {
+                let known = dictionary.by_code[&message.code].iter();
+                let mut known = known.filter(|it| it.name() == message.name);
+                assert!(
+                    known.any(|it| it.services.contains(&service.id)),
+                    "{:04X} {} of {}",
+                    message.code,
+                    message.name,
+                    service.id
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_was_generated_is_tried_before_what_is_read_by_its_definition() {
+        let plain = Dictionary::new();
+        let complete = Dictionary::complete();
+        for (code, known) in &plain.by_code {
+            let first = &complete.by_code[code][0];
+            assert_eq!(first.services, known[0].services, "{code:04X}");
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! The log of a node on disk: everything that passes, in files that take each other's place.
+//!
+//! A [`Journal`] has a [tap](Node::tap) of the node, which is its bounded queue, and a thread that
+//! writes, so that a slow card holds up nobody. What the thread is too slow for is lost and counted,
+//! and the log itself says how much and where. A file is ended when it has its size or age, and the
+//! oldest go before the directory would hold more than it may. What is written is handed to the
+//! operating system within a second, in whole blocks or lines: after a crash everything up to there
+//! can be read.
+
+mod directory;
+mod packets;
+mod sink;
+#[cfg(test)]
+mod tests;
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, PoisonError, RwLock};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use tokio::sync::oneshot;
+use tokio::time::MissedTickBehavior;
+
+use self::directory::Directory;
+use self::sink::Sink;
+use super::{Filter, Links};
+use jaus::node::{Node, Tap, Tapped};
+
+/// Passages that may wait to be written.
+const WAITING: usize = 8192;
+/// How often everything is handed to the operating system.
+const FLUSH: Duration = Duration::from_secs(1);
+/// The least that a file may be given: the longest datagram and its headers fit.
+pub const LEAST_FILE: u64 = 128 << 10;
+
+/// What is written.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum JournalFormat {
+    /// Every datagram and fragment as it passed, as pcapng: for `jaus watch`, `jaus decode` and
+    /// Wireshark. What came by TCP or a serial line, or stayed within the node, has headers around it
+    /// as if it had been a datagram.
+    #[default]
+    Packets,
+    /// Whole messages as JSON, one a line: for people and their scripts.
+    JsonLines,
+}
+
+/// Where a log is kept, and how much of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JournalSettings {
+    /// The directory; it is made if it is not there.
+    pub directory: PathBuf,
+    /// What is written.
+    pub format: JournalFormat,
+    /// Octets of all files of the log together.
+    pub limit: u64,
+    /// Octets of one file, at least [`LEAST_FILE`] and at most half of the limit.
+    pub file_limit: u64,
+    /// The time that one file may span.
+    pub file_age: Duration,
+}
+
+impl JournalSettings {
+    /// 1 GiB in packets, in files of 64 MiB and an hour at most.
+    #[must_use]
+    pub fn new(directory: impl Into<PathBuf>) -> Self {
+        Self {
+            directory: directory.into(),
+            format: JournalFormat::default(),
+            limit: 1 << 30,
+            file_limit: 64 << 20,
+            file_age: Duration::from_secs(3600),
+        }
+    }
+
+    /// Another bound for all files together, with files of a sixteenth of it at most.
+    #[must_use]
+    pub fn limited_to(self, octets: u64) -> Self {
+        let file_limit = self.file_limit.min(octets / 16).max(LEAST_FILE);
+        Self {
+            limit: octets,
+            file_limit,
+            ..self
+        }
+    }
+}
+
+/// Why there can be no log.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum JournalError {
+    /// The directory cannot be used.
+    #[error("the log directory {directory} cannot be used: {source}")]
+    Directory {
+        /// Which.
+        directory: String,
+        /// What the operating system says.
+        source: io::Error,
+    },
+    /// Bounds that contradict each other.
+    #[error(
+        "a log of {limit} octets in files of {file_limit} cannot be: a file has at least {LEAST_FILE} \
+         octets, and the log at least twice as many as a file"
+    )]
+    Bounds {
+        /// [`JournalSettings::limit`].
+        limit: u64,
+        /// [`JournalSettings::file_limit`].
+        file_limit: u64,
+    },
+    /// No thread can be started.
+    #[error("the log cannot be written: {0}")]
+    Thread(io::Error),
+}
+
+/// What a log has done. The numbers only grow.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct JournalCounters {
+    /// Packets or lines written.
+    pub written: u64,
+    /// What passed and could not be written: the disk was too slow, full or gone.
+    pub lost: u64,
+}
+
+#[derive(Debug, Default)]
+struct Numbers {
+    written: AtomicU64,
+    lost: AtomicU64,
+    /// Where is written to now.
+    file: RwLock<Option<PathBuf>>,
+}
+
+/// A log that is being written. Dropping it writes what waits and ends it.
+#[derive(Debug)]
+pub struct Journal {
+    numbers: Arc<Numbers>,
+    stop: Option<oneshot::Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Journal {
+    /// Begins a log of everything that passes `node` from now on.
+    ///
+    /// # Errors
+    /// A directory that cannot be used, or bounds that cannot be.
+    pub fn start(node: &Node, settings: &JournalSettings) -> Result<Self, JournalError> {
+        Self::of(node.tap(WAITING), Links::of(node.clone()), settings)
+    }
+
+    fn of(tap: Tap, links: Links, settings: &JournalSettings) -> Result<Self, JournalError> {
+        let (limit, file_limit) = (settings.limit, settings.file_limit);
+        if file_limit < LEAST_FILE || file_limit > limit / 2 {
+            return Err(JournalError::Bounds { limit, file_limit });
+        }
+        let unusable = |source| JournalError::Directory {
+            directory: settings.directory.display().to_string(),
+            source,
+        };
+        let directory = Directory::open(settings).map_err(unusable)?;
+        let numbers = Arc::new(Numbers::default());
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_time()
+            .build()
+            .map_err(JournalError::Thread)?;
+        let (stop, stopped) = oneshot::channel();
+        let (theirs, settings) = (numbers.clone(), settings.clone());
+        let write = move || {
+            let sink = Sink::new(directory, &settings, links);
+            runtime.block_on(write(tap, sink, &settings, &theirs, stopped));
+        };
+        let thread = std::thread::Builder::new().name("jaus-log".to_owned());
+        let thread = thread.spawn(write).map_err(JournalError::Thread)?;
+        Ok(Self {
+            numbers,
+            stop: Some(stop),
+            thread: Some(thread),
+        })
+    }
+
+    /// What it has done so far.
+    #[must_use]
+    pub fn counters(&self) -> JournalCounters {
+        JournalCounters {
+            written: self.numbers.written.load(Ordering::Relaxed),
+            lost: self.numbers.lost.load(Ordering::Relaxed),
+        }
+    }
+
+    /// The file that is being written, once something has passed.
+    #[must_use]
+    pub fn file(&self) -> Option<PathBuf> {
+        let file = self.numbers.file.read();
+        file.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+impl Drop for Journal {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take() {
+            // It has panicked, at worst; then there is nothing left to wait for.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The thread: writes until it is told to stop or the node has.
+async fn write(
+    mut tap: Tap,
+    mut sink: Sink,
+    settings: &JournalSettings,
+    numbers: &Numbers,
+    mut stopped: oneshot::Receiver<()>,
+) {
+    let dictionary = super::Dictionary::new();
+    let mut messages = super::MessageStream::new(&dictionary, Filter::default());
+    let mut turns = tokio::time::interval(FLUSH);
+    turns.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut trouble = Trouble::default();
+    let mut is_last = false;
+    loop {
+        let tapped = tokio::select! {
+            biased;
+            _ = &mut stopped, if !is_last => { is_last = true; continue; }
+            _ = turns.tick() => {
+                trouble.may_try = true;
+                trouble.note(&settings.directory, sink.flush());
+                continue;
+            }
+            tapped = tap.next(), if !is_last => tapped,
+            () = std::future::ready(()), if is_last => tap.try_next(),
+        };
+        let Some(tapped) = tapped else { break };
+        match tapped {
+            Tapped::Lost(count) => sink.lose(count),
+            Tapped::Passage(passage) if trouble.may_try => {
+                let written = match settings.format {
+                    JournalFormat::Packets => sink.write_packets(&passage),
+                    JournalFormat::JsonLines => sink.write_lines(&passage, &mut messages),
+                };
+                if !trouble.note(&settings.directory, written) {
+                    sink.give_up();
+                }
+            }
+            Tapped::Passage(_) => sink.lose(1),
+        }
+        sink.tell(numbers);
+    }
+    trouble.note(&settings.directory, sink.end());
+    sink.tell(numbers);
+}
+
+/// A disk that does not do what it should: said once, and tried again every second.
+#[derive(Debug)]
+struct Trouble {
+    may_try: bool,
+    told: bool,
+}
+
+impl Default for Trouble {
+    fn default() -> Self {
+        Self {
+            may_try: true,
+            told: false,
+        }
+    }
+}
+
+impl Trouble {
+    /// Whether it went well.
+    fn note(&mut self, directory: &Path, result: io::Result<()>) -> bool {
+        match result {
+            Ok(()) => {
+                if self.may_try && std::mem::take(&mut self.told) {
+                    tracing::info!("the log in {} is written again", directory.display());
+                }
+                true
+            }
+            Err(error) => {
+                self.may_try = false;
+                if !std::mem::replace(&mut self.told, true) {
+                    let directory = directory.display();
+                    tracing::warn!(
+                        "the log in {directory} cannot be written, and is tried again: {error}"
+                    );
+                }
+                false
+            }
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! Large messages in a capture: fragments put together, within bounds, in both styles seen.
+//!
+//! AS5669A and Junior cut the message as it is, so that only the first fragment begins with the
+//! message code. JAUS++ repeats the code at the beginning of every fragment. Nothing in a fragment
+//! tells which it is; the whole message does, when it is read.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use bytes::Bytes;
+
+use jaus::address::JausId;
+use jaus::wire::{DataControl, Frame, Version, large};
+
+/// Messages that may be incomplete at a time; then the one that began first is given up.
+const MOST_OPEN: usize = 64;
+/// The most that one message may have; JAUS peers stop at some hundred kilobytes.
+const LONGEST: usize = 16 << 20;
+
+/// Fragments on their way to a whole message.
+#[derive(Debug, Default)]
+pub(super) struct LargeMessages {
+    /// Oldest first.
+    open: VecDeque<Open>,
+    given_up: u64,
+}
+
+#[derive(Debug)]
+struct Open {
+    source: JausId,
+    destination: JausId,
+    version: Version,
+    first: Option<u16>,
+    last: Option<u16>,
+    /// By sequence number.
+    pieces: BTreeMap<u16, Bytes>,
+    length: usize,
+}
+
+/// A message of which every fragment was seen.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Whole {
+    /// Sequence number of the first fragment.
+    pub(super) sequence: u16,
+    /// The fragments' payloads behind one another.
+    pub(super) plain: Bytes,
+    /// The same without the code that every fragment but the first begins with, if they all do.
+    pub(super) without_repeated_code: Option<Bytes>,
+}
+
+impl LargeMessages {
+    /// Messages given up, and those that still wait for fragments.
+    pub(super) fn incomplete(&self) -> u64 {
+        self.given_up + self.open.len() as u64
+    }
+
+    /// Adds a fragment; the message if nothing is missing now.
+    pub(super) fn insert(&mut self, frame: &Frame) -> Option<Whole> {
+        let place = self.place_for(frame);
+        let open = &mut self.open[place];
+        match frame.flags.data() {
+            DataControl::First => open.first = Some(frame.sequence),
+            DataControl::Last => open.last = Some(frame.sequence),
+            DataControl::Middle | DataControl::Single => {}
+        }
+        // One that comes again replaces itself.
+        let before = open.pieces.insert(frame.sequence, frame.payload.clone());
+        open.length += frame.payload.len();
+        open.length -= before.map_or(0, |piece| piece.len());
+        if open.length > LONGEST {
+            self.open.remove(place);
+            self.given_up += 1;
+            return None;
+        }
+        let whole = open.whole()?;
+        self.open.remove(place);
+        Some(whole)
+    }
+
+    /// Where the fragment's message waits. A second beginning or end is another message's.
+    fn place_for(&mut self, frame: &Frame) -> usize {
+        let known = self.open.iter().position(|open| {
+            (open.source, open.destination, open.version)
+                == (frame.source, frame.destination, frame.version)
+        });
+        let other = |seen: Option<u16>| seen.is_some_and(|seen| seen != frame.sequence);
+        if let Some(place) = known {
+            let open = &self.open[place];
+            let begins_anew = match frame.flags.data() {
+                DataControl::First => other(open.first),
+                DataControl::Last => other(open.last),
+                DataControl::Middle | DataControl::Single => false,
+            };
+            if !begins_anew {
+                return place;
+            }
+            self.open.remove(place);
+            self.given_up += 1;
+        } else if self.open.len() == MOST_OPEN {
+            self.open.pop_front();
+            self.given_up += 1;
+        }
+        self.open.push_back(Open {
+            source: frame.source,
+            destination: frame.destination,
+            version: frame.version,
+            first: None,
+            last: None,
+            pieces: BTreeMap::new(),
+            length: 0,
+        });
+        self.open.len() - 1
+    }
+}
+
+impl Open {
+    /// All payloads from the first to the last, if they are here. Sequence numbers wrap around.
+    fn whole(&self) -> Option<Whole> {
+        let (first, last) = (self.first?, self.last?);
+        let fragments = last.wrapping_sub(first);
+        if usize::from(fragments) >= self.pieces.len() {
+            return None;
+        }
+        let pieces: Vec<&Bytes> = (0..=fragments)
+            .map(|step| self.pieces.get(&first.wrapping_add(step)))
+            .collect::<Option<_>>()?;
+        pieces.first()?.get(..large::CODE_LEN)?;
+        let repeated = large::repeats_code(pieces.iter().copied());
+        let join = |skip| large::join(pieces.iter().copied(), skip);
+        // The older headers hold the code, so there it stands in every payload.
+        let (plain, without_repeated_code) = match self.version {
+            Version::As5669a => (join(0), repeated.then(|| join(large::CODE_LEN))),
+            Version::As5669 | Version::Ra => (repeated.then(|| join(large::CODE_LEN))?, None),
+        };
+        Some(Whole {
+            sequence: first,
+            plain,
+            without_repeated_code,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jaus::wire::Flags;
+
+    fn fragment(data: DataControl, sequence: u16, payload: &'static [u8]) -> Frame {
+        Frame {
+            flags: Flags::default().with_data(data),
+            sequence,
+            ..Frame::new(
+                JausId::new(1, 1, 1),
+                JausId::new(2, 1, 1),
+                Bytes::from_static(payload),
+            )
+        }
+    }
+
+    #[test]
+    fn fragments_in_any_order_make_the_message_even_across_the_wrap() {
+        let mut large = LargeMessages::default();
+        assert_eq!(
+            large.insert(&fragment(DataControl::Middle, 65_535, b"cd")),
+            None
+        );
+        assert_eq!(large.insert(&fragment(DataControl::Last, 0, b"ef")), None);
+        assert_eq!(
+            large.insert(&fragment(DataControl::Middle, 65_535, b"cd")),
+            None
+        );
+        let whole = large
+            .insert(&fragment(DataControl::First, 65_534, b"ab"))
+            .unwrap();
+        assert_eq!(whole.plain, b"abcdef"[..]);
+        assert_eq!(whole.sequence, 65_534);
+        assert_eq!(whole.without_repeated_code, None);
+        assert_eq!(large.incomplete(), 0);
+    }
+
+    #[test]
+    fn a_code_in_every_fragment_is_offered_to_be_left_out() {
+        let mut large = LargeMessages::default();
+        large.insert(&fragment(DataControl::First, 1, b"\x03\x4Bab"));
+        let whole = large
+            .insert(&fragment(DataControl::Last, 2, b"\x03\x4Bcd"))
+            .unwrap();
+        assert_eq!(whole.plain, b"\x03\x4Bab\x03\x4Bcd"[..]);
+        assert_eq!(whole.without_repeated_code.unwrap(), b"\x03\x4Babcd"[..]);
+    }
+
+    #[test]
+    fn a_second_beginning_gives_up_the_first_message() {
+        let mut large = LargeMessages::default();
+        large.insert(&fragment(DataControl::First, 1, b"ab"));
+        large.insert(&fragment(DataControl::First, 9, b"cd"));
+        let whole = large
+            .insert(&fragment(DataControl::Last, 10, b"ef"))
+            .unwrap();
+        assert_eq!(whole.plain, b"cdef"[..]);
+        assert_eq!(large.incomplete(), 1);
+    }
+
+    #[test]
+    fn open_messages_are_bounded() {
+        let mut large = LargeMessages::default();
+        for component in 0..=255 {
+            let mut frame = fragment(DataControl::First, 1, b"ab");
+            frame.source = JausId::new(1, 1, component);
+            large.insert(&frame);
+        }
+        assert_eq!(large.open.len(), MOST_OPEN);
+        assert_eq!(large.incomplete(), 256);
+    }
+}

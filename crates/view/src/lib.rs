@@ -1,0 +1,40 @@
+//! What people look at: captures, and JSON of any message.
+//!
+//! From the outside in: a [`Capture`] gives [`Frame`]s, a [`Network`] finds the UDP [`Datagram`]s
+//! in them, a [`MessageLog`] the JAUS messages in those, and a [`Dictionary`] the fields of a
+//! message. A [`Line`] is the result as one JSON object; a [`Request`] is the way back.
+//! Nothing in the stack knows that this crate exists.
+#![forbid(unsafe_code)]
+
+mod capture;
+#[cfg(feature = "web")]
+pub mod debug;
+mod definition;
+mod dictionary;
+mod hex;
+mod journal;
+mod large;
+mod line;
+mod log;
+mod network;
+mod request;
+mod stream;
+mod time;
+pub mod tree;
+
+pub use capture::{Capture, CaptureError, CaptureWriter, Frame, InterfaceNumber, LinkType};
+pub use definition::{Body, ServiceName};
+pub use dictionary::{Added, Dictionary, Reading, Unreadable};
+pub use hex::{from_hex, to_hex};
+pub use journal::{
+    Journal, JournalCounters, JournalError, JournalFormat, JournalSettings, LEAST_FILE,
+};
+pub use line::{Content, Envelope, Header, Line};
+pub use log::MessageLog;
+pub use network::{Counts, Datagram, JAUS_PORT, Network, udp_packet};
+pub use request::Request;
+pub use stream::Links;
+pub use stream::{Entry, Filter, FilterError, MessageStream};
+pub use time::{InvalidTime, Timestamp};
+
+use stream::timestamp;

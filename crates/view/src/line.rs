@@ -1,0 +1,231 @@
+//! One message as one JSON object: what `jaus decode` prints, line by line.
+
+use bytes::Bytes;
+use serde::Serialize;
+use serde::ser::{SerializeMap, Serializer};
+
+use super::definition::Body;
+use super::dictionary::{Reading, Unreadable};
+use super::hex::to_hex;
+use super::{CaptureError, Timestamp};
+use jaus::address::JausId;
+use jaus::wire::ra::RaId;
+use jaus::wire::{self, Frame, Version};
+
+/// A message, or why it cannot be read, as people and scripts see it.
+///
+/// Serializes as one object with the keys in the order in which they are described here; what is
+/// not known is left out.
+#[derive(Debug, Clone)]
+pub struct Line<'d> {
+    /// `time`, `source`, `destination`, `transport`, `priority`, `broadcast`, `ack`, `data`,
+    /// `sequence`: when, who to whom and how. Not there for bare messages.
+    pub envelope: Option<Envelope>,
+    /// `code`: four hexadecimal digits.
+    pub code: Option<u16>,
+    /// `message`: its name in the definition.
+    pub message: Option<&'d str>,
+    /// `service`: the URN of a service that defines it.
+    pub service: Option<&'d str>,
+    /// `version`: of the service, where it is not the one that would be tried first.
+    pub version: Option<jsidl::model::Version>,
+    /// What the message holds.
+    pub content: Content,
+}
+
+/// The last keys of a [`Line`].
+#[derive(Debug, Clone)]
+pub enum Content {
+    /// `body`: the fields.
+    Body(Body),
+    /// `length`: this many octets of a large message, which is shown once it is whole.
+    Fragment(usize),
+    /// `octets`: the message in hexadecimal, because no definition here describes its body.
+    Octets(Bytes),
+    /// Nothing: an acknowledgement.
+    Empty,
+    /// `error` and `offset`; then `octets`, the whole message, if there is one.
+    Unreadable {
+        /// What is wrong.
+        error: String,
+        /// Where: in a message counted from its code, in a datagram or a file from its first
+        /// octet.
+        offset: u64,
+        /// The message at fault.
+        octets: Option<Bytes>,
+    },
+}
+
+/// What a capture and a transport header tell about a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Envelope {
+    /// When it was captured.
+    pub time: Option<Timestamp>,
+    /// What stands in its header; `None` if that could not be read.
+    pub header: Option<Header>,
+}
+
+/// The fields of a transport header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Header {
+    /// From whom.
+    pub source: JausId,
+    /// For whom.
+    pub destination: JausId,
+    /// Which kind of header.
+    pub transport: Version,
+    /// Priority, broadcast, acknowledgement.
+    pub flags: wire::Flags,
+    /// `single`, `first`, `middle` or `last`; `whole` for a large message put together.
+    pub data: &'static str,
+    /// The sequence number; of a large message, the first fragment's.
+    pub sequence: u16,
+}
+
+impl Line<'_> {
+    /// Whether it says why something cannot be read.
+    pub fn is_error(&self) -> bool {
+        matches!(self.content, Content::Unreadable { .. })
+    }
+
+    /// The object as text, without a line end.
+    pub fn to_json(&self) -> String {
+        // Serializing into memory fails only for maps without text keys; there are none.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+impl<'d> Line<'d> {
+    /// A message that was looked up in the dictionary.
+    pub(super) fn of_reading(
+        envelope: Option<Envelope>,
+        reading: Reading<'d>,
+        octets: &Bytes,
+    ) -> Self {
+        let content = match reading.body {
+            Ok(body) => Content::Body(body),
+            Err(Unreadable { problem, offset }) => Content::Unreadable {
+                error: problem,
+                offset: offset as u64,
+                octets: (!octets.is_empty()).then(|| octets.clone()),
+            },
+        };
+        Self {
+            envelope,
+            code: reading.code,
+            message: reading.message,
+            service: reading.service,
+            version: reading.version,
+            content,
+        }
+    }
+
+    /// Something that is no message at all.
+    pub fn of_error(envelope: Option<Envelope>, error: &impl ToString, offset: u64) -> Self {
+        Self {
+            envelope,
+            code: None,
+            message: None,
+            service: None,
+            version: None,
+            content: Content::Unreadable {
+                error: error.to_string(),
+                offset,
+                octets: None,
+            },
+        }
+    }
+}
+
+impl From<&CaptureError> for Line<'_> {
+    fn from(error: &CaptureError) -> Self {
+        Self::of_error(None, error, error.offset())
+    }
+}
+
+impl Header {
+    pub(super) fn of(frame: &Frame) -> Self {
+        Self {
+            source: frame.source,
+            destination: frame.destination,
+            transport: frame.version,
+            flags: frame.flags,
+            data: frame.flags.data().name(),
+            sequence: frame.sequence,
+        }
+    }
+
+    /// Whether the message is one of the Reference Architecture, by its header and its source.
+    pub(super) fn is_ra(&self) -> bool {
+        RaId::in_header(self.transport, self.source).is_some()
+    }
+
+    /// `42.1.1`; the Reference Architecture's ids have four parts.
+    fn id(&self, id: JausId) -> String {
+        if self.transport == Version::Ra || self.is_ra() {
+            RaId::from(id).to_string()
+        } else {
+            id.to_string()
+        }
+    }
+}
+
+impl Serialize for Line<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        if let Some(envelope) = &self.envelope {
+            envelope.write(&mut map)?;
+        }
+        if let Some(code) = self.code {
+            map.serialize_entry("code", &format_args!("{code:04X}"))?;
+        }
+        if let Some(message) = self.message {
+            map.serialize_entry("message", message)?;
+        }
+        if let Some(service) = self.service {
+            map.serialize_entry("service", service)?;
+        }
+        if let Some(version) = self.version {
+            map.serialize_entry("version", &format_args!("{version}"))?;
+        }
+        match &self.content {
+            Content::Body(body) => map.serialize_entry("body", body)?,
+            Content::Fragment(length) => map.serialize_entry("length", length)?,
+            Content::Octets(octets) => map.serialize_entry("octets", &to_hex(octets))?,
+            Content::Empty => {}
+            Content::Unreadable {
+                error,
+                offset,
+                octets,
+            } => {
+                map.serialize_entry("error", error)?;
+                map.serialize_entry("offset", offset)?;
+                if let Some(octets) = octets {
+                    map.serialize_entry("octets", &to_hex(octets))?;
+                }
+            }
+        }
+        map.end()
+    }
+}
+
+impl Envelope {
+    fn write<M: SerializeMap>(&self, map: &mut M) -> Result<(), M::Error> {
+        if let Some(time) = self.time {
+            map.serialize_entry("time", &format_args!("{time}"))?;
+        }
+        let Some(header) = &self.header else {
+            return Ok(());
+        };
+        let flags = header.flags;
+        map.serialize_entry("source", &header.id(header.source))?;
+        map.serialize_entry("destination", &header.id(header.destination))?;
+        map.serialize_entry("transport", header.transport.name())?;
+        map.serialize_entry("priority", flags.priority().name())?;
+        let broadcast = flags.broadcast().map_or("reserved", wire::Broadcast::name);
+        map.serialize_entry("broadcast", broadcast)?;
+        map.serialize_entry("ack", flags.acknowledgement().name())?;
+        map.serialize_entry("data", header.data)?;
+        map.serialize_entry("sequence", &header.sequence)
+    }
+}

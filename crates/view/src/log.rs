@@ -1,0 +1,192 @@
+//! From the datagrams of a capture to the messages in them.
+
+use bytes::Bytes;
+
+use super::dictionary::Dictionary;
+use super::large::LargeMessages;
+use super::line::{Content, Envelope, Header, Line};
+use super::{Datagram, Timestamp};
+use jaus::wire::{self, DataControl, Frame, Version, judp};
+
+/// Reads datagrams one after the other and gives a [`Line`] for every message.
+///
+/// Octets behind the messages of a datagram are passed over without a word, because JAUS++ leaves
+/// the end of older, longer messages there. Now and then such a rest looks like a message. What
+/// follows the first message is therefore only believed if its header could have been written on
+/// purpose ([`Frame::is_plausible`]) and its source is of the same node as the first message's:
+/// one node sends a datagram.
+#[derive(Debug)]
+pub struct MessageLog<'d> {
+    dictionary: &'d Dictionary,
+    large: LargeMessages,
+    stale_octets: u64,
+}
+
+impl<'d> MessageLog<'d> {
+    /// A log that looks messages up in `dictionary`.
+    pub fn new(dictionary: &'d Dictionary) -> Self {
+        Self {
+            dictionary,
+            large: LargeMessages::default(),
+            stale_octets: 0,
+        }
+    }
+
+    /// Octets behind messages that were passed over so far.
+    pub fn stale_octets(&self) -> u64 {
+        self.stale_octets
+    }
+
+    /// Large messages of which some fragments were not seen so far.
+    pub fn incomplete_messages(&self) -> u64 {
+        self.large.incomplete()
+    }
+
+    /// The messages of a datagram, or why there is none.
+    pub fn read(&mut self, time: Option<Timestamp>, datagram: &Datagram<'_>) -> Vec<Line<'d>> {
+        let mut lines = Vec::new();
+        let octets = Bytes::copy_from_slice(&datagram.payload);
+        if let Err(error) = self.messages(time, octets, &mut lines) {
+            let envelope = Envelope { time, header: None };
+            let sentence = match datagram.missing {
+                0 => error.to_string(),
+                missing => format!("{error}; the capture left out {missing} octets"),
+            };
+            let offset = error.offset as u64;
+            lines.push(Line::of_error(Some(envelope), &sentence, offset));
+        }
+        lines
+    }
+
+    /// Adds the lines of a datagram's messages.
+    fn messages(
+        &mut self,
+        time: Option<Timestamp>,
+        octets: Bytes,
+        lines: &mut Vec<Line<'d>>,
+    ) -> Result<(), wire::Error> {
+        let mut frames = judp::frames(octets)?;
+        let mut sender = None;
+        loop {
+            let rest = frames.remaining();
+            let frame = frames.next().transpose()?.filter(|frame| {
+                let node = frame.source.whole_node();
+                *sender.get_or_insert(node) == node
+            });
+            let Some(frame) = frame else {
+                self.stale_octets += rest as u64;
+                return Ok(());
+            };
+            self.message(time, &frame, lines);
+        }
+    }
+
+    /// Adds the line of a message, and that of the large message which it completes.
+    fn message(&mut self, time: Option<Timestamp>, frame: &Frame, lines: &mut Vec<Line<'d>>) {
+        let envelope = Envelope {
+            time,
+            header: Some(Header::of(frame)),
+        };
+        if frame.is_acknowledgement() {
+            lines.push(self.bare(envelope, None, Content::Empty));
+        } else if frame.flags.data() != DataControl::Single {
+            lines.push(self.fragment(envelope, frame));
+            lines.extend(self.whole(time, frame));
+        } else {
+            lines.push(self.line(envelope, &frame.payload));
+        }
+    }
+
+    /// The line of a message as soon as all of it is here; none for an acknowledgement.
+    pub(super) fn whole_message(
+        &mut self,
+        time: Option<Timestamp>,
+        frame: &Frame,
+    ) -> Option<Line<'d>> {
+        if frame.is_acknowledgement() {
+            return None;
+        }
+        if frame.flags.data() != DataControl::Single {
+            return self.whole(time, frame);
+        }
+        let envelope = Envelope {
+            time,
+            header: Some(Header::of(frame)),
+        };
+        Some(self.line(envelope, &frame.payload))
+    }
+
+    /// A message that is here as a whole.
+    fn line(&self, envelope: Envelope, octets: &Bytes) -> Line<'d> {
+        let transport = envelope.header.as_ref().map(|header| header.transport);
+        let reading = self.ra(&envelope).and_then(|ra| ra.read_ra(octets));
+        let reading = match (reading, transport) {
+            (Some(reading), _) if reading.body.is_ok() => reading,
+            (Some(reading), Some(Version::Ra)) => reading,
+            (None, Some(Version::Ra)) => {
+                // The Reference Architecture's messages share codes and names with the services'
+                // but not layouts: reading them by the services' definitions would invent values.
+                let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
+                return self.bare(envelope, code, Content::Octets(octets.clone()));
+            }
+            // Through the other older header, a message of the services may come from a subsystem
+            // that looks like one of the Reference Architecture.
+            (of_ra, _) => {
+                let reading = self.dictionary.read(octets);
+                of_ra.filter(|_| reading.body.is_err()).unwrap_or(reading)
+            }
+        };
+        Line::of_reading(Some(envelope), reading, octets)
+    }
+
+    /// The dictionary, if the message may be one of the Reference Architecture.
+    fn ra(&self, envelope: &Envelope) -> Option<&'d Dictionary> {
+        let is_ra = envelope.header.as_ref().is_some_and(Header::is_ra);
+        is_ra.then_some(self.dictionary)
+    }
+
+    fn fragment(&self, envelope: Envelope, frame: &Frame) -> Line<'d> {
+        // Only the first fragment surely begins with the code; the older headers hold it.
+        let has_code =
+            frame.version != Version::As5669a || frame.flags.data() == DataControl::First;
+        let code = frame.code().filter(|_| has_code);
+        self.bare(envelope, code, Content::Fragment(frame.payload.len()))
+    }
+
+    /// The large message that this fragment completes.
+    fn whole(&mut self, time: Option<Timestamp>, frame: &Frame) -> Option<Line<'d>> {
+        let whole = self.large.insert(frame)?;
+        let envelope = Envelope {
+            time,
+            header: Some(Header {
+                data: "whole",
+                sequence: whole.sequence,
+                ..Header::of(frame)
+            }),
+        };
+        let line = self.line(envelope.clone(), &whole.plain);
+        let Some(octets) = whole.without_repeated_code.filter(|_| line.is_error()) else {
+            return Some(line);
+        };
+        let other = self.line(envelope, &octets);
+        Some(if other.is_error() { line } else { other })
+    }
+
+    /// A line without body.
+    fn bare(&self, envelope: Envelope, code: Option<u16>, content: Content) -> Line<'d> {
+        let name = |code| {
+            let ra = self.ra(&envelope);
+            ra.and_then(|ra| ra.ra_name_of(code))
+                .or_else(|| self.dictionary.name_of(code))
+        };
+        let message = code.and_then(name);
+        Line {
+            envelope: Some(envelope),
+            code,
+            message,
+            service: None,
+            version: None,
+            content,
+        }
+    }
+}

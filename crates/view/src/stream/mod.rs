@@ -1,0 +1,108 @@
+//! A stream of messages for people: whole messages, each shown once, those that a [`Filter`] lets
+//! pass.
+//!
+//! Where messages come from does not matter: a running node's [`Tap`](jaus::node::Tap), a capture,
+//! or JSON lines that were written before. Fragments are put together here, and not where the
+//! traffic is. What its sender repeats, a router passes on, or several links carry, is shown when it is
+//! seen first; acknowledgements are not shown.
+
+mod entry;
+mod fields;
+mod filter;
+mod passage;
+mod seen;
+#[cfg(test)]
+mod tests;
+
+use bytes::Bytes;
+use serde_json::Value as Json;
+
+use super::{Datagram, Dictionary, MessageLog, Timestamp};
+use jaus::wire::{Frame, judp};
+
+pub use entry::Entry;
+pub use filter::{Filter, FilterError};
+pub use passage::Links;
+pub(super) use passage::timestamp;
+pub(super) use seen::Seen;
+
+/// Turns what passed into entries.
+#[derive(Debug)]
+pub struct MessageStream<'d> {
+    messages: MessageLog<'d>,
+    filter: Filter,
+    seen: Seen,
+}
+
+impl<'d> MessageStream<'d> {
+    /// A stream of what `filter` lets pass, read by the definitions of `dictionary`.
+    #[must_use]
+    pub fn new(dictionary: &'d Dictionary, filter: Filter) -> Self {
+        Self {
+            messages: MessageLog::new(dictionary),
+            filter,
+            seen: Seen::default(),
+        }
+    }
+
+    /// Large messages of which some fragments were not seen so far.
+    #[must_use]
+    pub fn incomplete_messages(&self) -> u64 {
+        self.messages.incomplete_messages()
+    }
+
+    /// The messages of a datagram in a capture. What is not JAUS gives none.
+    pub fn read_datagram(
+        &mut self,
+        time: Option<Timestamp>,
+        datagram: &Datagram<'_>,
+    ) -> Vec<Entry> {
+        let octets = Bytes::copy_from_slice(&datagram.payload);
+        let Ok(frames) = judp::frames(octets) else {
+            return Vec::new();
+        };
+        let frames = frames.map_while(Result::ok);
+        let frames = frames.take_while(Frame::is_plausible);
+        frames
+            .filter_map(|frame| self.read_frame(time, &frame))
+            .collect()
+    }
+
+    /// A line of JSON as this or `jaus decode` has written it; `None` if it does not pass.
+    ///
+    /// # Errors
+    /// What is wrong with a line that is no JSON object.
+    pub fn read_json(&self, line: &str) -> Result<Option<Entry>, String> {
+        match serde_json::from_str(line) {
+            Ok(Json::Object(object)) => {
+                let entry = Entry::of_object(object);
+                Ok(self.filter.passes(&entry).then_some(entry))
+            }
+            Ok(_) => Err("this is no JSON object".to_owned()),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    /// The message of a frame, or the one that it completes, if it is to be shown.
+    fn read_frame(&mut self, time: Option<Timestamp>, frame: &Frame) -> Option<Entry> {
+        if time.is_some_and(|time| self.seen.is_copy(time, frame)) {
+            return None;
+        }
+        self.read_whole(time, frame, Vec::new())
+    }
+
+    /// The same for a frame that was not seen before.
+    fn read_whole(
+        &mut self,
+        time: Option<Timestamp>,
+        frame: &Frame,
+        way: Vec<(&'static str, String)>,
+    ) -> Option<Entry> {
+        if frame.is_acknowledgement() || !self.filter.may_pass(frame.source, frame.destination) {
+            return None;
+        }
+        let line = self.messages.whole_message(time, frame)?;
+        let entry = Entry::of_line(&line, way);
+        self.filter.passes(&entry).then_some(entry)
+    }
+}

@@ -1,0 +1,216 @@
+//! Filters, and what is shown once.
+
+use bytes::Bytes;
+use serde_json::json;
+
+use super::*;
+use jaus::address::JausId;
+use jaus::wire::{Acknowledgement, DataControl, Flags, Priority};
+
+fn entry(json: Json) -> Entry {
+    match json {
+        Json::Object(object) => Entry::of_object(object),
+        other => panic!("{other}"),
+    }
+}
+
+fn velocity() -> Entry {
+    entry(json!({
+        "time": "2026-01-01T12:00:00.000000Z", "direction": "sent", "source": "101.2.33",
+        "destination": "42.1.1", "priority": "standard", "sequence": 7, "code": "4404",
+        "message": "ReportVelocityState",
+        "service": "urn:jaus:jss:mobility:VelocityStateSensor",
+        "body": {
+            "Velocity_X": 1.5, "State": "Ready",
+            "Records": [{"Pose": {"X": 1, "Y": -2}}, {"Pose": {"X": 5, "Y": 0}}],
+        },
+    }))
+}
+
+#[track_caller]
+fn passes(filter: &str) -> bool {
+    let parsed: Filter = filter.parse().unwrap();
+    let again: Filter = parsed.to_string().parse().unwrap();
+    assert_eq!(parsed, again, "{filter}");
+    parsed.passes(&velocity())
+}
+
+#[test]
+fn a_message_must_meet_every_term() {
+    for filter in [
+        "",
+        "component=101",
+        "component=101.2.33",
+        "component=42.*.1",
+        "component=7,42",
+        "from=101.2 to=42",
+        "service=velocitystate",
+        "service=urn:jaus:jss:mobility:VelocityStateSensor",
+        "message=ReportVelocityState",
+        "message=velocity",
+        "message=Report*State",
+        "message=4404 message=4404h",
+        "message=Nothing,4404",
+        "direction=sent,local",
+        "velocity_x>1.0",
+        "Velocity_X>=1.5 velocityx<2",
+        "velocity_x!=2",
+        "state=READY",
+        "state~ead",
+        "pose.x=5",
+        "records.1.pose.x=5",
+        "body.records.0.pose.y<0",
+        "sequence=7",
+        "priority=standard",
+        "ready",
+        "\"2026-01-01T12\"",
+        "text=VelocityStateSensor velocity_x=1.5 component=101",
+    ] {
+        assert!(passes(filter), "{filter}");
+    }
+    for filter in [
+        "component=102",
+        "to=101",
+        "from=42",
+        "service=PoseSensor",
+        "message=Query*",
+        "message=ReportVelocity*X",
+        "message=4403",
+        "direction=received",
+        "velocity_x>1.5",
+        "velocity_x=1.4",
+        "velocity_y>0",
+        "records.0.pose.x=5",
+        "state>1",
+        "state!=ready",
+        "nowhere",
+        "component=101 velocity_x>2",
+    ] {
+        assert!(!passes(filter), "{filter}");
+    }
+}
+
+#[test]
+fn a_mistake_in_a_filter_is_told_with_what_would_be_right() {
+    for (filter, part) in [
+        ("component=rover", "write 101.2.33"),
+        ("component=1.2.3.4", "write 101.2.33"),
+        ("velocity_x>fast", "there is to be a number"),
+        ("direction=up", "received, sent, local, passing"),
+        ("\"open", "a double quote is missing"),
+    ] {
+        let said = filter.parse::<Filter>().unwrap_err().to_string();
+        assert!(said.contains(part), "{filter}: {said}");
+    }
+    let mut filter = Filter::default();
+    filter.add("text", "").unwrap();
+    assert!(filter.is_empty());
+    let said = filter.add("mesage", "x").unwrap_err().to_string();
+    assert!(
+        said.contains("`mesage`") && said.contains("component, from"),
+        "{said}"
+    );
+    assert!(filter.add("field", "velocity").is_err());
+    assert!(filter.add("text", &"x".repeat(5000)).is_err(), "bounded");
+}
+
+fn frame(sequence: u16, payload: &'static [u8]) -> Frame {
+    Frame {
+        sequence,
+        ..Frame::new(
+            JausId::new(101, 1, 1),
+            JausId::new(42, 1, 1),
+            Bytes::from_static(payload),
+        )
+    }
+}
+
+const QUERY: &[u8] = b"\x00\x2B\x02";
+
+fn at(milliseconds: u32) -> Option<Timestamp> {
+    let (seconds, rest) = (milliseconds / 1000, milliseconds % 1000);
+    Some(Timestamp::new(i64::from(seconds), rest * 1_000_000, 6))
+}
+
+/// How many lines each frame, with its time, gives.
+fn shown(frames: &[(u32, Frame)]) -> Vec<usize> {
+    let dictionary = Dictionary::new();
+    let mut stream = MessageStream::new(&dictionary, Filter::default());
+    let mut read = |(time, frame): &(u32, Frame)| {
+        let entry = stream.read_frame(at(*time), frame);
+        usize::from(entry.is_some())
+    };
+    frames.iter().map(&mut read).collect()
+}
+
+#[test]
+fn what_is_repeated_or_comes_by_another_way_is_shown_once() {
+    let wants = Flags::new(Priority::Standard).with_acknowledgement(Acknowledgement::Request);
+    let repeated = Frame {
+        flags: wants,
+        ..frame(9, QUERY)
+    };
+    let counts = shown(&[
+        (0, frame(1, QUERY)),
+        (1, frame(1, QUERY)),
+        (2, frame(2, QUERY)),
+        (3, repeated.clone()),
+        (800, repeated.clone()),
+        (1600, repeated.clone()),
+        (9000, repeated),
+    ]);
+    assert_eq!(counts, [1, 0, 1, 1, 0, 0, 1], "numbers come again later");
+}
+
+#[test]
+fn what_has_no_number_is_a_copy_only_at_once() {
+    let counts = shown(&[
+        (0, frame(0, QUERY)),
+        (1, frame(0, QUERY)),
+        (100, frame(0, QUERY)),
+    ]);
+    assert_eq!(counts, [1, 0, 1]);
+}
+
+#[test]
+fn a_message_in_fragments_is_shown_when_it_is_whole_also_when_fragments_come_twice() {
+    let part = |data, sequence, payload| Frame {
+        flags: Flags::default().with_data(data),
+        ..frame(sequence, payload)
+    };
+    let first = part(DataControl::First, 1, b"\x00\x2B");
+    let last = part(DataControl::Last, 2, b"\x02");
+    let counts = shown(&[(0, first.clone()), (1, first), (2, last.clone()), (3, last)]);
+    assert_eq!(counts, [0, 0, 1, 0]);
+}
+
+#[test]
+fn acknowledgements_are_not_shown() {
+    let acknowledgement = Frame {
+        flags: Flags::default().with_acknowledgement(Acknowledgement::Positive),
+        ..frame(1, b"")
+    };
+    assert_eq!(shown(&[(0, acknowledgement)]), [0]);
+}
+
+#[test]
+fn a_line_for_people_names_who_what_and_the_fields_and_hides_control_characters() {
+    assert_eq!(
+        velocity().in_words(false),
+        "12:00:00.000   101.2.33 → 42.1.1     sent     ReportVelocityState  Velocity_X=1.5 \
+         State=Ready Records([Pose(X=1 Y=-2)] [Pose(X=5 Y=0)])"
+    );
+    let hostile = entry(json!({"message": "M", "body": {"Name": "\u{1b}[2J"}}));
+    assert!(!hostile.in_words(false).contains('\u{1b}'));
+    assert!(velocity().in_words(true).contains("\u{1b}["));
+}
+
+#[test]
+fn lines_that_were_written_are_read_back_as_they_were() {
+    let dictionary = Dictionary::new();
+    let stream = MessageStream::new(&dictionary, "velocity_x>1".parse().unwrap());
+    let line = velocity().to_json();
+    assert_eq!(stream.read_json(&line), Ok(Some(velocity())));
+    assert_eq!(stream.read_json(r#"{"message":"M"}"#), Ok(None));
+    assert!(stream.read_json("{").is_err() && stream.read_json("7").is_err());
+}

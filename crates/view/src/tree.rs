@@ -1,0 +1,219 @@
+//! What discovery has found, for people and as JSON: the tree, and what becomes different in it.
+
+use std::collections::BTreeMap;
+
+use jaus::address::JausId;
+use jaus::component::{Change, Directory, Identification, Kind, Level, Loss, Offer};
+use jaus::service::Component;
+use serde_json::{Map, Value as Json, json};
+
+/// The tree as indented lines, without `left_out`, the component that looked.
+pub fn lines(directory: &Directory, left_out: Option<JausId>) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (number, subsystem) in directory.subsystems() {
+        let others: Vec<_> = subsystem
+            .components()
+            .filter(|c| Some(c.id) != left_out)
+            .collect();
+        if others.is_empty() {
+            continue;
+        }
+        lines.push(format!(
+            "subsystem {number}{}",
+            naming(subsystem.identification())
+        ));
+        for (number, node) in subsystem.nodes() {
+            lines.push(format!("  node {number}{}", naming(node.identification())));
+            for component in node.components().filter(|c| Some(c.id) != left_out) {
+                lines.push(format!(
+                    "    {}{}",
+                    component.id,
+                    naming(component.identification.as_ref())
+                ));
+                lines.extend(
+                    services(component)
+                        .into_iter()
+                        .map(|line| format!("      {line}")),
+                );
+            }
+        }
+    }
+    lines
+}
+
+/// `  vehicle "Rover"`; nothing as long as nothing was told. That a node is a node goes without
+/// saying.
+fn naming(identification: Option<&Identification>) -> String {
+    let Some(Identification { kind, name }) = identification else {
+        return String::new();
+    };
+    match (kind, name.as_str()) {
+        (Kind::Node | Kind::Component, "") => String::new(),
+        (Kind::Node | Kind::Component, name) => format!("  \"{name}\""),
+        (kind, "") => format!("  {kind}"),
+        (kind, name) => format!("  {kind} \"{name}\""),
+    }
+}
+
+/// `the vehicle "Rover"`, or `called "Camera"`.
+pub fn introduction(Identification { kind, name }: &Identification) -> String {
+    match kind {
+        Kind::Vehicle | Kind::OperatorControlUnit => format!("the {kind} \"{name}\""),
+        _ => format!("called \"{name}\""),
+    }
+}
+
+/// A line for each service, its versions aligned in a column.
+fn services(component: &Component) -> Vec<String> {
+    let Some(offers) = &component.services else {
+        return vec!["(has not told its services yet)".to_owned()];
+    };
+    let services = by_urn(offers);
+    let width = services.keys().map(|urn| urn.len()).max().unwrap_or(0);
+    services
+        .into_iter()
+        .map(|(urn, versions)| format!("{urn:width$}  {}", versions.join(", ")))
+        .collect()
+}
+
+/// The versions of every service, the newest first.
+pub fn by_urn(offers: &[Offer]) -> BTreeMap<&str, Vec<String>> {
+    let mut services: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for Offer { urn, major, minor } in offers.iter().rev() {
+        services
+            .entry(urn)
+            .or_default()
+            .push(format!("{major}.{minor}"));
+    }
+    services
+}
+
+/// The tree as one JSON object, without the component `own`.
+pub fn json(directory: &Directory, own: JausId) -> Json {
+    let mut subsystems = Vec::new();
+    for (number, subsystem) in directory.subsystems() {
+        let mut nodes = Vec::new();
+        for (number, node) in subsystem.nodes() {
+            let others = node.components().filter(|component| component.id != own);
+            let components: Vec<_> = others.map(component_json).collect();
+            if !components.is_empty() {
+                let mut object = named_json("node", json!(number), node.identification());
+                object.insert("components".to_owned(), Json::Array(components));
+                nodes.push(Json::Object(object));
+            }
+        }
+        if !nodes.is_empty() {
+            let mut object = named_json("subsystem", json!(number), subsystem.identification());
+            object.insert("nodes".to_owned(), Json::Array(nodes));
+            subsystems.push(Json::Object(object));
+        }
+    }
+    json!({ "subsystems": subsystems })
+}
+
+fn component_json(component: &Component) -> Json {
+    let id = json!(component.id.to_string());
+    let mut object = named_json("component", id, component.identification.as_ref());
+    if let Some(offers) = &component.services {
+        object.insert("services".to_owned(), services_json(offers));
+    }
+    Json::Object(object)
+}
+
+fn services_json(offers: &[Offer]) -> Json {
+    let service = |offer: &Offer| {
+        let version = format!("{}.{}", offer.major, offer.minor);
+        json!({ "urn": offer.urn, "version": version })
+    };
+    offers.iter().map(service).collect()
+}
+
+fn named_json(key: &str, id: Json, identification: Option<&Identification>) -> Map<String, Json> {
+    let mut object = Map::new();
+    object.insert(key.to_owned(), id);
+    if let Some(Identification { kind, name }) = identification {
+        object.insert("kind".to_owned(), json!(kind.to_string()));
+        object.insert("name".to_owned(), json!(name));
+    }
+    object
+}
+
+/// A change in words; `None` if it says nothing that the next one does not say better.
+pub fn in_words(change: Change, directory: &Directory) -> Option<String> {
+    Some(match change {
+        Change::SubsystemFound(_) => return None,
+        Change::Found(id) => format!("{id} has come"),
+        Change::Identified(level, id) => {
+            let who = level_name(level, id);
+            format!(
+                "{who} is {}",
+                introduction(directory.identification(level, id)?)
+            )
+        }
+        Change::Services(id) => {
+            let offers = directory.component(id)?.services.as_ref()?;
+            let names = by_urn(offers).into_iter().map(|(urn, versions)| {
+                let name = urn.rsplit(':').next().unwrap_or(urn);
+                format!("{name} {}", versions.join("/"))
+            });
+            format!("{id} offers {}", names.collect::<Vec<_>>().join(", "))
+        }
+        Change::Lost(id, loss) => format!("{id} is gone: {}", reason(loss)),
+        Change::SubsystemLost(number) => format!("subsystem {number} is gone"),
+    })
+}
+
+/// A change as a JSON object.
+pub fn change_json(change: Change, directory: &Directory) -> Json {
+    match change {
+        Change::SubsystemFound(number) => {
+            json!({ "change": "subsystem found", "subsystem": number })
+        }
+        Change::Found(id) => json!({ "change": "found", "component": id.to_string() }),
+        Change::Identified(level, id) => {
+            let (key, id_json) = match level {
+                Level::Subsystem => ("subsystem", json!(id.subsystem())),
+                Level::Node => ("node", json!(format!("{}.{}", id.subsystem(), id.node()))),
+                Level::Component => ("component", json!(id.to_string())),
+            };
+            let mut object = Map::new();
+            object.insert("change".to_owned(), json!("identified"));
+            object.extend(named_json(
+                key,
+                id_json,
+                directory.identification(level, id),
+            ));
+            Json::Object(object)
+        }
+        Change::Services(id) => {
+            let component = directory.component(id);
+            let offers = component.and_then(|component| component.services.as_deref());
+            json!({
+                "change": "services",
+                "component": id.to_string(),
+                "services": services_json(offers.unwrap_or_default()),
+            })
+        }
+        Change::Lost(id, loss) => {
+            json!({ "change": "lost", "component": id.to_string(), "reason": reason(loss) })
+        }
+        Change::SubsystemLost(number) => json!({ "change": "subsystem lost", "subsystem": number }),
+    }
+}
+
+fn level_name(level: Level, id: JausId) -> String {
+    match level {
+        Level::Subsystem => format!("subsystem {}", id.subsystem()),
+        Level::Node => format!("node {}.{}", id.subsystem(), id.node()),
+        Level::Component => id.to_string(),
+    }
+}
+
+const fn reason(loss: Loss) -> &'static str {
+    match loss {
+        Loss::Silent => "it does not answer any more",
+        Loss::Unlisted => "its subsystem does not list it any more",
+        Loss::WithItsReporter => "the component that spoke for it is gone",
+        Loss::NoRoom => "it never spoke, and its place is needed for one that does",
+    }
+}
