@@ -7,17 +7,19 @@
 //! | read and write messages | [`messages`], [`codec`] |
 //! | run a node and see raw messages | [`node`] |
 //! | embed the protocol where there is no tokio | [`endpoint`], [`service`] |
-//! | look into datagrams | [`wire`], and [`view`] for captures and JSON |
+//! | look into datagrams | [`wire`]; the crate `jaus-view` for captures and JSON |
 //! | know what other implementations do otherwise | [`peer`] |
 //!
-//! Modules know only those below them: `view` and `component`, then `service` and `node`, then
-//! `link`, `endpoint`, `peer` and `messages`, then `wire` and `codec`, then `address`. From
-//! `service` and `endpoint` downwards nothing opens a socket or reads a clock.
+//! A vehicle with motion control, a world model and missions is the crate `jaus-vehicle`; systems of
+//! the Reference Architecture 3.x are reached through `jaus-ra`; the tool `jaus` is `jaus-cli`.
+//!
+//! Modules know only those below them: `component`, then `service` and `node`, then `link`,
+//! `endpoint`, `peer` and `messages`, then `wire` and `codec`, then `address`. `service` and
+//! `endpoint`, and all below them, open no socket and read no clock.
 #![forbid(unsafe_code)]
 
 pub mod address;
 mod as_text;
-pub mod codec;
 #[cfg(feature = "node")]
 pub mod component;
 mod counters;
@@ -30,6 +32,10 @@ pub mod node;
 pub mod peer;
 pub mod service;
 pub mod wire;
+
+/// The runtime of the messages.
+#[doc(inline)]
+pub use jaus_codec as codec;
 
 /// The README's programs compile.
 #[cfg(all(doctest, feature = "node", feature = "mobility"))]

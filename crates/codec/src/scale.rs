@@ -263,19 +263,19 @@ impl fmt::Display for OutOfRange {
 macro_rules! __codec_scaled {
     ($name:ident($raw:ty), $field:literal, $lower:literal to $upper:literal $unit:literal, $rounding:ident) => {
         #[allow(clippy::approx_constant)]
-        impl $crate::codec::Scaled for $name {
+        impl $crate::Scaled for $name {
             const NAME: &'static str = $field;
             const UNIT: &'static str = $unit;
-            const SCALE: $crate::codec::Scale = $crate::codec::Scale::of_integer(
+            const SCALE: $crate::Scale = $crate::Scale::of_integer(
                 $lower,
                 $upper,
                 <$raw>::MIN as i64,
                 <$raw>::MAX as i64,
-                $crate::codec::Rounding::$rounding,
+                $crate::Rounding::$rounding,
             );
 
             #[inline]
-            fn from_real(value: f64) -> Result<Self, $crate::codec::OutOfRange> {
+            fn from_real(value: f64) -> Result<Self, $crate::OutOfRange> {
                 Self::new(value)
             }
 
@@ -291,17 +291,17 @@ macro_rules! __codec_scaled {
             /// # Errors
             /// If the value is outside the range, which includes its limits.
             #[inline]
-            pub fn new(value: f64) -> Result<Self, $crate::codec::OutOfRange> {
-                match <Self as $crate::codec::Scaled>::SCALE.raw(value) {
+            pub fn new(value: f64) -> Result<Self, $crate::OutOfRange> {
+                match <Self as $crate::Scaled>::SCALE.raw(value) {
                     Some(count) => Ok(Self::of_count(count)),
-                    None => Err($crate::codec::OutOfRange::of::<Self>(value)),
+                    None => Err($crate::OutOfRange::of::<Self>(value)),
                 }
             }
 
             /// The value in the unit of the field.
             #[inline]
             pub fn value(self) -> f64 {
-                <Self as $crate::codec::Scaled>::SCALE.value(self.count())
+                <Self as $crate::Scaled>::SCALE.value(self.count())
             }
 
             /// The integer on the wire.
@@ -326,11 +326,11 @@ macro_rules! __codec_scaled {
             }
         }
 
-        $crate::codec::fixed_newtype!($name($raw));
+        $crate::fixed_newtype!($name($raw));
 
         impl ::core::fmt::Display for $name {
             fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
-                let scale = <Self as $crate::codec::Scaled>::SCALE;
+                let scale = <Self as $crate::Scaled>::SCALE;
                 ::core::fmt::Display::fmt(&scale.shortest(self.count()), f)
             }
         }
@@ -341,24 +341,24 @@ macro_rules! __codec_scaled {
             }
         }
 
-        $crate::codec::if_serde! {
-            impl $crate::codec::view::View for $name {
-                fn view(&self) -> $crate::codec::view::Value {
-                    let scale = &<Self as $crate::codec::Scaled>::SCALE;
-                    $crate::codec::view::scaled(scale, self.count())
+        $crate::if_serde! {
+            impl $crate::view::View for $name {
+                fn view(&self) -> $crate::view::Value {
+                    let scale = &<Self as $crate::Scaled>::SCALE;
+                    $crate::view::scaled(scale, self.count())
                 }
 
                 fn from_view(
-                    value: &$crate::codec::view::Value,
-                ) -> Result<Self, $crate::codec::view::Error> {
-                    let scale = &<Self as $crate::codec::Scaled>::SCALE;
-                    let out_of_range = $crate::codec::OutOfRange::of::<Self>;
-                    let count = $crate::codec::view::raw_scaled(value, scale, out_of_range)?;
+                    value: &$crate::view::Value,
+                ) -> Result<Self, $crate::view::Error> {
+                    let scale = &<Self as $crate::Scaled>::SCALE;
+                    let out_of_range = $crate::OutOfRange::of::<Self>;
+                    let count = $crate::view::raw_scaled(value, scale, out_of_range)?;
                     Ok(Self::of_count(count))
                 }
             }
         }
 
-        $crate::codec::arbitrary_integer!($name);
+        $crate::arbitrary_integer!($name);
     };
 }

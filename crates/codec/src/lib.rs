@@ -1,7 +1,7 @@
-//! The small runtime under generated messages.
+//! The runtime of messages that the crate `jsidl` generates.
 //!
 //! A JAUS message is little-endian, unaligned and unpadded: its code, then its body. What the
-//! generator of the `jsidl` crate emits is plain Rust over the types of this module: a
+//! generator of the `jsidl` crate emits is plain Rust over the types of this crate: a
 //! [`Reader`] over shared octets, a [`Writer`] that appends, [`Fixed`] for what has one size,
 //! [`Composite`] for what has many, and open types for what people read: [`Scale`]d integers,
 //! enumerations, bit fields, [`Text`].
@@ -10,6 +10,7 @@
 //! - the integers on the wire are what is kept, so `encode(decode(b)) == b` for every accepted `b`;
 //! - decoding never panics and never allocates more than the input can fill;
 //! - errors name the message, the path to the field and the octet.
+#![forbid(unsafe_code)]
 
 #[cfg(feature = "arbitrary")]
 pub mod arbitrary;
@@ -99,11 +100,11 @@ macro_rules! __codec_if_arbitrary {
 #[macro_export]
 macro_rules! __codec_arbitrary_integer {
     ($name:ident) => {
-        impl<'a> $crate::codec::arbitrary::Arbitrary<'a> for $name {
+        impl<'a> $crate::arbitrary::Arbitrary<'a> for $name {
             fn arbitrary(
-                random: &mut $crate::codec::arbitrary::Unstructured<'a>,
-            ) -> $crate::codec::arbitrary::Result<Self> {
-                $crate::codec::arbitrary::Arbitrary::arbitrary(random).map(Self)
+                random: &mut $crate::arbitrary::Unstructured<'a>,
+            ) -> $crate::arbitrary::Result<Self> {
+                $crate::arbitrary::Arbitrary::arbitrary(random).map(Self)
             }
         }
     };

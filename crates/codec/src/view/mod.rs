@@ -120,23 +120,23 @@ impl From<OutOfRange> for Error {
 #[macro_export]
 macro_rules! __codec_view_serde {
     ($name:ident) => {
-        impl $crate::codec::view::serde::Serialize for $name {
-            fn serialize<S: $crate::codec::view::serde::Serializer>(
+        impl $crate::view::serde::Serialize for $name {
+            fn serialize<S: $crate::view::serde::Serializer>(
                 &self,
                 serializer: S,
             ) -> Result<S::Ok, S::Error> {
-                let view = $crate::codec::view::View::view(self);
-                $crate::codec::view::serde::Serialize::serialize(&view, serializer)
+                let view = $crate::view::View::view(self);
+                $crate::view::serde::Serialize::serialize(&view, serializer)
             }
         }
 
-        impl<'de> $crate::codec::view::serde::Deserialize<'de> for $name {
-            fn deserialize<D: $crate::codec::view::serde::Deserializer<'de>>(
+        impl<'de> $crate::view::serde::Deserialize<'de> for $name {
+            fn deserialize<D: $crate::view::serde::Deserializer<'de>>(
                 deserializer: D,
             ) -> Result<Self, D::Error> {
-                let value = $crate::codec::view::serde::Deserialize::deserialize(deserializer)?;
-                $crate::codec::view::View::from_view(&value)
-                    .map_err($crate::codec::view::serde::de::Error::custom)
+                let value = $crate::view::serde::Deserialize::deserialize(deserializer)?;
+                $crate::view::View::from_view(&value)
+                    .map_err($crate::view::serde::de::Error::custom)
             }
         }
     };

@@ -22,7 +22,7 @@ pub trait Enumeration: Copy {
 #[macro_export]
 macro_rules! __codec_enumeration {
     ($name:ident($raw:ty), [$(($value:literal, $text:literal)),* $(,)?]) => {
-        impl $crate::codec::Enumeration for $name {
+        impl $crate::Enumeration for $name {
             const VALUES: &'static [(u64, &'static str)] = &[$(($value, $text)),*];
 
             fn raw(self) -> u64 {
@@ -36,32 +36,32 @@ macro_rules! __codec_enumeration {
             }
         }
 
-        $crate::codec::fixed_newtype!($name($raw));
+        $crate::fixed_newtype!($name($raw));
 
         impl ::core::fmt::Debug for $name {
             fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
-                match $crate::codec::Enumeration::name(*self) {
+                match $crate::Enumeration::name(*self) {
                     Some(name) => write!(f, "{} ({name})", self.0),
                     None => write!(f, "{}", self.0),
                 }
             }
         }
 
-        $crate::codec::if_serde! {
-            impl $crate::codec::view::View for $name {
-                fn view(&self) -> $crate::codec::view::Value {
-                    $crate::codec::view::View::view(&self.0)
+        $crate::if_serde! {
+            impl $crate::view::View for $name {
+                fn view(&self) -> $crate::view::Value {
+                    $crate::view::View::view(&self.0)
                 }
 
                 fn from_view(
-                    value: &$crate::codec::view::Value,
-                ) -> Result<Self, $crate::codec::view::Error> {
-                    let named = value.named(<Self as $crate::codec::Enumeration>::VALUES)?;
-                    $crate::codec::view::View::from_view(&named).map(Self)
+                    value: &$crate::view::Value,
+                ) -> Result<Self, $crate::view::Error> {
+                    let named = value.named(<Self as $crate::Enumeration>::VALUES)?;
+                    $crate::view::View::from_view(&named).map(Self)
                 }
             }
         }
 
-        $crate::codec::arbitrary_integer!($name);
+        $crate::arbitrary_integer!($name);
     };
 }

@@ -62,7 +62,7 @@ pub const fn set_checked(
 #[macro_export]
 macro_rules! __codec_bit_field {
     ($name:ident($raw:ty), [$(($field:literal, $from:literal, $to:literal $(, $values:ident)?)),* $(,)?]) => {
-        impl $crate::codec::Bits for $name {
+        impl $crate::Bits for $name {
             const FIELDS: &'static [(&'static str, u32, u32)] = &[$(($field, $from, $to)),*];
 
             fn raw(self) -> u64 {
@@ -71,35 +71,35 @@ macro_rules! __codec_bit_field {
 
             fn names(field: &str) -> &'static [(u64, &'static str)] {
                 match field {
-                    $($($field => <$values as $crate::codec::Enumeration>::VALUES,)?)*
+                    $($($field => <$values as $crate::Enumeration>::VALUES,)?)*
                     _ => &[],
                 }
             }
         }
 
-        $crate::codec::fixed_newtype!($name($raw));
+        $crate::fixed_newtype!($name($raw));
 
         impl ::core::fmt::Debug for $name {
             fn fmt(&self, f: &mut ::core::fmt::Formatter<'_>) -> ::core::fmt::Result {
-                $crate::codec::bits::debug(*self, f)
+                $crate::bits::debug(*self, f)
             }
         }
 
-        $crate::codec::if_serde! {
-            impl $crate::codec::view::View for $name {
-                fn view(&self) -> $crate::codec::view::Value {
-                    $crate::codec::view::bits(*self)
+        $crate::if_serde! {
+            impl $crate::view::View for $name {
+                fn view(&self) -> $crate::view::Value {
+                    $crate::view::bits(*self)
                 }
 
                 fn from_view(
-                    value: &$crate::codec::view::Value,
-                ) -> Result<Self, $crate::codec::view::Error> {
-                    $crate::codec::view::raw_bits::<Self>(value).map(|raw| Self(raw as $raw))
+                    value: &$crate::view::Value,
+                ) -> Result<Self, $crate::view::Error> {
+                    $crate::view::raw_bits::<Self>(value).map(|raw| Self(raw as $raw))
                 }
             }
         }
 
-        $crate::codec::arbitrary_integer!($name);
+        $crate::arbitrary_integer!($name);
     };
 }
 

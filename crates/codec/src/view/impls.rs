@@ -5,7 +5,7 @@ use std::fmt::Write;
 use bytes::Bytes;
 
 use super::{Error, Object, Value, View};
-use crate::codec::{Bits, FormattedBlob, OutOfRange, Scale, Text, bits};
+use crate::{Bits, FormattedBlob, OutOfRange, Scale, Text, bits};
 
 /// The member for the bits of a bit field that no sub-field owns.
 const RESERVED: &str = "_reserved";

@@ -74,17 +74,17 @@ count!(u8, u16, u32, u64);
 #[macro_export]
 macro_rules! __codec_fixed_newtype {
     ($name:ident($raw:ty)) => {
-        impl $crate::codec::Fixed for $name {
-            const SIZE: usize = <$raw as $crate::codec::Fixed>::SIZE;
+        impl $crate::Fixed for $name {
+            const SIZE: usize = <$raw as $crate::Fixed>::SIZE;
 
             #[inline(always)]
             fn get(run: &[u8], at: usize) -> Self {
-                Self($crate::codec::Fixed::get(run, at))
+                Self($crate::Fixed::get(run, at))
             }
 
             #[inline(always)]
             fn put(self, run: &mut [u8], at: usize) {
-                $crate::codec::Fixed::put(self.0, run, at);
+                $crate::Fixed::put(self.0, run, at);
             }
         }
     };
