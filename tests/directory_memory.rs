@@ -1,5 +1,5 @@
 //! What a further component of a node costs in memory.
-#![cfg(all(target_os = "linux", feature = "node"))]
+#![cfg(target_os = "linux")]
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,

@@ -14,11 +14,11 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::endpoint::{LinkId, Path, Received};
-use jaus_ra::gateway::{Action, Gateway, Settings};
-use jaus_ra::RaId;
 use jaus::wire::ra::{Fields, Header, PREFIX};
 use jaus::wire::{Acknowledgement, Broadcast, Priority};
 use jaus_fuzz::message;
+use jaus_ra::RaId;
+use jaus_ra::gateway::{Action, Gateway, Settings};
 use libfuzzer_sys::fuzz_target;
 
 /// Time zero of every story.

@@ -11,11 +11,11 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use jaus::wire::Acknowledgement;
+use jaus::wire::ra::{Fields, Header, PREFIX};
 use jaus_ra::RaId;
 use jaus_ra::connection::{self, Connections};
 use jaus_ra::node::{Component, Event, Node, RaNode, Settings, Subsystem};
-use jaus::wire::Acknowledgement;
-use jaus::wire::ra::{Fields, Header, PREFIX};
 use libfuzzer_sys::fuzz_target;
 
 /// Time zero of every story.

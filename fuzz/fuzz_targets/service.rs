@@ -14,11 +14,12 @@ use jaus::address::JausId;
 use jaus::endpoint::{LinkId, Path, Received};
 use jaus::service::{
     Discovery, Kind, Liveness, Management, Profile, Scope, Service, Stack, Standing, State, Time,
-    TimeOfDay, Timing, Transport, mobility,
+    TimeOfDay, Timing, Transport,
 };
-use jaus_vehicle::motion::{Drive, Frame, Limits, Motion, Pilot, Platform, Pose, Velocity};
 use jaus::wire::{Broadcast, Priority};
 use jaus_fuzz::message;
+use jaus_vehicle::mobility;
+use jaus_vehicle::motion::{Drive, Frame, Limits, Motion, Pilot, Platform, Pose, Velocity};
 use libfuzzer_sys::fuzz_target;
 
 /// Time zero of every story.

@@ -30,25 +30,25 @@ pub(super) enum Hold {
     },
 }
 
-/// Something that is not wanted any more.
+/// A subscription or control that is no longer wanted.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Goodbye {
+pub(super) enum Cancellation {
     Subscription(SubscriptionId),
     Control(ControlId),
 }
 
-/// Says goodbye when it is dropped, wherever that happens.
+/// Sends the cancellation when it is dropped, wherever that happens.
 #[derive(Debug)]
 pub(super) struct Ticket {
-    goodbye: Goodbye,
+    cancellation: Cancellation,
     /// As long as the bound on what can be held, because each ticket has one word to say.
-    goodbyes: mpsc::UnboundedSender<Goodbye>,
+    cancellations: mpsc::UnboundedSender<Cancellation>,
 }
 
 impl Drop for Ticket {
     fn drop(&mut self) {
         // An error means that the component has stopped, and took leave then.
-        let _ = self.goodbyes.send(self.goodbye);
+        let _ = self.cancellations.send(self.cancellation);
     }
 }
 
@@ -83,7 +83,7 @@ pub(super) enum Condition {
 
 /// Everything that somebody holds or waits for.
 pub(super) struct Clients {
-    goodbyes: mpsc::UnboundedSender<Goodbye>,
+    cancellations: mpsc::UnboundedSender<Cancellation>,
     subscribing: HashMap<SubscriptionId, oneshot::Sender<Subscribed>>,
     feeds: HashMap<SubscriptionId, Arc<Feed>>,
     asking: HashMap<ControlId, oneshot::Sender<Controlled>>,
@@ -91,10 +91,10 @@ pub(super) struct Clients {
 }
 
 impl Clients {
-    /// With the way on which goodbyes come back to [`part`](Self::part).
-    pub(super) fn new(goodbyes: mpsc::UnboundedSender<Goodbye>) -> Self {
+    /// With the channel on which cancellations come back to [`part`](Self::part).
+    pub(super) fn new(cancellations: mpsc::UnboundedSender<Cancellation>) -> Self {
         Self {
-            goodbyes,
+            cancellations,
             subscribing: HashMap::new(),
             feeds: HashMap::new(),
             asking: HashMap::new(),
@@ -102,10 +102,10 @@ impl Clients {
         }
     }
 
-    fn ticket(&self, goodbye: Goodbye) -> Ticket {
+    fn ticket(&self, cancellation: Cancellation) -> Ticket {
         Ticket {
-            goodbye,
-            goodbyes: self.goodbyes.clone(),
+            cancellation,
+            cancellations: self.cancellations.clone(),
         }
     }
 
@@ -136,13 +136,13 @@ impl Clients {
         }
     }
 
-    pub(super) fn part(&mut self, stack: &mut Stack, goodbye: Goodbye) {
-        match goodbye {
-            Goodbye::Subscription(id) => {
+    pub(super) fn part(&mut self, stack: &mut Stack, cancellation: Cancellation) {
+        match cancellation {
+            Cancellation::Subscription(id) => {
                 self.feeds.remove(&id);
                 stack.unsubscribe(Instant::now(), id);
             }
-            Goodbye::Control(id) => stack.release_control(Instant::now(), id),
+            Cancellation::Control(id) => stack.release_control(Instant::now(), id),
         }
     }
 
@@ -154,8 +154,8 @@ impl Clients {
             }
             let feed = Arc::new(Feed::new());
             self.feeds.insert(id, feed.clone());
-            // An unclaimed ticket says goodbye.
-            let _ = reply.send(Ok((self.ticket(Goodbye::Subscription(id)), feed)));
+            // An unclaimed ticket cancels.
+            let _ = reply.send(Ok((self.ticket(Cancellation::Subscription(id)), feed)));
         }
         if let Some(feed) = self.feeds.get(&id) {
             feed.tell(news);
@@ -170,7 +170,7 @@ impl Clients {
                 };
                 let (condition, told) = watch::channel(Condition::Held(None));
                 self.controls.insert(id, condition);
-                let _ = reply.send(Ok((self.ticket(Goodbye::Control(id)), told)));
+                let _ = reply.send(Ok((self.ticket(Cancellation::Control(id)), told)));
             }
             ControlNews::Refused(why) => {
                 if let Some(reply) = self.asking.remove(&id) {

@@ -9,7 +9,7 @@ use bytes::Bytes;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::task::JoinSet;
 
-use super::clients::{Clients, Goodbye, Hold};
+use super::clients::{Cancellation, Clients, Hold};
 use super::directories::Membership;
 use super::watch::Outlet;
 use crate::address::JausId;
@@ -80,7 +80,7 @@ pub(super) struct Driver {
     patience: Patience,
     waiting: HashMap<Inquiry, oneshot::Sender<Answer>>,
     clients: Clients,
-    goodbyes: mpsc::UnboundedReceiver<Goodbye>,
+    cancellations: mpsc::UnboundedReceiver<Cancellation>,
 }
 
 impl Driver {
@@ -92,7 +92,7 @@ impl Driver {
         publisher: Publisher,
         patience: Patience,
     ) -> Self {
-        let (bid, goodbyes) = mpsc::unbounded_channel();
+        let (bid, cancellations) = mpsc::unbounded_channel();
         Self {
             stack,
             membership,
@@ -104,7 +104,7 @@ impl Driver {
             patience,
             waiting: HashMap::new(),
             clients: Clients::new(bid),
-            goodbyes,
+            cancellations,
         }
     }
 
@@ -130,8 +130,8 @@ impl Driver {
                     None => return self.leave().await,
                 },
                 () = self.resident.closing() => return self.leave().await,
-                Some(goodbye) = self.goodbyes.recv() => {
-                    self.clients.part(&mut self.stack, goodbye);
+                Some(cancellation) = self.cancellations.recv() => {
+                    self.clients.part(&mut self.stack, cancellation);
                 }
                 Some((peer, delivered)) = self.probes.next() => {
                     if delivered {
@@ -147,8 +147,8 @@ impl Driver {
 
     /// Ends what was dropped before a command was given, so that the command finds it ended.
     fn part(&mut self) {
-        while let Ok(goodbye) = self.goodbyes.try_recv() {
-            self.clients.part(&mut self.stack, goodbye);
+        while let Ok(cancellation) = self.cancellations.try_recv() {
+            self.clients.part(&mut self.stack, cancellation);
         }
     }
 

@@ -27,7 +27,7 @@ impl Fingerprint {
 
 /// The way by which something came, as a keyed hash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Way(u64);
+pub(super) struct PathHash(u64);
 
 /// Whose message, and whether it is one that its sender may repeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ impl Class {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sighting {
     pub(super) time: Instant,
-    pub(super) way: Way,
+    pub(super) way: PathHash,
     pub(super) repetitions: u8,
 }
 
@@ -112,8 +112,8 @@ impl Recent {
     }
 
     /// What tells a way from others; `None` if ways do not matter.
-    pub(super) fn way(&self, path: Option<Path>) -> Way {
-        Way(path.map_or(0, |path| self.keys.hash_one(path)))
+    pub(super) fn way(&self, path: Option<Path>) -> PathHash {
+        PathHash(path.map_or(0, |path| self.keys.hash_one(path)))
     }
 
     /// When it was put in last, if that is remembered.
@@ -136,7 +136,7 @@ impl Recent {
         };
         let sighting = Sighting {
             time: now,
-            way: Way(0),
+            way: PathHash(0),
             repetitions: 0,
         };
         self.insert_as(seen, sighting, class);
@@ -258,7 +258,7 @@ mod tests {
             let seen = recent.fingerprint(&frame(sequence, b"\x02\x22"));
             let sighting = Sighting {
                 time: start,
-                way: Way(0),
+                way: PathHash(0),
                 repetitions: 0,
             };
             recent.insert_as(seen, sighting, STRANGER);

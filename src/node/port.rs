@@ -32,7 +32,7 @@ pub struct Port {
 
 impl Port {
     pub(super) fn new(id: JausId, mailbox: Arc<Mailbox>, guard: Arc<Guard>) -> Self {
-        let way = Way::Here(guard.0.clone());
+        let way = Attachment::Here(guard.0.clone());
         Self {
             sender: Sender { id, way },
             mailbox,
@@ -42,7 +42,7 @@ impl Port {
 
     pub(super) fn to_host(client: Arc<Client>) -> Self {
         let (id, mailbox) = (client.id(), client.mailbox().clone());
-        let way = Way::Host(client);
+        let way = Attachment::Host(client);
         Self {
             sender: Sender { id, way },
             mailbox,
@@ -101,8 +101,8 @@ impl Port {
     #[must_use]
     pub fn reside(&self) -> Resident {
         match &self.sender.way {
-            Way::Here(shared) => Resident::of(&shared.residents),
-            Way::Host(_) => Resident::elsewhere(),
+            Attachment::Here(shared) => Resident::of(&shared.residents),
+            Attachment::Host(_) => Resident::elsewhere(),
         }
     }
 
@@ -110,8 +110,8 @@ impl Port {
     /// of another process they have nothing in common.
     pub(crate) fn common<T: Any + Send + Sync + Default>(&self) -> Arc<T> {
         match &self.sender.way {
-            Way::Here(shared) => shared.common(),
-            Way::Host(_) => Arc::default(),
+            Attachment::Here(shared) => shared.common(),
+            Attachment::Host(_) => Arc::default(),
         }
     }
 
@@ -131,8 +131,8 @@ impl Port {
     #[must_use]
     pub fn host_events(&self) -> HostEvents {
         match &self.sender.way {
-            Way::Here(_) => EventSender::new().subscribe(),
-            Way::Host(client) => client.events(),
+            Attachment::Here(_) => EventSender::new().subscribe(),
+            Attachment::Host(client) => client.events(),
         }
     }
 }
@@ -140,11 +140,11 @@ impl Port {
 impl Drop for Port {
     fn drop(&mut self) {
         match &self.sender.way {
-            Way::Here(shared) => {
+            Attachment::Here(shared) => {
                 let mut core = shared.lock();
                 core.detach(self.sender.id, &self.mailbox, Departure::Left);
             }
-            Way::Host(client) => client.leave(),
+            Attachment::Host(client) => client.leave(),
         }
     }
 }
@@ -153,12 +153,12 @@ impl Drop for Port {
 #[derive(Clone, Debug)]
 pub struct Sender {
     id: JausId,
-    way: Way,
+    way: Attachment,
 }
 
 /// Where the node is.
 #[derive(Clone, Debug)]
-enum Way {
+enum Attachment {
     Here(Arc<Shared>),
     Host(Arc<Client>),
 }
@@ -184,8 +184,8 @@ impl Sender {
     pub fn send(&self, message: Outgoing) -> Result<MessageHandle, SendError> {
         self.check_source(&message)?;
         match &self.way {
-            Way::Here(shared) => shared.lock().send(message, None),
-            Way::Host(client) => client.send(message, None),
+            Attachment::Here(shared) => shared.lock().send(message, None),
+            Attachment::Host(client) => client.send(message, None),
         }
     }
 
@@ -199,8 +199,8 @@ impl Sender {
         message.acknowledge = true;
         let (tell, told) = oneshot::channel();
         match &self.way {
-            Way::Here(shared) => shared.lock().send(message, Some(Waiter::Here(tell))),
-            Way::Host(client) => client.send(message, Some(tell)),
+            Attachment::Here(shared) => shared.lock().send(message, Some(Waiter::Here(tell))),
+            Attachment::Host(client) => client.send(message, Some(tell)),
         }?;
         told.await.unwrap_or(Err(Undelivered::Lost))
     }
@@ -208,7 +208,7 @@ impl Sender {
     /// Waits until the host's node has taken all that was sent. A node of the same process takes
     /// everything at once.
     pub async fn flushed(&self) {
-        if let Way::Host(client) = &self.way {
+        if let Attachment::Host(client) = &self.way {
             client.flushed().await;
         }
     }
@@ -217,8 +217,8 @@ impl Sender {
     #[must_use]
     pub fn is_connected(&self) -> bool {
         match &self.way {
-            Way::Here(shared) => !*shared.stopped.borrow(),
-            Way::Host(client) => client.is_connected(),
+            Attachment::Here(shared) => !*shared.stopped.borrow(),
+            Attachment::Host(client) => client.is_connected(),
         }
     }
 
@@ -226,12 +226,12 @@ impl Sender {
     /// is detached and its last words to the host's node are written.
     pub async fn disconnected(&self) {
         match &self.way {
-            Way::Here(shared) => {
+            Attachment::Here(shared) => {
                 let mut stopped = shared.stopped.subscribe();
                 // An error cannot be: the sender is in what we hold.
                 let _ = stopped.wait_for(|stopped| *stopped).await;
             }
-            Way::Host(client) => client.disconnected().await,
+            Attachment::Host(client) => client.disconnected().await,
         }
     }
 

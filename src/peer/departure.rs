@@ -27,7 +27,7 @@ impl fmt::Display for Source {
 
 /// How it is known that a peer departs in this way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum Recognition {
     /// By any of these.
     By(&'static [Sign]),
     /// It need not be known: what we do suits everybody.
@@ -36,7 +36,7 @@ pub enum Told {
     Configured,
 }
 
-impl fmt::Display for Told {
+impl fmt::Display for Recognition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::By(signs) => {
@@ -65,7 +65,7 @@ pub struct Entry {
     /// Where we know it from.
     pub source: Source,
     /// How it is recognised.
-    pub told: Told,
+    pub told: Recognition,
     /// What we do.
     pub ours: &'static str,
     /// The file that does it, from the root of the repository.

@@ -1,7 +1,7 @@
 //! The departures, one by one.
 
 use super::Peer::{Fkie, Iop, JausPlusPlus, Jts, Junior, OpenJausSdk};
-use super::{Entry, Sign, Source, Told};
+use super::{Entry, Recognition, Sign, Source};
 
 macro_rules! departures {
     ($($(#[doc = $doc:literal])+ $variant:ident = $entry:expr;)+) => {
@@ -34,7 +34,7 @@ departures! {
         peers: &[JausPlusPlus],
         does: "leaves the end of an older, longer datagram behind a message",
         source: Source::Recorded,
-        told: Told::By(&[Sign::StaleOctets]),
+        told: Recognition::By(&[Sign::StaleOctets]),
         ours: "reading stops at the first implausible header; what is left is counted, and neither \
                delivered nor learned from",
         place: "src/wire/judp.rs",
@@ -47,7 +47,7 @@ departures! {
         does: "begins each fragment of a large message with the message code, 1573 octets in all \
                but the last, and reads nothing else",
         source: Source::Provoked,
-        told: Told::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
+        told: Recognition::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
         ours: "its large messages are put together without the repeated codes, and ours to it are \
                cut as it cuts",
         place: "src/endpoint/large/style.rs",
@@ -59,7 +59,7 @@ departures! {
         peers: &[JausPlusPlus],
         does: "does not mark the last fragment of a message that fills all its fragments",
         source: Source::Read,
-        told: Told::By(&[Sign::RepeatedCode]),
+        told: Recognition::By(&[Sign::RepeatedCode]),
         ours: "the message is whole when its sender's next message has the number of the last \
                fragment, which JAUS++ gives twice",
         place: "src/endpoint/large/reassembly.rs",
@@ -72,7 +72,7 @@ departures! {
         does: "takes at most 1425 octets in one packet, refuses the number 0 in fragments, and \
                loses a message whose numbers go round",
         source: Source::Read,
-        told: Told::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
+        told: Recognition::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
         ours: "no packet to it is longer; numbers leave out 0 and do not go round within a message \
                to anybody",
         place: "src/endpoint/large/split.rs",
@@ -85,7 +85,7 @@ departures! {
         does: "reads one datagram in a millisecond, so that what comes faster overflows its \
                receive buffer: 200 kB without acknowledgements never arrive",
         source: Source::Provoked,
-        told: Told::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
+        told: Recognition::By(&[Sign::RepeatedCode, Sign::JausPlusPlusService]),
         ours: "the fragments of a large message that is not acknowledged leave at 600 in a second; \
                what is acknowledged goes no faster than it reads anyway. What one of its components \
                has to send must fit 655 350 octets",
@@ -99,7 +99,7 @@ departures! {
         does: "counts events for each query by itself, so that several have one number, and Cancel \
                Event ends the first of them",
         source: Source::Provoked,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "events are told apart by their reports; a subscription that a cancellation may have \
                hit is asked for again",
         place: "src/service/client/subscriptions.rs",
@@ -111,7 +111,7 @@ departures! {
         peers: &[JausPlusPlus],
         does: "crashes when it gets Update Event (01F1h)",
         source: Source::Provoked,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "nobody is ever sent one: what is wanted otherwise is cancelled and created",
         place: "src/service/client/subscription.rs",
         test: "no_update_event_is_sent_in_the_whole_life_of_a_subscription",
@@ -123,7 +123,7 @@ departures! {
         does: "sends the first report of an event up to four times at once, with numbers of their \
                own",
         source: Source::Recorded,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "each is a report like any other; none is taken for lost or for a stream of another",
         place: "src/service/client/subscription.rs",
         test: "a_first_report_that_comes_four_times_loses_nothing_and_cancels_nothing",
@@ -135,7 +135,7 @@ departures! {
         does: "asks Query Events for one number every 5 s, and creates anew at 1 Hz whatever else \
                the answer does not list",
         source: Source::Recorded,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "Report Events lists the event that was asked for, and then all others of the client",
         place: "src/service/events/mod.rs",
         test: "a_client_is_told_of_its_own_events_by_each_question",
@@ -146,7 +146,7 @@ departures! {
         peers: &[JausPlusPlus],
         does: "sends Create Event for what it has already",
         source: Source::Recorded,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "same client, type and query are one event: its number is confirmed again, and no \
                second stream begins",
         place: "src/service/events/mod.rs",
@@ -159,7 +159,7 @@ departures! {
         does: "writes the response code of Reject Event Request one too low, and always, whatever \
                the presence vector says",
         source: Source::Provoked,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "a code that the presence vector does not tell of is read, and one added",
         place: "src/service/client/rejection.rs",
         test: "a_code_that_the_presence_vector_does_not_tell_of_is_one_too_low",
@@ -171,7 +171,7 @@ departures! {
         does: "takes the first bit of the presence vector of Reject Event Request for a text, so \
                that one with a code alone is too short for it, and it waits in vain",
         source: Source::Provoked,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "each rejection has code and text: then what JAUS++ expects is in the places where \
                the standard has it. It shows the code one too high",
         place: "src/service/events/rejecting.rs",
@@ -183,7 +183,7 @@ departures! {
         peers: &[JausPlusPlus],
         does: "answers Query Services for node 255, component 255 with an empty list",
         source: Source::Provoked,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "each component is asked for by its numbers",
         place: "src/service/discovery/search.rs",
         test: "services_are_asked_for_by_number_and_never_by_wildcard",
@@ -194,7 +194,7 @@ departures! {
         peers: &[JausPlusPlus],
         does: "sends Register Services to components of other subsystems, every 5 s",
         source: Source::Recorded,
-        told: Told::By(&[Sign::RegistersAcrossSubsystems]),
+        told: Recognition::By(&[Sign::RegistersAcrossSubsystems]),
         ours: "the services are taken note of like those of a report, and nothing is answered",
         place: "src/service/discovery/learn.rs",
         test: "a_registration_from_another_subsystem_is_learned_and_not_answered",
@@ -206,7 +206,7 @@ departures! {
         does: "sends Set Emergency (0006h) for Clear Emergency, and does not know 0007h: of its own \
                emergencies Reset (0005h) alone is the end",
         source: Source::Provoked,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "it is taken at its word: the emergency stays, however often it is set. One Clear \
                Emergency with the client's id ends it, or the vehicle's application does",
         place: "src/service/control/management.rs",
@@ -218,7 +218,7 @@ departures! {
         peers: &[JausPlusPlus],
         does: "never sends Report Heartbeat Pulse by itself",
         source: Source::Provoked,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "anything that comes is a sign of life, and who is silent is asked who it is",
         place: "src/service/discovery/search.rs",
         test: "a_peer_that_only_answers_is_not_lost",
@@ -230,7 +230,7 @@ departures! {
         does: "writes the version octet before each message of a TCP stream, as a segment of its \
                own",
         source: Source::Recorded,
-        told: Told::By(&[Sign::RepeatedVersion]),
+        told: Recognition::By(&[Sign::RepeatedVersion]),
         ours: "both ways of writing are read, and who writes so is answered so, for it hangs when one \
                is missing. It hangs as well when a message of ours comes in two segments: use UDP \
                with it",
@@ -244,7 +244,7 @@ departures! {
         does: "opens a TCP connection to whoever it hears by UDP and writes on it; what it is \
                answered there it reads behind version octets alone, or hangs",
         source: Source::Recorded,
-        told: Told::By(&[
+        told: Recognition::By(&[
             Sign::RegistersAcrossSubsystems,
             Sign::StaleOctets,
             Sign::RepeatedVersion,
@@ -262,7 +262,7 @@ departures! {
         does: "sends a message for one id whose address it does not know to the group, as a global \
                broadcast that wants an acknowledgement, until one comes",
         source: Source::Recorded,
-        told: Told::By(&[Sign::CallsUnknownIds]),
+        told: Recognition::By(&[Sign::CallsUnknownIds]),
         ours: "it is acknowledged from where we want to be reached, and delivered to the one",
         place: "src/endpoint/receive.rs",
         test: "a_call_of_junior_is_acknowledged_by_the_one_alone_from_its_own_address",
@@ -273,7 +273,7 @@ departures! {
         peers: &[Fkie],
         does: "its node manager in Python sends the same without the broadcast flag",
         source: Source::Recorded,
-        told: Told::By(&[Sign::CallsUnknownIds]),
+        told: Recognition::By(&[Sign::CallsUnknownIds]),
         ours: "a message for one id that comes by the group and wants an acknowledgement is such a \
                call",
         place: "src/endpoint/receive.rs",
@@ -286,7 +286,7 @@ departures! {
         does: "writes flags FFh for priority 0, which reads as an acknowledgement of a last \
                fragment",
         source: Source::Recorded,
-        told: Told::By(&[Sign::PriorityFault]),
+        told: Recognition::By(&[Sign::PriorityFault]),
         ours: "dropped and counted by its name: whether it is a whole message is lost with the \
                flags. The application must use priorities 1 to 15",
         place: "src/endpoint/receive.rs",
@@ -298,7 +298,7 @@ departures! {
         peers: &[Junior, Jts, Fkie],
         does: "begins with number 1 in each process",
         source: Source::Provoked,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "content counts, not the number alone, and only for a short time: of who is known to \
                be Junior 0.9 s, because it gives up repeating sooner; and a fragment that a message \
                which is being put together lacks is taken in any case",
@@ -313,7 +313,7 @@ departures! {
                also of a node that was started again since: a fragment of it, and a large message \
                never arrives",
         source: Source::Recorded,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "a node begins at a number that the clock tells, ahead of those that it used before",
         place: "src/endpoint/config.rs",
         test: "a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers",
@@ -325,7 +325,7 @@ departures! {
         does: "takes a TCP connection for the first id that is heard on it, and opens one for each \
                id",
         source: Source::Recorded,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "an id is answered on the connection on which it was heard last, however many there \
                are. Only one of our components reaches it by a connection of ours: let it connect, \
                or use UDP",
@@ -339,7 +339,7 @@ departures! {
         does: "writes to a TCP connection that was reset as to any other, and is ended by the \
                signal SIGPIPE: its engine, with all that are on its host",
         source: Source::Recorded,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "a node that stops says so on its connections and takes in what still comes, and \
                repeats nothing on them within 200 ms, which would be acknowledged late. Nothing \
                helps when a node of ours is killed; start the engine with that signal ignored",
@@ -353,7 +353,7 @@ departures! {
         does: "reads the header compression flags from bits 0-1 of the first octet, where the \
                message type is",
         source: Source::Provoked,
-        told: Told::NeedNotBe,
+        told: Recognition::NeedNotBe,
         ours: "the first octet of what we send is always 0, also in answer to one that is not",
         place: "src/wire/as5669a.rs",
         test: "the_first_octet_of_all_that_is_sent_is_zero",
@@ -365,7 +365,7 @@ departures! {
         does: "takes ten datagrams in a turn and keeps the latest 50 or 100 fragments of all \
                senders",
         source: Source::Recorded,
-        told: Told::By(&[
+        told: Recognition::By(&[
             Sign::PriorityFault,
             Sign::LongFragments,
             Sign::CallsUnknownIds,
@@ -385,7 +385,7 @@ departures! {
         does: "takes a 0 in any octet of an id for \"all\", so that it delivers what is for 1.1.1 \
                also to 513.1.1",
         source: Source::Recorded,
-        told: Told::Configured,
+        told: Recognition::Configured,
         ours: "`Peer::confuses` tells which ids it cannot keep apart; choose subsystems below 256 \
                only, or none",
         place: "src/peer/habits.rs",
@@ -397,7 +397,7 @@ departures! {
         peers: &[Iop, Jts],
         does: "writes 0 for \"all subsystems\", \"all nodes\", \"all components\" into destinations",
         source: Source::Read,
-        told: Told::By(&[Sign::IopService]),
+        told: Recognition::By(&[Sign::IopService]),
         ours: "from such a peer a 0 is read as the wildcard of its field; from all others it names \
                nobody",
         place: "src/endpoint/receive.rs",
@@ -409,7 +409,7 @@ departures! {
         peers: &[OpenJausSdk],
         does: "counts sequence numbers for each destination by itself, so that numbers come again",
         source: Source::Recorded,
-        told: Told::By(&[Sign::NumbersByDestination]),
+        told: Recognition::By(&[Sign::NumbersByDestination]),
         ours: "the destination counts with the number, and the content with both",
         place: "src/endpoint/recent.rs",
         test: "numbers_that_count_for_each_destination_are_no_duplicates",
@@ -420,7 +420,7 @@ departures! {
         peers: &[OpenJausSdk],
         does: "sends what is for one component to all of its node, as global broadcasts",
         source: Source::Recorded,
-        told: Told::By(&[Sign::AsksWholeNodes]),
+        told: Recognition::By(&[Sign::AsksWholeNodes]),
         ours: "each component that it is for answers to the asker alone, for itself",
         place: "src/endpoint/receive.rs",
         test: "a_question_to_a_whole_node_is_answered_by_unicast",

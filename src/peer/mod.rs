@@ -52,7 +52,7 @@ use std::str::FromStr;
 use crate::as_text::serde_as_text;
 
 pub use assignment::Assignment;
-pub use departure::{Entry, Source, Told, table};
+pub use departure::{Entry, Recognition, Source, table};
 pub use entries::Departure;
 pub(crate) use habits::JAUSPP_FRAGMENT;
 pub use habits::{Intake, LargeStyle};

@@ -18,7 +18,6 @@
 
 mod clock;
 mod owned;
-mod random;
 pub mod seeds;
 mod trace;
 mod wire;
@@ -35,8 +34,8 @@ use jaus::wire::judp;
 
 use clock::VirtualTime;
 pub use clock::WallClock;
+pub use jaus_test_kit::random::Random;
 pub use owned::{Event, OwnedEndpoint};
-pub use random::Random;
 pub use trace::Trace;
 use wire::{Backlog, Flight, Wire};
 pub use wire::{Conditions, Harm, Socket};

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::endpoint::LinkId;
 
-use super::random::Random;
+use super::Random;
 
 /// How well the wire works.
 #[derive(Clone, Debug)]

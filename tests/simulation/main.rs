@@ -31,6 +31,7 @@ mod faults;
 mod judges;
 mod large;
 mod ledger;
+mod network;
 mod nodes;
 mod plan;
 mod producer;

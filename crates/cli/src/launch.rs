@@ -16,7 +16,7 @@ use super::{output, runtime, settings};
 use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::{Config, Node};
-use jaus_vehicle::parts::{Part, PartError, Seat};
+use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// The flags of a program that is one [`Part`].
 pub trait Ready: Args {
@@ -114,7 +114,7 @@ impl<F: Ready> Program<F> {
             let kind = place.identity.kind.map_or(F::KIND, Kind::from);
             let name = self.name.or(place.identity.name);
             let name = name.unwrap_or_else(|| F::SUBSYSTEM.to_owned());
-            let seat = Seat {
+            let slot = Slot {
                 port,
                 node,
                 kind,
@@ -122,7 +122,7 @@ impl<F: Ready> Program<F> {
             };
             let systemd = Systemd::from_environment();
             let outcome = tokio::select! {
-                result = part.run(seat) => {
+                result = part.run(slot) => {
                     let Err(error): Result<Infallible, _> = result;
                     let outcome = match error {
                         PartError::ShutDown => Outcome::Done,

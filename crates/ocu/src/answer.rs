@@ -17,7 +17,7 @@ pub(super) enum Said<'a> {
         authority: u8,
     },
     State(&'a State),
-    /// A wish was carried out.
+    /// A request was carried out.
     Done {
         id: u64,
     },

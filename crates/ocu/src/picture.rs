@@ -23,9 +23,9 @@ pub(super) struct Picture {
     name: String,
     parts: BTreeMap<JausId, Part>,
     gone: GoneParts,
-    pose: Option<Told<state::Pose>>,
-    velocity: Option<Told<state::Velocity>>,
-    mission: Option<Told<Mission>>,
+    pose: Option<Sample<state::Pose>>,
+    velocity: Option<Sample<state::Velocity>>,
+    mission: Option<Sample<Mission>>,
     path: Vec<[f64; 2]>,
     maps: Vec<state::Map>,
     store: Option<JausId>,
@@ -37,9 +37,9 @@ pub(super) struct Part {
     pub(super) role: Role,
     /// Whether it offers Management.
     pub(super) managed: bool,
-    status: Option<Told<u8>>,
+    status: Option<Sample<u8>>,
     /// Who controls it, with which authority.
-    controller: Option<Told<Option<(JausId, u8)>>>,
+    controller: Option<Sample<Option<(JausId, u8)>>>,
     stage: Option<state::Stage>,
     /// What it is called.
     name: String,
@@ -56,7 +56,7 @@ pub(super) struct Part {
 /// What was reported, by whom, and when it was true: when the sample was taken, by its time stamp;
 /// without one, when the report arrived.
 #[derive(Debug, Clone, Copy)]
-struct Told<T> {
+struct Sample<T> {
     what: T,
     by: JausId,
     at: Instant,
@@ -285,18 +285,18 @@ impl Picture {
         }
         (part.heard, part.is_down) = (Some(now), false);
         match report {
-            Report::Status(what) => part.status = Some(Told { what, by, at: now }),
-            Report::Control(what) => part.controller = Some(Told { what, by, at: now }),
+            Report::Status(what) => part.status = Some(Sample { what, by, at: now }),
+            Report::Control(what) => part.controller = Some(Sample { what, by, at: now }),
             Report::Stage(stage) => part.stage = Some(stage),
             Report::Pose(what, stamp) => {
                 let at = sampled_at(&mut part.pose_clock, now, stamp);
-                self.pose = Some(Told { what, by, at });
+                self.pose = Some(Sample { what, by, at });
             }
             Report::Velocity(what, stamp) => {
                 let at = sampled_at(&mut part.velocity_clock, now, stamp);
-                self.velocity = Some(Told { what, by, at });
+                self.velocity = Some(Sample { what, by, at });
             }
-            Report::Mission(what) => self.mission = Some(Told { what, by, at: now }),
+            Report::Mission(what) => self.mission = Some(Sample { what, by, at: now }),
             Report::Path(path) => self.path = path,
             Report::Maps(maps) => {
                 self.maps = maps;
@@ -394,7 +394,7 @@ impl Picture {
     /// The parts that can be stopped by an emergency and have not said lately that they are.
     pub(super) fn not_in_emergency(&self, now: Instant) -> impl Iterator<Item = JausId> {
         let stands = move |part: &Part| {
-            let fresh = |it: &Told<u8>| now.saturating_duration_since(it.at) < Self::FRESH;
+            let fresh = |it: &Sample<u8>| now.saturating_duration_since(it.at) < Self::FRESH;
             part.is(State::Emergency) && part.status.as_ref().is_some_and(fresh)
         };
         let managed = self.parts.iter().filter(|(_, part)| part.managed);

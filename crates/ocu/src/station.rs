@@ -1,15 +1,15 @@
-//! The operator's station as a ready component: settings, the open door, and the run.
+//! The operator's station as a ready component: settings, the listening socket, and the run.
 
 use std::convert::Infallible;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use tokio::net::TcpListener;
 
-use super::desk::Desk;
-use super::server::{Door, Server};
+use super::server::{Admission, Server};
+use super::session::Session;
 use super::token::Token;
 use jaus::link::interface;
-use jaus_vehicle::parts::{Part, PartError, Seat};
+use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// An operator's station, with its page.
 #[derive(Debug, Clone)]
@@ -60,7 +60,7 @@ impl Default for Station {
 }
 
 impl Station {
-    /// Opens the door for pages, which find the desk behind it once the station runs.
+    /// Listens for pages, which reach the session once the station runs.
     ///
     /// # Errors
     /// If the address can not be listened at.
@@ -112,13 +112,13 @@ impl OpenStation {
 }
 
 impl Part for Station {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
-        self.open().await?.run(seat).await
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
+        self.open().await?.run(slot).await
     }
 }
 
 impl Part for OpenStation {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         for url in self.urls() {
             tracing::info!("the operator's page is at {url}");
         }
@@ -127,9 +127,9 @@ impl Part for OpenStation {
             listener,
             address: _,
         } = self;
-        let node = seat.node.clone();
-        let component = seat.component("Operator").live_on(seat.port)?;
-        let door = Door {
+        let node = slot.node.clone();
+        let component = slot.component("Operator").live_on(slot.port)?;
+        let admission = Admission {
             operator: component.id(),
             authority: station.authority,
             token: station.token,
@@ -137,10 +137,10 @@ impl Part for OpenStation {
             hosts: station.hosts,
             node,
         };
-        let (desk, access) = Desk::new(component, station.vehicle, station.authority);
-        let server = Server::new(door, access);
+        let (session, access) = Session::new(component, station.vehicle, station.authority);
+        let server = Server::new(admission, access);
         tokio::select! {
-            error = desk.run() => Err(error),
+            error = session.run() => Err(error),
             error = server.run(listener) => {
                 Err(PartError::Broken(format!("the page can not be offered any more: {error}")))
             }

@@ -13,6 +13,7 @@ pub mod evidence;
 pub mod group;
 #[cfg(target_os = "linux")]
 pub mod hosts;
+pub mod random;
 pub mod rover;
 pub mod tools;
 pub mod vehicle_process;

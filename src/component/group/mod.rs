@@ -5,9 +5,9 @@
 //! who that is now.
 
 mod audience;
+mod member_table;
 mod reports;
 mod results;
-mod roll;
 
 use super::{Component, DeliverError, QueryError, SendError};
 use crate::address::JausId;

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use tokio::sync::watch;
 
 use super::Audience;
-use super::roll::Roll;
+use super::member_table::MemberTable;
 use crate::address::JausId;
 use crate::codec::Message;
 use crate::component::driver::sleep_until;
@@ -33,9 +33,9 @@ pub struct GroupSubscription<R> {
     topic: Topic,
     query: &'static str,
     directories: watch::Receiver<()>,
-    /// Whether the roll is to be called.
+    /// Whether the members are to be looked up.
     is_stale: bool,
-    roll: Roll,
+    member_table: MemberTable,
     asked: BTreeMap<JausId, Asking<R>>,
     subscribed: BTreeMap<JausId, Subscription<R>>,
     news: VecDeque<(JausId, GroupUpdate<R>)>,
@@ -96,7 +96,7 @@ impl<R: Message> GroupSubscription<R> {
             audience,
             topic,
             query,
-            roll: Roll::default(),
+            member_table: MemberTable::default(),
             asked: BTreeMap::new(),
             subscribed: BTreeMap::new(),
             news: VecDeque::new(),
@@ -115,11 +115,11 @@ impl<R: Message> GroupSubscription<R> {
             if let Some(news) = self.news.pop_front() {
                 return Some(news);
             }
-            let wake = self.roll.poll_timeout();
+            let wake = self.member_table.poll_timeout();
             let Self {
                 directories,
                 is_stale,
-                roll,
+                member_table,
                 asked,
                 subscribed,
                 news,
@@ -128,8 +128,8 @@ impl<R: Message> GroupSubscription<R> {
                 ..
             } = self;
             let members = poll_fn(|cx| {
-                let answered = poll_asked(cx, asked, subscribed, roll, news);
-                let reported = poll_subscribed(cx, *last, query, subscribed, roll, news);
+                let answered = poll_asked(cx, asked, subscribed, member_table, news);
+                let reported = poll_subscribed(cx, *last, query, subscribed, member_table, news);
                 if answered || reported {
                     return Poll::Ready(());
                 }
@@ -155,7 +155,7 @@ impl<R: Message> GroupSubscription<R> {
         self.directories.mark_unchanged();
         let directory = self.component.directory();
         let present = self.audience.members(&directory, self.component.id());
-        for left in self.roll.handle_present(&present) {
+        for left in self.member_table.handle_present(&present) {
             self.asked.remove(&left);
             self.subscribed.remove(&left);
             self.news.push_back((left, GroupUpdate::Gone));
@@ -163,7 +163,7 @@ impl<R: Message> GroupSubscription<R> {
     }
 
     fn ask_who_is_due(&mut self) {
-        while let Some(peer) = self.roll.poll_ask(Instant::now()) {
+        while let Some(peer) = self.member_table.poll_ask(Instant::now()) {
             let component = self.component.clone();
             let topic = Topic {
                 peer,
@@ -206,7 +206,7 @@ fn poll_asked<R>(
     cx: &mut Context<'_>,
     asked: &mut BTreeMap<JausId, Asking<R>>,
     subscribed: &mut BTreeMap<JausId, Subscription<R>>,
-    roll: &mut Roll,
+    member_table: &mut MemberTable,
     news: &mut News<R>,
 ) -> bool {
     let before = asked.len();
@@ -214,13 +214,13 @@ fn poll_asked<R>(
         match asking.as_mut().poll(cx) {
             Poll::Pending => return true,
             Poll::Ready(Ok(subscription)) => {
-                roll.handle_subscribed(member);
+                member_table.handle_subscribed(member);
                 subscribed.insert(member, subscription);
             }
             // That is told by the end of everything.
             Poll::Ready(Err(SubscribeError::Stopped)) => {}
             Poll::Ready(Err(why)) => {
-                let again = roll.handle_refused(Instant::now(), member);
+                let again = member_table.handle_refused(Instant::now(), member);
                 news.push_back((member, GroupUpdate::NotSubscribed { why, again }));
             }
         }
@@ -235,7 +235,7 @@ fn poll_subscribed<R: Message>(
     last: JausId,
     query: &'static str,
     subscribed: &mut BTreeMap<JausId, Subscription<R>>,
-    roll: &mut Roll,
+    member_table: &mut MemberTable,
     news: &mut News<R>,
 ) -> bool {
     let behind = (Bound::Excluded(last), Bound::Unbounded);
@@ -253,7 +253,7 @@ fn poll_subscribed<R: Message>(
                     subscribed.remove(&member);
                     // Without a reason the component has stopped, which is told by the end of all.
                     if let Some(why) = end {
-                        let again = roll.handle_refused(Instant::now(), member);
+                        let again = member_table.handle_refused(Instant::now(), member);
                         let why = SubscribeError::Ended {
                             peer: member,
                             query,

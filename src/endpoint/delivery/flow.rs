@@ -9,7 +9,7 @@
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::time::{Duration, Instant};
 
-use super::parcel::{Parcel, Started};
+use super::pending::{PendingMessage, Started};
 use super::round_trip::RoundTrip;
 use super::window::Window;
 use super::{FlowStatus, Undelivered};
@@ -69,7 +69,7 @@ pub(super) enum Progress {
 #[derive(Debug)]
 pub(super) struct Flow {
     /// By handle, hence in the order in which they were handed in.
-    parcels: BTreeMap<u64, Parcel>,
+    pending_messages: BTreeMap<u64, PendingMessage>,
     /// Messages of which not all was sent, by priority.
     waiting: [VecDeque<u64>; Priority::ALL.len()],
     /// What is to be sent again, by priority.
@@ -111,7 +111,7 @@ pub(super) struct Flow {
 impl Flow {
     pub(super) fn new(now: Instant, config: &Config) -> Self {
         Self {
-            parcels: BTreeMap::new(),
+            pending_messages: BTreeMap::new(),
             waiting: Default::default(),
             lost: Default::default(),
             flight: HashMap::new(),
@@ -138,7 +138,7 @@ impl Flow {
     }
 
     pub(super) fn is_idle(&self) -> bool {
-        self.parcels.is_empty()
+        self.pending_messages.is_empty()
     }
 
     pub(super) fn active(&self) -> Instant {
@@ -150,12 +150,12 @@ impl Flow {
             round_trip: self.round_trip.smoothed(),
             window: self.window.packets(),
             in_flight: self.in_flight,
-            messages: self.parcels.len(),
+            messages: self.pending_messages.len(),
         }
     }
 
     /// Takes in a message.
-    pub(super) fn push(&mut self, now: Instant, message: u64, parcel: Parcel) {
+    pub(super) fn push(&mut self, now: Instant, message: u64, pending: PendingMessage) {
         if self.is_idle() {
             self.round_trip.restart();
             if now.saturating_duration_since(self.active) >= STALE {
@@ -163,8 +163,8 @@ impl Flow {
             }
         }
         self.active = now;
-        self.waiting[usize::from(parcel.priority.bits())].push_back(message);
-        self.parcels.insert(message, parcel);
+        self.waiting[usize::from(pending.priority.bits())].push_back(message);
+        self.pending_messages.insert(message, pending);
     }
 
     /// The highest priority at which something is to be sent and may be.
@@ -184,8 +184,8 @@ impl Flow {
     /// Whether the message that begins next has more octets than that.
     pub(super) fn begins_more_than(&self, octets: usize) -> bool {
         let next = self.waiting.iter().rev().find_map(VecDeque::front);
-        let parcel = next.and_then(|message| self.parcels.get(message));
-        parcel.is_some_and(|parcel| parcel.started.is_none() && parcel.payload.len() > octets)
+        let pending = next.and_then(|message| self.pending_messages.get(message));
+        pending.is_some_and(|pending| pending.started.is_none() && pending.payload.len() > octets)
     }
 
     /// The next packet to send, of that priority or, if that must wait for numbers, of a lower one;
@@ -210,7 +210,10 @@ impl Flow {
             let Some(packet) = self.flight.get_mut(&sequence).filter(|packet| packet.lost) else {
                 continue;
             };
-            let frame = self.parcels.get(&packet.message)?.frame(packet.index)?;
+            let frame = self
+                .pending_messages
+                .get(&packet.message)?
+                .frame(packet.index)?;
             packet.lost = false;
             packet.sent = now;
             packet.order = self.sends;
@@ -232,15 +235,15 @@ impl Flow {
     ) -> Option<(Frame, u32)> {
         loop {
             let message = *self.waiting[level].front()?;
-            if !self.parcels.contains_key(&message) {
+            if !self.pending_messages.contains_key(&message) {
                 self.waiting[level].pop_front();
                 continue;
             }
             self.start(message, numbers, begin)?;
-            let parcel = self.parcels.get_mut(&message)?;
-            let index = parcel.started.as_ref()?.next;
-            let frame = parcel.frame(index)?;
-            let started = parcel.started.as_mut()?;
+            let pending = self.pending_messages.get_mut(&message)?;
+            let index = pending.started.as_ref()?.next;
+            let frame = pending.frame(index)?;
+            let started = pending.started.as_mut()?;
             started.next += 1;
             if started.next == started.cut.count() {
                 self.waiting[level].pop_front();
@@ -248,7 +251,7 @@ impl Flow {
             let packet = Packet {
                 message,
                 index,
-                priority: parcel.priority,
+                priority: pending.priority,
                 first_sent: now,
                 sent: now,
                 order: self.sends,
@@ -269,21 +272,24 @@ impl Flow {
         numbers: &mut Numbers,
         begin: &mut impl FnMut(usize) -> (Cut, Version),
     ) -> Option<()> {
-        let parcel = self.parcels.get(&message)?;
-        if parcel.started.is_some() {
+        let pending = self.pending_messages.get(&message)?;
+        if pending.started.is_some() {
             return Some(());
         }
-        let (cut, version) = begin(parcel.payload.len());
+        let (cut, version) = begin(pending.payload.len());
         let count = cut.count();
         let end = numbers.peek(count as u64) + count as u64;
         if end - self.floor >= ROUND {
-            let under_way = self.parcels.values().filter_map(|p| p.started.as_ref());
+            let under_way = self
+                .pending_messages
+                .values()
+                .filter_map(|p| p.started.as_ref());
             self.floor = under_way.map(|s| s.first).min().unwrap_or(end);
             if end.saturating_sub(self.floor) >= ROUND {
                 return None;
             }
         }
-        self.parcels.get_mut(&message)?.started = Some(Started {
+        self.pending_messages.get_mut(&message)?.started = Some(Started {
             cut,
             version,
             first: numbers.take(count),
@@ -315,13 +321,13 @@ impl Flow {
         self.newest = self.newest.max(packet.order);
         self.find_lost(now);
         self.armed = (self.in_flight > 0).then_some(now);
-        let Some(parcel) = self.parcels.get_mut(&message) else {
+        let Some(pending) = self.pending_messages.get_mut(&message) else {
             return Progress::Unawaited;
         };
-        let Some(started) = &mut parcel.started else {
+        let Some(started) = &mut pending.started else {
             return Progress::Unawaited;
         };
-        parcel.acknowledged += started.cut.range(packet.index).len();
+        pending.acknowledged += started.cut.range(packet.index).len();
         started.missing -= 1;
         if started.missing > 0 {
             return Progress::Part;
@@ -332,8 +338,8 @@ impl Flow {
     /// The message that a packet of `source` belongs to.
     pub(super) fn owner_of(&self, source: JausId, sequence: u16) -> Option<u64> {
         let message = self.flight.get(&sequence)?.message;
-        let parcel = self.parcels.get(&message)?;
-        (parcel.source == source).then_some(message)
+        let pending = self.pending_messages.get(&message)?;
+        (pending.source == source).then_some(message)
     }
 
     fn learn_from(&mut self, now: Instant, packet: &Packet) {
@@ -406,7 +412,7 @@ impl Flow {
 
     /// When the message that was handed in first is given up, unless something is heard before.
     fn end_of_patience(&self) -> Option<Instant> {
-        let (_, oldest) = self.parcels.first_key_value()?;
+        let (_, oldest) = self.pending_messages.first_key_value()?;
         let patience = if self.silent {
             self.patience / SILENT_PART
         } else {
@@ -435,7 +441,7 @@ impl Flow {
         let mut given_up = self.take_exhausted();
         let mut silent = self.silent;
         while self.end_of_patience().is_some_and(|end| end <= now)
-            && let Some((&message, _)) = self.parcels.first_key_value()
+            && let Some((&message, _)) = self.pending_messages.first_key_value()
         {
             silent = true;
             given_up.extend(self.give_up(message, Unacknowledged::TimedOut));
@@ -458,24 +464,24 @@ impl Flow {
         message: u64,
         reason: Unacknowledged,
     ) -> Option<(u64, Undelivered)> {
-        let parcel = self.remove(message)?;
-        let reason = match (reason, &parcel.started) {
+        let pending = self.remove(message)?;
+        let reason = match (reason, &pending.started) {
             (Unacknowledged::TimedOut, None) => Unacknowledged::NotSent,
             (reason, _) => reason,
         };
         let undelivered = Undelivered {
-            awaited: parcel.awaited,
+            awaited: pending.awaited,
             reason,
-            acknowledged: parcel.acknowledged,
-            length: parcel.payload.len(),
+            acknowledged: pending.acknowledged,
+            length: pending.payload.len(),
         };
         Some((message, undelivered))
     }
 
     /// Takes a message out, with what is on its way of it.
-    pub(super) fn remove(&mut self, message: u64) -> Option<Parcel> {
-        let parcel = self.parcels.remove(&message)?;
-        if let Some(started) = parcel
+    pub(super) fn remove(&mut self, message: u64) -> Option<PendingMessage> {
+        let pending = self.pending_messages.remove(&message)?;
+        if let Some(started) = pending
             .started
             .as_ref()
             .filter(|started| started.missing > 0)
@@ -489,13 +495,13 @@ impl Flow {
         if self.in_flight == 0 {
             self.armed = None;
         }
-        Some(parcel)
+        Some(pending)
     }
 
     /// The messages of a component.
     pub(super) fn messages_of(&self, source: JausId) -> Vec<u64> {
-        let theirs = |(_, parcel): &(&u64, &Parcel)| parcel.source == source;
-        self.parcels
+        let theirs = |(_, pending): &(&u64, &PendingMessage)| pending.source == source;
+        self.pending_messages
             .iter()
             .filter(theirs)
             .map(|(&message, _)| message)

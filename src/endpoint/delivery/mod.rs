@@ -15,7 +15,7 @@
 //! datagrams a millisecond from a buffer of 70000 octets, which the window finds out by loss.
 
 mod flow;
-mod parcel;
+mod pending;
 mod round_trip;
 mod window;
 
@@ -30,7 +30,7 @@ use super::{
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, Priority, Version};
 use flow::{Flow, Progress};
-use parcel::Parcel;
+use pending::PendingMessage;
 
 /// So many packets of a flow go one after the other, which lets links send them with one call.
 const TURN: usize = 32;
@@ -111,19 +111,19 @@ impl Deliveries {
         now: Instant,
         destination: JausId,
         handle: MessageHandle,
-        parcel: Parcel,
+        pending: PendingMessage,
     ) -> Result<(), SendError> {
         if !self.flows.contains_key(&destination) && !self.make_room(now) {
             let limit = self.config.max_flows;
             return Err(SendError::TooManyDestinations { limit });
         }
         self.messages += 1;
-        self.octets += parcel.payload.len();
+        self.octets += pending.payload.len();
         let flow = self
             .flows
             .entry(destination)
             .or_insert_with(|| Flow::new(now, &self.config));
-        flow.push(now, handle.0, parcel);
+        flow.push(now, handle.0, pending);
         self.touch(destination);
         Ok(())
     }
@@ -234,7 +234,7 @@ impl Deliveries {
                 .messages_of(source)
                 .into_iter()
                 .filter_map(|message| flow.remove(message))
-                .map(|parcel| parcel.payload.len())
+                .map(|pending| pending.payload.len())
                 .collect();
             gone.into_iter().for_each(|length| self.settle(length));
             self.touch(destination);
@@ -261,9 +261,9 @@ impl Endpoint {
     ) -> Result<(), SendError> {
         self.deliveries
             .check_room(self.news.results(), message.payload.len())?;
-        let parcel = Parcel::new(now, message, scope);
+        let pending = PendingMessage::new(now, message, scope);
         self.deliveries
-            .push(now, message.destination, handle, parcel)
+            .push(now, message.destination, handle, pending)
     }
 
     /// Sends the packets that are next of this priority, as many as one flow may send in its turn;
@@ -379,14 +379,14 @@ impl Endpoint {
     }
 
     fn tell_delivered(&mut self, by: JausId, message: u64) {
-        let parcel = self
+        let pending = self
             .deliveries
             .flows
             .get_mut(&by)
             .and_then(|flow| flow.remove(message));
-        if let Some(parcel) = parcel {
-            self.deliveries.settle(parcel.payload.len());
-            if parcel.awaited {
+        if let Some(pending) = pending {
+            self.deliveries.settle(pending.payload.len());
+            if pending.awaited {
                 let message = MessageHandle(message);
                 self.news.push_result(Event::Acknowledged { message, by });
             }

@@ -8,8 +8,9 @@
     reason = "tests with sockets"
 )]
 
-mod papers;
+mod outputs;
 mod peer;
+mod replay;
 mod right;
 mod safety;
 #[path = "../support/mod.rs"]

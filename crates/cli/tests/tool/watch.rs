@@ -15,7 +15,7 @@ use jaus::endpoint::Outgoing;
 use jaus::link::Group;
 use jaus::node::{Config, Node, Port, Tapped, Way};
 use jaus_test_kit::group::own_group;
-use jaus_vehicle::parts::{Communicator, Part, Seat};
+use jaus_vehicle::parts::{Communicator, Part, Slot};
 use jaus_view::debug::{DebugView, MOST_VIEWERS};
 use jaus_view::{Dictionary, Filter, JournalSettings, Links, MessageStream};
 use serde_json::Value as Json;
@@ -286,13 +286,13 @@ async fn the_communicator_logs_what_passes_and_its_log_is_read_back_with_filters
         log: Some(JournalSettings::new(&scratch.0)),
         ..Communicator::default()
     };
-    let seat = Seat {
+    let slot = Slot {
         port: vehicle.attach(35).unwrap(),
         node: Some(vehicle.clone()),
         kind: Kind::Vehicle,
         name: "Rover".to_owned(),
     };
-    let running = tokio::spawn(part.run(seat));
+    let running = tokio::spawn(part.run(slot));
     // It is running when its component answers.
     let ask = async {
         loop {

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-/// The largest frame of a page, in octets; the largest wish has a tenth of it.
+/// The largest frame of a page, in octets; the largest request has a tenth of it.
 pub(super) const LARGEST_FRAME: usize = 4096;
 
 /// How often a page may say something: a bucket that fills evenly and that every frame takes

@@ -1,5 +1,5 @@
-//! The pages' server: the page's files, the WebSocket to the desk, and what keeps strangers out.
-//! It holds nothing of the vehicle: snapshots pass through, wishes are handed to the desk.
+//! The pages' server: the page's files, the WebSocket to the session, and what keeps strangers out.
+//! It holds nothing of the vehicle: snapshots pass through, requests are handed to the session.
 
 mod bounds;
 mod connections;
@@ -22,15 +22,15 @@ use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, oneshot};
 
 use self::connections::Connections;
-use super::desk::{Access, Order};
 use super::page::{self, File};
+use super::session::{Access, Order};
 use super::token::Token;
 use jaus::address::JausId;
 use jaus::node::Node;
 use jaus_view::Dictionary;
 
 /// Who may come in, and whom they meet.
-pub(super) struct Door {
+pub(super) struct Admission {
     pub(super) operator: JausId,
     pub(super) authority: u8,
     pub(super) token: Option<Token>,
@@ -47,7 +47,7 @@ pub(super) struct Server {
 
 /// What all connections share.
 struct Shared {
-    door: Door,
+    admission: Admission,
     access: Access,
     dictionary: Dictionary,
     /// Places for pages.
@@ -83,9 +83,9 @@ impl Server {
     /// How many pages are served at once.
     const PAGES: usize = 32;
 
-    pub(super) fn new(door: Door, access: Access) -> Self {
+    pub(super) fn new(admission: Admission, access: Access) -> Self {
         let shared = Shared {
-            door,
+            admission,
             access,
             dictionary: Dictionary::new(),
             places: Arc::new(Semaphore::new(Self::PAGES)),
@@ -117,7 +117,7 @@ impl Server {
 
 /// Lets nobody in who comes by way of another site, and tells the browser how to treat the answer.
 async fn admit(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
-    if let Err(refusal) = guard::check(request.headers(), &shared.door.hosts) {
+    if let Err(refusal) = guard::check(request.headers(), &shared.admission.hosts) {
         shared.counters.strangers.fetch_add(1, Relaxed);
         tracing::debug!(%refusal, "not admitted");
         return (refusal.status(), format!("{refusal}\n")).into_response();
@@ -177,7 +177,7 @@ async fn serve_map(
             ([(header::CONTENT_TYPE, "application/octet-stream")], cells).into_response()
         }
         Ok(Err(reason)) => (StatusCode::NOT_FOUND, reason + "\n").into_response(),
-        Err(_) => (StatusCode::SERVICE_UNAVAILABLE, "the desk has ended\n").into_response(),
+        Err(_) => (StatusCode::SERVICE_UNAVAILABLE, "the session has ended\n").into_response(),
     }
 }
 
@@ -202,12 +202,16 @@ async fn serve_page(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade
 impl Shared {
     /// Whether somebody who has shown nothing yet may change the vehicle.
     fn needs_token(&self) -> bool {
-        self.door.token.is_some()
+        self.admission.token.is_some()
     }
 
     /// Whether what was shown is the token; what is wrong is counted.
     fn admits(&self, shown: &str) -> bool {
-        let right = self.door.token.as_ref().is_none_or(|token| token.is(shown));
+        let right = self
+            .admission
+            .token
+            .as_ref()
+            .is_none_or(|token| token.is(shown));
         if !right {
             self.counters.wrong_tokens.fetch_add(1, Relaxed);
         }
@@ -218,6 +222,6 @@ impl Shared {
     fn lets_read(&self, headers: &HeaderMap) -> bool {
         let shown = headers.get(header::AUTHORIZATION);
         let shown = shown.and_then(|it| it.to_str().ok()?.strip_prefix("Bearer "));
-        !self.door.token_to_read || shown.is_some_and(|it| self.admits(it))
+        !self.admission.token_to_read || shown.is_some_and(|it| self.admits(it))
     }
 }

@@ -1,4 +1,4 @@
-//! One page's WebSocket: what it says goes to the desk, snapshots and answers come back. Reading
+//! One page's WebSocket: what it says goes to the session, snapshots and answers come back. Reading
 //! and writing are independent, so that a page that does not keep up can still stop the vehicle.
 
 use std::sync::Arc;
@@ -16,8 +16,8 @@ use super::bounds::Rate;
 use super::view::{self, MessageView};
 use crate::PageId;
 use crate::answer::Said as Answer;
-use crate::desk::{Order, Reply};
-use crate::wish::{Frame, MessageFilter, Said, Wish};
+use crate::request::{Frame, MessageFilter, OperatorRequest, Said};
+use crate::session::{Order, Reply};
 use jaus_view::Filter;
 
 /// The version of the protocol between page and station.
@@ -32,7 +32,7 @@ const PING: Duration = Duration::from_secs(5);
 const WRONG_TOKEN: Duration = Duration::from_secs(1);
 /// After so many of them the connection ends.
 const WRONG_TOKENS: u32 = 5;
-/// Between two refusals that answer no wish in particular.
+/// Between two refusals that answer no request in particular.
 const REFUSAL: Duration = Duration::from_secs(1);
 
 /// Serves a page until it goes, or has to.
@@ -81,7 +81,7 @@ struct Reader<'s> {
     trusted: &'s AtomicBool,
     rate: Rate,
     wrong_tokens: u32,
-    /// When a wish without an id was last refused.
+    /// When a request without an id was last refused.
     refused: Option<Instant>,
 }
 
@@ -122,20 +122,20 @@ impl Reader<'_> {
         let frame: Frame = match serde_json::from_str(text) {
             Ok(frame) => frame,
             Err(error) => {
-                self.refuse(None, &format!("this is not a wish: {error}"));
+                self.refuse(None, &format!("this is not a request: {error}"));
                 return None;
             }
         };
         match frame.said {
             Said::Token { token } => return self.show(frame.id, &token).await,
             Said::Messages { on, filter } => self.choose(frame.id, on, &filter).await,
-            Said::Wish(_) if !self.trusted.load(Relaxed) => {
+            Said::OperatorRequest(_) if !self.trusted.load(Relaxed) => {
                 self.refuse(
                     frame.id,
                     "this needs the token that jaus-ocu printed or read from its file",
                 );
             }
-            Said::Wish(wish) => self.wish(frame.id, wish).await,
+            Said::OperatorRequest(request) => self.request(frame.id, request).await,
         }
         None
     }
@@ -159,7 +159,7 @@ impl Reader<'_> {
         if !self.may_read() {
             return self.refuse(id, "looking needs the token, too");
         }
-        if on && self.shared.door.node.is_none() {
+        if on && self.shared.admission.node.is_none() {
             return self.refuse(
                 id,
                 "the station's node runs in another process: look at its debug view",
@@ -178,14 +178,18 @@ impl Reader<'_> {
         may_read(self.shared, self.trusted)
     }
 
-    async fn wish(&mut self, id: Option<u64>, wish: Wish) {
+    async fn request(&mut self, id: Option<u64>, request: OperatorRequest) {
         let (page, reply) = (self.page, self.reply(id));
-        let order = Order::Wish { page, wish, reply };
-        // An error means that the desk has ended, and the writer notices that.
+        let order = Order::OperatorRequest {
+            page,
+            request,
+            reply,
+        };
+        // An error means that the session has ended, and the writer notices that.
         let _ = self.shared.access.orders.send(order).await;
     }
 
-    /// What tells the page how its wish went. Without an id it only hears of refusals, and of them
+    /// What tells the page how its request went. Without an id it only hears of refusals, and of them
     /// not too many.
     fn reply(&mut self, id: Option<u64>) -> Reply {
         let answers = self.answers.clone();
@@ -225,7 +229,7 @@ fn say(answers: &mpsc::Sender<Utf8Bytes>, answer: &Answer<'_>) {
 
 /// Whether a page may look.
 fn may_read(shared: &Shared, trusted: &AtomicBool) -> bool {
-    !shared.door.token_to_read || trusted.load(Relaxed)
+    !shared.admission.token_to_read || trusted.load(Relaxed)
 }
 
 /// The next message of the view, if there is one.
@@ -236,7 +240,7 @@ async fn next_message(view: &mut Option<MessageView<'_>>) -> Option<Utf8Bytes> {
     }
 }
 
-/// Tells the page everything, until it does not take it or the desk has ended.
+/// Tells the page everything, until it does not take it or the session has ended.
 async fn write(
     sink: &mut SplitSink<WebSocket, Message>,
     shared: &Shared,
@@ -252,8 +256,8 @@ async fn write(
     let hello = Answer::Hello {
         version: VERSION,
         token_needed: shared.needs_token(),
-        operator: shared.door.operator.to_string(),
-        authority: shared.door.authority,
+        operator: shared.admission.operator.to_string(),
+        authority: shared.admission.authority,
     };
     let mut next = serde_json::to_string(&hello)
         .ok()
@@ -282,7 +286,7 @@ async fn write(
             }
             _ = pings.tick() => Some(Message::Ping(axum::body::Bytes::new())),
             Some(filter) = chosen.recv() => {
-                view = filter.zip(shared.door.node.as_ref()).map(|(filter, node)| {
+                view = filter.zip(shared.admission.node.as_ref()).map(|(filter, node)| {
                     MessageView::new(node, &shared.dictionary, filter)
                 });
                 None

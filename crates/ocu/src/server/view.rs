@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use axum::extract::ws::Utf8Bytes;
 use serde_json::{Map, Value, json};
 
-use crate::wish::MessageFilter;
+use crate::request::MessageFilter;
 use jaus::node::{Node, Tap, Tapped};
 use jaus_view::{Dictionary, Entry, Filter, FilterError, Links, MessageStream};
 

@@ -32,12 +32,12 @@ async fn who_has_not_taken_control_is_told_so_and_moves_nothing() {
     let mut page = scene.page().await;
     page.until(|state| driver_of(state)["state"] == "standby")
         .await;
-    for wish in [
+    for request in [
         json!({"type": "drive", "forward": 1, "turn": 0}),
         json!({"type": "resume"}),
         json!({"type": "standby"}),
     ] {
-        let refused = page.ask(wish).await.unwrap_err();
+        let refused = page.ask(request).await.unwrap_err();
         assert_eq!(refused, "take control first");
     }
     let refused = page
@@ -76,12 +76,12 @@ async fn a_vehicle_stops_when_the_page_is_gone() {
 async fn standby_and_giving_back_control_stop_the_vehicle() {
     let scene = Scene::new().await;
     let mut page = scene.driver().await;
-    for wish in [
+    for request in [
         json!({"type": "standby"}),
         json!({"type": "control", "on": false}),
     ] {
         page.drive_until(&scene, |scene| scene.speed() > 0.3).await;
-        page.ask(wish).await.unwrap();
+        page.ask(request).await.unwrap();
         scene.until(|scene| scene.speed() == 0.0).await;
         let again = page.ask(json!({"type": "drive", "forward": 1, "turn": 0}));
         again.await.unwrap_err();
@@ -142,11 +142,11 @@ async fn of_two_pages_one_drives_and_the_other_is_told_so() {
     driver
         .drive_until(&scene, |scene| scene.speed() > 0.3)
         .await;
-    let wish = json!({"type": "drive", "forward": 0.5, "turn": 0});
+    let request = json!({"type": "drive", "forward": 0.5, "turn": 0});
     // On a machine that is busy for 300 ms the first has let go before the second comes.
     let refused = loop {
-        driver.ask(wish.clone()).await.unwrap();
-        if let Err(refused) = other.ask(wish.clone()).await {
+        driver.ask(request.clone()).await.unwrap();
+        if let Err(refused) = other.ask(request.clone()).await {
             break refused;
         }
         other.ask(json!({"type": "drive_end"})).await.unwrap();

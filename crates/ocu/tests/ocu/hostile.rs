@@ -59,12 +59,12 @@ async fn without_the_token_a_page_may_look_and_change_nothing_not_even_by_guessi
     assert_eq!(page.hello["token_needed"], true);
     page.until(|state| driver_of(state)["state"] == "standby")
         .await;
-    for wish in [
+    for request in [
         json!({"type": "control", "on": true}),
         json!({"type": "emergency", "on": true}),
         json!({"type": "select", "subsystem": 101}),
     ] {
-        let refused = page.ask(wish).await.unwrap_err();
+        let refused = page.ask(request).await.unwrap_err();
         assert!(refused.contains("token"), "{refused}");
     }
     let wrong = json!({"type": "token", "token": "correct-horse-batterz"});
@@ -175,17 +175,17 @@ async fn what_is_no_wish_is_refused_in_words_and_the_page_goes_on() {
                 said["reason"]
                     .as_str()
                     .unwrap()
-                    .starts_with("this is not a wish")
+                    .starts_with("this is not a request")
             );
             break;
         }
     }
-    for wish in [
+    for request in [
         json!({"type": "drive", "forward": 2, "turn": 0}),
         json!({"type": "destination", "x": 1e300, "y": 0, "speed": -1}),
         json!({"type": "approve", "mission": 9}),
     ] {
-        page.ask(wish).await.unwrap_err();
+        page.ask(request).await.unwrap_err();
     }
     page.state().await;
 }

@@ -22,7 +22,7 @@ async fn the_map_of_the_store_is_shown_with_all_its_cells() {
         map: Some((raster, picture.clone())),
         ..KnowledgeStore::default()
     };
-    let running = tokio::spawn(store.run(scene.seat(61)));
+    let running = tokio::spawn(store.run(scene.slot(61)));
     let mut page = scene.page().await;
     let state = page.until(|state| !state["map"].is_null()).await;
     let map = &state["map"];

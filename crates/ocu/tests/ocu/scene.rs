@@ -16,7 +16,7 @@ use jaus_ocu::{Listen, Station};
 use jaus_test_kit::group::own_group;
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
-use jaus_vehicle::parts::{Part, Seat};
+use jaus_vehicle::parts::{Part, Slot};
 use serde_json::{Value, json};
 use tokio::net::TcpStream;
 use tokio::task::JoinHandle;
@@ -71,7 +71,7 @@ impl Scene {
             listen: Listen::At((Ipv4Addr::LOCALHOST, 0).into()),
             ..station
         };
-        let (address, station, desk) = start(station, 42, group).await;
+        let (address, station, session) = start(station, 42, group).await;
         Self {
             vehicle,
             rover: Some(rover),
@@ -80,7 +80,7 @@ impl Scene {
             timeout,
             frozen,
             station,
-            nodes: vec![node, desk],
+            nodes: vec![node, session],
         }
     }
 
@@ -141,9 +141,9 @@ impl Scene {
     }
 
     /// A place for another part of the vehicle.
-    pub(crate) fn seat(&self, component: u8) -> Seat {
+    pub(crate) fn slot(&self, component: u8) -> Slot {
         let node = &self.nodes[0];
-        Seat {
+        Slot {
             port: node.attach(component).unwrap(),
             node: Some(node.clone()),
             kind: Kind::Vehicle,
@@ -225,14 +225,14 @@ async fn start(
     let node = Node::start(Config::loopback(subsystem, 1).group(group)).unwrap();
     let open = station.open().await.unwrap();
     let address = open.address();
-    let seat = Seat {
+    let slot = Slot {
         port: node.attach(1).unwrap(),
         node: Some(node.clone()),
         kind: Kind::OperatorControlUnit,
         name: "Operator".to_owned(),
     };
     let running = tokio::spawn(async move {
-        let Err(error) = open.run(seat).await;
+        let Err(error) = open.run(slot).await;
         panic!("the station has ended: {error}");
     });
     (address, running, node)
@@ -319,16 +319,16 @@ impl Page {
     }
 
     /// Says something and forgets it.
-    pub(crate) async fn say(&mut self, wish: &Value) {
-        let said = self.socket.send(Message::text(wish.to_string()));
+    pub(crate) async fn say(&mut self, request: &Value) {
+        let said = self.socket.send(Message::text(request.to_string()));
         within_limit(said).await.unwrap();
     }
 
     /// Wishes something, and waits for what becomes of it.
-    pub(crate) async fn ask(&mut self, mut wish: Value) -> Result<(), String> {
+    pub(crate) async fn ask(&mut self, mut request: Value) -> Result<(), String> {
         self.last_id += 1;
-        wish["id"] = self.last_id.into();
-        self.say(&wish).await;
+        request["id"] = self.last_id.into();
+        self.say(&request).await;
         loop {
             let said = self.next().await;
             if said["id"] == self.last_id {

@@ -4,7 +4,7 @@
 //! | here | what it does |
 //! |---|---|
 //! | [`Gateway`] | both halves without I/O and without a clock: fed with datagrams, messages and time |
-//! | `front` | an RA component as a JAUS component: services that answer from what it reports |
+//! | `proxy` | an RA component as a JAUS component: services that answer from what it reports |
 //! | `course` | lists of places across: elements here, numbers there |
 //! | `picture` | a JAUS subsystem as an RA subsystem: each component once for each of its services |
 //! | [`RaGateway`] | the running thing: sockets, node, timers |
@@ -20,10 +20,10 @@
 mod convert;
 mod counters;
 mod course;
-mod front;
-mod hall;
 mod pairs;
 mod picture;
+mod proxy;
+mod registry;
 mod report;
 mod roles;
 mod running;
@@ -42,7 +42,7 @@ pub use self::settings::{Settings, Show};
 
 use self::convert::Ids;
 use self::counters::Tally;
-use self::front::{Front, Target};
+use self::proxy::{Proxy, Target};
 use crate::carrier::Transmit;
 use crate::ids::{Collision, IdTable, InvalidIds, RaComponent, Side, Unmapped};
 use crate::node::{self, RaNode};
@@ -62,10 +62,10 @@ pub struct Gateway {
     known: Ids,
     ra: RaNode,
     /// The gateway's own component, which looks around among JAUS components.
-    desk: Stack,
+    own_stack: Stack,
     /// The same component as RA systems see it.
     own: RaId,
-    fronts: BTreeMap<JausId, Front>,
+    proxies: BTreeMap<JausId, Proxy>,
     /// How each listed RA component presents itself.
     listed: BTreeMap<JausId, Profile>,
     /// JAUS subsystems that have changed, and when RA systems are told.
@@ -126,7 +126,7 @@ impl Gateway {
         let profile = Profile::new(Kind::OtherSubsystem, settings.name.clone());
         let seed = id.to_u32().into();
         let discovery = Discovery::new(id, profile, Scope::System, Timing::default(), seed);
-        let desk = Stack::new(
+        let own_stack = Stack::new(
             discovery,
             vec![Box::new(Transport), Box::new(Liveness::new())],
         );
@@ -135,9 +135,9 @@ impl Gateway {
             settings,
             known: Ids::new(ids.clone()),
             ids,
-            desk,
+            own_stack,
             own,
-            fronts: BTreeMap::new(),
+            proxies: BTreeMap::new(),
             listed: BTreeMap::new(),
             changed: BTreeMap::new(),
             routes: BTreeMap::new(),
@@ -160,7 +160,7 @@ impl Gateway {
     /// The gateway's own id among JAUS components.
     #[must_use]
     pub const fn id(&self) -> JausId {
-        self.desk.id()
+        self.own_stack.id()
     }
 
     /// The gateway's own id among RA systems.
@@ -171,13 +171,13 @@ impl Gateway {
 
     /// Begins to live.
     pub fn start(&mut self, now: Instant) {
-        self.actions.push_back(Action::Attach(self.desk.id()));
-        let own = self.desk.id().subsystem();
+        self.actions.push_back(Action::Attach(self.own_stack.id()));
+        let own = self.own_stack.id().subsystem();
         if let Err(collision) = self.claim(Side::Jaus, own) {
             tracing::warn!("{collision}");
         }
         self.changed.insert(own, now);
-        self.desk.start(now);
+        self.own_stack.start(now);
         self.settle(now);
     }
 
@@ -189,11 +189,11 @@ impl Gateway {
 
     /// A message for one of the gateway's JAUS components has come.
     pub fn handle_message(&mut self, now: Instant, message: &Received) {
-        if message.to == self.desk.id() {
-            self.desk.handle_message(now, message);
+        if message.to == self.own_stack.id() {
+            self.own_stack.handle_message(now, message);
         } else {
-            self.with_front(now, message.to, |front, tally| {
-                front.handle_message(now, message, tally);
+            self.with_front(now, message.to, |proxy, tally| {
+                proxy.handle_message(now, message, tally);
             });
         }
         self.settle(now);
@@ -202,13 +202,13 @@ impl Gateway {
     /// The time of [`poll_timeout`](Self::poll_timeout) has come; earlier does no harm.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.ra.handle_timeout(now);
-        if self.desk.poll_timeout().is_some_and(|due| due <= now) {
-            self.desk.handle_timeout(now);
+        if self.own_stack.poll_timeout().is_some_and(|due| due <= now) {
+            self.own_stack.handle_timeout(now);
         }
-        let due = |it: &(&JausId, &Front)| it.1.poll_timeout().is_some_and(|due| due <= now);
-        let due: Vec<JausId> = self.fronts.iter().filter(due).map(|(&id, _)| id).collect();
+        let due = |it: &(&JausId, &Proxy)| it.1.poll_timeout().is_some_and(|due| due <= now);
+        let due: Vec<JausId> = self.proxies.iter().filter(due).map(|(&id, _)| id).collect();
         for id in due {
-            self.with_front(now, id, |front, tally| front.handle_timeout(now, tally));
+            self.with_front(now, id, |proxy, tally| proxy.handle_timeout(now, tally));
         }
         self.dismiss_guests(now);
         self.show_changes(now);
@@ -218,16 +218,16 @@ impl Gateway {
     /// Stops and releases what is controlled on either side, and gives control to no client any more.
     /// Releases that are not confirmed are repeated while the gateway still gets its time.
     pub fn release_all(&mut self, now: Instant) {
-        let all: Vec<JausId> = self.fronts.keys().copied().collect();
+        let all: Vec<JausId> = self.proxies.keys().copied().collect();
         for id in all {
-            self.with_front(now, id, |front, tally| front.take_leave(now, tally));
+            self.with_front(now, id, |proxy, tally| proxy.take_leave(now, tally));
         }
     }
 
     /// Whether everything is released that was controlled on either side.
     #[must_use]
     pub fn is_released(&self) -> bool {
-        self.fronts.values().all(Front::is_released)
+        self.proxies.values().all(Proxy::is_released)
     }
 
     /// Releases what is still controlled, and ends all else that runs with others.
@@ -236,7 +236,7 @@ impl Gateway {
         for (_, shown) in std::mem::take(&mut self.shown) {
             self.ra.withdraw(now, shown);
         }
-        self.desk.take_leave(now);
+        self.own_stack.take_leave(now);
         self.collect_desk(now);
     }
 
@@ -255,11 +255,11 @@ impl Gateway {
     pub fn poll_timeout(&self) -> Option<Instant> {
         let own = [
             self.ra.poll_timeout(),
-            self.desk.poll_timeout(),
+            self.own_stack.poll_timeout(),
             self.changed.values().min().copied(),
         ];
-        let fronts = self.fronts.values().filter_map(Front::poll_timeout);
-        own.into_iter().flatten().chain(fronts).min()
+        let proxies = self.proxies.values().filter_map(Proxy::poll_timeout);
+        own.into_iter().flatten().chain(proxies).min()
     }
 
     /// What has been carried across and refused.
@@ -283,7 +283,7 @@ impl Gateway {
     }
 
     fn collect_desk(&mut self, now: Instant) {
-        while let Some(event) = self.desk.poll_event() {
+        while let Some(event) = self.own_stack.poll_event() {
             match event {
                 Event::Change(change) => self.handle_change(now, change),
                 Event::Message(message) => {
@@ -294,7 +294,7 @@ impl Gateway {
                 _ => {}
             }
         }
-        while let Some(message) = self.desk.poll_transmit() {
+        while let Some(message) = self.own_stack.poll_transmit() {
             self.actions.push_back(Action::Send(message));
         }
     }
@@ -319,7 +319,7 @@ impl Gateway {
                 id.subsystem()
             }
         };
-        if self.settings.show.includes(subsystem) || subsystem == self.desk.id().subsystem() {
+        if self.settings.show.includes(subsystem) || subsystem == self.own_stack.id().subsystem() {
             let due = now + self.settings.gather;
             self.changed.entry(subsystem).or_insert(due);
         }
@@ -340,11 +340,17 @@ impl Gateway {
     }
 
     fn show(&mut self, now: Instant, subsystem: u16) {
-        let us = self.desk.id();
+        let us = self.own_stack.id();
         self.former.retain(|_, until| now < *until);
-        let (fronts, former) = (&self.fronts, &self.former);
-        let is_front = |id| fronts.contains_key(&id) || former.contains_key(&id);
-        let picture = picture::draw(&self.desk.directory(), &self.ids, subsystem, us, is_front);
+        let (proxies, former) = (&self.proxies, &self.former);
+        let is_front = |id| proxies.contains_key(&id) || former.contains_key(&id);
+        let picture = picture::draw(
+            &self.own_stack.directory(),
+            &self.ids,
+            subsystem,
+            us,
+            is_front,
+        );
         let Some(picture) = picture else {
             return self.hide(now, subsystem);
         };

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use super::front::Target;
+use super::proxy::Target;
 use super::roles;
 use crate::RaId;
 use crate::ids::{IdTable, RaComponent, Side, Unmapped};

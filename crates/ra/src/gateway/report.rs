@@ -43,15 +43,15 @@ pub struct JausComponentReport {
 
 impl Report {
     pub(super) fn of(gateway: &Gateway) -> Self {
-        let fronts = gateway.fronts.iter();
-        let ra_components = fronts.map(|(&jaus, front)| RaComponentReport {
-            ra: front.ra().to_string(),
+        let proxies = gateway.proxies.iter();
+        let ra_components = proxies.map(|(&jaus, proxy)| RaComponentReport {
+            ra: proxy.ra().to_string(),
             jaus,
             name: gateway
                 .listed
                 .get(&jaus)
                 .map_or_else(String::new, |profile| profile.component.clone()),
-            controlled: front.is_engaged(),
+            controlled: proxy.is_engaged(),
         });
         let routes = gateway.routes.iter();
         let jaus_components = routes.map(|(ra, target)| JausComponentReport {

@@ -23,7 +23,7 @@ use jaus::link::udp::{self, UdpLink};
 use jaus::link::{Group, Interface, Interfaces, Ip, STANDARD_PORT, Slab};
 use jaus::node::{Node, Port, Resident};
 use jaus::wire::Priority;
-use jaus_vehicle::parts::{Part, PartError, Seat};
+use jaus_vehicle::parts::{Part, PartError, Slot};
 
 /// The gateway between RA systems and JAUS, as a program runs it.
 #[derive(Debug, Clone)]
@@ -68,8 +68,8 @@ impl Default for RaGateway {
 }
 
 impl Part for RaGateway {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
-        let Some(node) = seat.node else {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
+        let Some(node) = slot.node else {
             return Err(PartError::Broken(
                 "the gateway attaches components of many subsystems, and so runs a node of its own: \
                  leave --attach out"
@@ -79,17 +79,17 @@ impl Part for RaGateway {
         let broken = |error: &dyn std::fmt::Display| PartError::Broken(error.to_string());
         let link = self.open(&node)?;
         let mut settings = self.settings;
-        settings.name = seat.name;
-        let gateway = Gateway::new(seat.port.id(), settings).map_err(|error| broken(&error))?;
+        settings.name = slot.name;
+        let gateway = Gateway::new(slot.port.id(), settings).map_err(|error| broken(&error))?;
         let (id, ra) = (gateway.id(), gateway.ra_id());
         tracing::info!("{id} is {ra} among RA systems, UDP {}", link.local());
-        let resident = seat.port.reside();
+        let resident = slot.port.reside();
         let mut running = Leaver(Some(Running {
             gateway,
             link,
             slab: Slab::new(),
-            _resident: seat.port.reside(),
-            ports: BTreeMap::from([(id, seat.port)]),
+            _resident: slot.port.reside(),
+            ports: BTreeMap::from([(id, slot.port)]),
             node,
             reports: self.reports,
             reporter: self.reporter,

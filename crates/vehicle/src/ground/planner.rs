@@ -257,13 +257,13 @@ mod tests {
     use crate::mission::{Action, LostLink, Stage};
     use jaus::service::rig::{CLIENT, Rig, STRANGER};
 
-    struct Desk {
+    struct Bench {
         rig: Rig,
         missions: Missions,
         woken: Arc<AtomicU32>,
     }
 
-    impl Desk {
+    impl Bench {
         fn new() -> Self {
             Self::with(Settings::default())
         }
@@ -307,46 +307,46 @@ mod tests {
 
     #[test]
     fn a_destination_from_the_client_in_control_begins_a_mission() {
-        let mut desk = Desk::new();
-        let woken = desk.woken.load(Ordering::Relaxed);
-        desk.go(1.0);
-        assert!(desk.woken.load(Ordering::Relaxed) > woken);
-        let report = desk.report();
+        let mut bench = Bench::new();
+        let woken = bench.woken.load(Ordering::Relaxed);
+        bench.go(1.0);
+        assert!(bench.woken.load(Ordering::Relaxed) > woken);
+        let report = bench.report();
         assert_eq!(report.stage, report_mission::Stage::MAP);
         assert_eq!((report.mission, report.attempt), (1, 1));
         assert_eq!((report.destination_x, report.destination_y), (1.0, 2.0));
-        let changed = &desk.rig.changed();
+        let changed = &bench.rig.changed();
         assert!(changed.contains(&QueryMission::CODE));
-        let (action, _) = desk.missions.tell(Mission::poll_action);
+        let (action, _) = bench.missions.tell(Mission::poll_action);
         assert!(matches!(action, Some(Action::FetchMap(_))));
     }
 
     #[test]
     fn commands_of_others_are_ignored_and_all_while_not_ready() {
-        let mut desk = Desk::new();
+        let mut bench = Bench::new();
         let to = SetDestination::default();
-        desk.rig.send(STRANGER, &to);
-        assert_eq!(desk.report().stage, report_mission::Stage::IDLE);
-        desk.rig.stand(State::Standby, Some(CLIENT));
-        desk.rig.send(CLIENT, &to);
-        assert_eq!(desk.report().stage, report_mission::Stage::IDLE);
+        bench.rig.send(STRANGER, &to);
+        assert_eq!(bench.report().stage, report_mission::Stage::IDLE);
+        bench.rig.stand(State::Standby, Some(CLIENT));
+        bench.rig.send(CLIENT, &to);
+        assert_eq!(bench.report().stage, report_mission::Stage::IDLE);
     }
 
     #[test]
     fn the_path_is_told_and_driven_once_it_is_approved() {
-        let mut desk = Desk::new();
-        desk.go(3.0);
-        desk.plan(vec![(0.0, 0.0), (3.0, 2.0)]);
-        let path: ReportPlannedPath = desk.rig.ask(&QueryPlannedPath {}).unwrap();
+        let mut bench = Bench::new();
+        bench.go(3.0);
+        bench.plan(vec![(0.0, 0.0), (3.0, 2.0)]);
+        let path: ReportPlannedPath = bench.rig.ask(&QueryPlannedPath {}).unwrap();
         assert_eq!(path.mission_rec.mission, 1);
         assert_eq!(path.point_list[1], PointRec { x: 3.0, y: 2.0 });
-        desk.rig.send(CLIENT, &ApproveMission { mission: 2 });
+        bench.rig.send(CLIENT, &ApproveMission { mission: 2 });
         assert_eq!(
-            desk.report().stage,
+            bench.report().stage,
             report_mission::Stage::AWAITING_APPROVAL
         );
-        desk.rig.send(CLIENT, &ApproveMission { mission: 1 });
-        assert_eq!(desk.report().stage, report_mission::Stage::PATH);
+        bench.rig.send(CLIENT, &ApproveMission { mission: 1 });
+        assert_eq!(bench.report().stage, report_mission::Stage::PATH);
     }
 
     #[test]
@@ -369,57 +369,57 @@ mod tests {
             ),
             (State::Ready, None, "control of the planner has ended"),
         ] {
-            let mut desk = Desk::new();
-            desk.go(3.0);
-            desk.rig.stand(state, client);
-            let report = desk.report();
+            let mut bench = Bench::new();
+            bench.go(3.0);
+            bench.rig.stand(state, client);
+            let report = bench.report();
             assert_eq!(report.stage, report_mission::Stage::STOPPED);
             assert_eq!(report.reason, reason);
-            desk.rig.stand(State::Ready, Some(CLIENT));
-            assert_eq!(desk.report().stage, report_mission::Stage::STOPPED);
+            bench.rig.stand(State::Ready, Some(CLIENT));
+            assert_eq!(bench.report().stage, report_mission::Stage::STOPPED);
         }
     }
 
     /// A planner that holds a mission, or drives back, when the link is lost; it drives.
-    fn driving(lost_link: LostLink) -> Desk {
-        let mut desk = Desk::with(Settings {
+    fn driving(lost_link: LostLink) -> Bench {
+        let mut bench = Bench::with(Settings {
             lost_link,
             ..Settings::default()
         });
-        desk.go(3.0);
-        desk.rig.send(CLIENT, &ApproveMission { mission: 1 });
-        desk.plan(vec![(0.0, 0.0), (3.0, 2.0)]);
-        assert_eq!(desk.report().stage, report_mission::Stage::PATH);
-        let _ = desk.missions.tell(|mission| {
+        bench.go(3.0);
+        bench.rig.send(CLIENT, &ApproveMission { mission: 1 });
+        bench.plan(vec![(0.0, 0.0), (3.0, 2.0)]);
+        assert_eq!(bench.report().stage, report_mission::Stage::PATH);
+        let _ = bench.missions.tell(|mission| {
             mission.handle_pose((0.0, 0.0));
             mission.handle_pose((1.0, 0.0));
         });
-        desk
+        bench
     }
 
     #[test]
     fn a_held_mission_goes_on_only_by_a_new_client_that_approves_it() {
-        let mut desk = driving(LostLink::Hold);
-        desk.rig.stand(State::Standby, None);
-        let report = desk.report();
+        let mut bench = driving(LostLink::Hold);
+        bench.rig.stand(State::Standby, None);
+        let report = bench.report();
         assert_eq!(report.stage, report_mission::Stage::AWAITING_APPROVAL);
-        desk.rig.stand(State::Standby, Some(STRANGER));
-        desk.rig.stand(State::Ready, Some(STRANGER));
+        bench.rig.stand(State::Standby, Some(STRANGER));
+        bench.rig.stand(State::Ready, Some(STRANGER));
         assert_eq!(
-            desk.report().stage,
+            bench.report().stage,
             report_mission::Stage::AWAITING_APPROVAL,
             "not by itself"
         );
-        desk.rig.send(STRANGER, &ApproveMission { mission: 1 });
-        assert_eq!(desk.report().stage, report_mission::Stage::MAP);
+        bench.rig.send(STRANGER, &ApproveMission { mission: 1 });
+        assert_eq!(bench.report().stage, report_mission::Stage::MAP);
     }
 
     #[test]
     fn an_emergency_ends_a_held_mission() {
-        let mut desk = driving(LostLink::Hold);
-        desk.rig.stand(State::Standby, None);
-        desk.rig.stand(State::Emergency, None);
-        assert_eq!(desk.report().stage, report_mission::Stage::STOPPED);
+        let mut bench = driving(LostLink::Hold);
+        bench.rig.stand(State::Standby, None);
+        bench.rig.stand(State::Emergency, None);
+        assert_eq!(bench.report().stage, report_mission::Stage::STOPPED);
     }
 
     #[test]
@@ -429,36 +429,36 @@ mod tests {
             (State::Standby, Some(CLIENT)),
             (State::Emergency, None),
         ] {
-            let mut desk = driving(LostLink::Return);
-            desk.rig.stand(State::Standby, None);
-            let now = desk.rig.now;
-            let _ = desk.missions.tell(|mission| {
+            let mut bench = driving(LostLink::Return);
+            bench.rig.stand(State::Standby, None);
+            let now = bench.rig.now;
+            let _ = bench.missions.tell(|mission| {
                 let run = mission.report().run;
                 mission.handle_lost_client(now, run, false);
             });
-            assert_eq!(desk.report().stage, report_mission::Stage::PATH);
-            desk.rig.stand(state, client);
-            assert_eq!(desk.report().stage, report_mission::Stage::STOPPED);
+            assert_eq!(bench.report().stage, report_mission::Stage::PATH);
+            bench.rig.stand(state, client);
+            assert_eq!(bench.report().stage, report_mission::Stage::STOPPED);
         }
     }
 
     #[test]
     fn the_operator_stops_it() {
-        let mut desk = Desk::new();
-        desk.go(3.0);
-        desk.rig.send(CLIENT, &StopMission {});
-        let report = desk.report();
+        let mut bench = Bench::new();
+        bench.go(3.0);
+        bench.rig.send(CLIENT, &StopMission {});
+        let report = bench.report();
         assert_eq!(report.stage, report_mission::Stage::STOPPED);
         assert_eq!(report.reason, "42.1.1 has stopped the mission");
     }
 
     #[test]
     fn a_long_reason_is_told_as_far_as_it_fits() {
-        let mut desk = Desk::new();
-        desk.go(3.0);
+        let mut bench = Bench::new();
+        bench.go(3.0);
         let reason = format!("x{}", "ä".repeat(200));
-        let _ = desk.missions.tell(|mission| mission.stop(&reason));
-        let told = desk.report().reason;
+        let _ = bench.missions.tell(|mission| mission.stop(&reason));
+        let told = bench.report().reason;
         assert_eq!(told.len(), 255);
         assert!(told.as_str().is_some_and(|told| reason.starts_with(told)));
     }

@@ -1,7 +1,7 @@
 //! Acceleration State Sensor: how the vehicle's velocity changes, along and about its own axes.
 
 use super::behaviour::Behaviour;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::Exchange;
 use super::wanted::Wanted;
 use jaus::codec::{Message, ServiceId};
@@ -39,7 +39,7 @@ impl Behaviour for AccelerationStateSensor {
         Handled::Yes
     }
 
-    fn handle_motion(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+    fn handle_motion(&mut self, _: &mut Controls, context: &mut Context<'_>) {
         context.changed::<QueryAccelerationState>();
         context.changed::<QueryAccelerationStateExt>();
     }
@@ -49,7 +49,7 @@ fn report(
     query: &QueryAccelerationState,
     exchange: &mut Exchange<'_, '_>,
 ) -> ReportAccelerationState {
-    let acceleration = exchange.cockpit.pilot.motion().acceleration;
+    let acceleration = exchange.controls.pilot.motion().acceleration;
     let wanted = Wanted(query.presence_vector.into());
     ReportAccelerationState {
         acceleration_x: wanted.real(0, acceleration.x, fields::AccelerationX::new),
@@ -69,7 +69,7 @@ fn report_ext(
     exchange: &mut Exchange<'_, '_>,
 ) -> ReportAccelerationStateExt {
     let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
-    let acceleration = exchange.cockpit.pilot.motion().acceleration;
+    let acceleration = exchange.controls.pilot.motion().acceleration;
     let wanted = Wanted(query.presence_vector.into());
     ReportAccelerationStateExt {
         acceleration_x: wanted.real(0, acceleration.x, ext::AccelerationX::new),

@@ -1,6 +1,6 @@
 //! What one mobility service has to say for itself; all else is the same for all of them.
 
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::Exchange;
 use jaus::codec::ServiceId;
 use jaus::service::{Context, Handled};
@@ -30,12 +30,12 @@ pub(super) trait Behaviour: Send {
     }
 
     /// The vehicle has moved: says which answers are others now.
-    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        let _ = (cockpit, context);
+    fn handle_motion(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
+        let _ = (controls, context);
     }
 
     /// The vehicle has been stopped: what was commanded, or kept in standby, counts no more.
-    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        let _ = (cockpit, context);
+    fn handle_stop(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
+        let _ = (controls, context);
     }
 }

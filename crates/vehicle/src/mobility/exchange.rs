@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::clock;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use crate::motion::{Goal, Ticket};
 use jaus::address::JausId;
 use jaus::codec::{Message, OutOfRange};
@@ -21,7 +21,7 @@ pub(super) struct Command<M> {
 /// One message, with the vehicle and the context in which it came.
 pub(super) struct Exchange<'a, 'c> {
     pub(super) now: Instant,
-    pub(super) cockpit: &'a mut Cockpit,
+    pub(super) controls: &'a mut Controls,
     pub(super) message: &'a Received,
     pub(super) context: &'a mut Context<'c>,
 }
@@ -46,19 +46,19 @@ impl Exchange<'_, '_> {
         };
         let message = self.read_if(may)?;
         let is_ready = self.context.standing().acts_for(self.message.source);
-        let acts = is_ready && !self.cockpit.is_in_trouble();
+        let acts = is_ready && !self.controls.is_in_trouble();
         Some(Command { message, acts })
     }
 
     /// Pursues a goal on behalf of the sender for as long as its command is valid.
     pub(super) fn pursue(&mut self, goal: Goal, validity: Validity) -> Ticket {
         self.accept(validity);
-        self.cockpit.pilot.pursue(goal)
+        self.controls.pilot.pursue(goal)
     }
 
     /// The sender's command is in force from now on.
     pub(super) fn accept(&mut self, validity: Validity) {
-        let guard = &mut self.cockpit.guard;
+        let guard = &mut self.controls.guard;
         guard.accept(self.now, self.message.source, validity);
     }
 
@@ -87,8 +87,8 @@ impl Exchange<'_, '_> {
 
     /// When the vehicle's motion was sampled, since the beginning of 1970; `None` without a clock.
     fn sampled_since_1970(&mut self) -> Option<Duration> {
-        let sampled_at = self.cockpit.pilot.motion().sampled_at;
-        let clock = self.cockpit.clock.as_mut()?;
+        let sampled_at = self.controls.pilot.motion().sampled_at;
+        let clock = self.controls.clock.as_mut()?;
         Some(clock.since_1970(self.now, sampled_at))
     }
 

@@ -2,7 +2,7 @@
 
 use super::behaviour::Behaviour;
 use super::both_versions;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::Exchange;
 use super::wanted::Wanted;
 use crate::motion::GlobalPose;
@@ -40,7 +40,7 @@ impl Behaviour for GlobalPoseSensor {
             }
             QueryGeomagneticProperty::CODE => {
                 let mut report = ReportGeomagneticProperty::default();
-                let variation = exchange.cockpit.magnetic_variation;
+                let variation = exchange.controls.magnetic_variation;
                 if report.set_magnetic_variation_rad(variation).is_ok() {
                     exchange.reply(&report);
                 }
@@ -57,7 +57,7 @@ impl Behaviour for GlobalPoseSensor {
             }
             SetGeomagneticProperty::CODE => {
                 if let Some(message) = exchange.configure::<SetGeomagneticProperty>() {
-                    exchange.cockpit.magnetic_variation = message.magnetic_variation_rad();
+                    exchange.controls.magnetic_variation = message.magnetic_variation_rad();
                     exchange.context.changed::<QueryGeomagneticProperty>();
                 }
             }
@@ -70,7 +70,7 @@ impl Behaviour for GlobalPoseSensor {
         Some(SetGlobalPose::NAME)
     }
 
-    fn handle_motion(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+    fn handle_motion(&mut self, _: &mut Controls, context: &mut Context<'_>) {
         changed(context);
     }
 }
@@ -81,14 +81,14 @@ fn changed(context: &mut Context<'_>) {
 }
 
 fn pose(exchange: &Exchange<'_, '_>) -> GlobalPose {
-    exchange.cockpit.pilot.global_pose()
+    exchange.controls.pilot.global_pose()
 }
 
 fn set(pose: GlobalPose, exchange: &mut Exchange<'_, '_>) {
     let (latitude, longitude, yaw) = (pose.latitude, pose.longitude, pose.yaw);
     tracing::info!(source = %exchange.message.source, latitude, longitude, yaw, "global pose set");
-    exchange.cockpit.pilot.set_global_pose(pose);
-    exchange.cockpit.handle_new_frame();
+    exchange.controls.pilot.set_global_pose(pose);
+    exchange.controls.handle_new_frame();
     changed(exchange.context);
 }
 

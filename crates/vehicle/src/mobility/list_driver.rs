@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 
 use super::behaviour::Behaviour;
 use super::both_versions;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::Exchange;
 use super::kind::Kind;
 use super::travel;
@@ -44,11 +44,11 @@ impl<K: Kind> Behaviour for ListDriver<K> {
         travel::tells_end_of(command)
     }
 
-    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        cockpit.work_off(context);
+    fn handle_motion(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
+        controls.work_off(context);
     }
 
-    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        cockpit.abandon(context);
+    fn handle_stop(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
+        controls.abandon(context);
     }
 }

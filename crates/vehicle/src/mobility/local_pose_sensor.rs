@@ -2,7 +2,7 @@
 
 use super::behaviour::Behaviour;
 use super::both_versions;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::Exchange;
 use super::wanted::Wanted;
 use crate::motion::Pose;
@@ -56,7 +56,7 @@ impl Behaviour for LocalPoseSensor {
         Some(SetLocalPose::NAME)
     }
 
-    fn handle_motion(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+    fn handle_motion(&mut self, _: &mut Controls, context: &mut Context<'_>) {
         changed(context);
     }
 }
@@ -67,14 +67,14 @@ fn changed(context: &mut Context<'_>) {
 }
 
 fn pose(exchange: &Exchange<'_, '_>) -> Pose {
-    exchange.cockpit.pilot.motion().pose
+    exchange.controls.pilot.motion().pose
 }
 
 fn set(pose: Pose, exchange: &mut Exchange<'_, '_>) {
     let (x, y, yaw) = (pose.x, pose.y, pose.yaw);
     tracing::info!(source = %exchange.message.source, x, y, yaw, "local pose set");
-    exchange.cockpit.pilot.set_pose(pose);
-    exchange.cockpit.handle_new_frame();
+    exchange.controls.pilot.set_pose(pose);
+    exchange.controls.handle_new_frame();
     changed(exchange.context);
 }
 

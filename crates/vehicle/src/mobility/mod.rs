@@ -23,7 +23,7 @@
 mod acceleration_state_sensor;
 mod behaviour;
 mod clock;
-mod cockpit;
+mod controls;
 mod exchange;
 mod global_pose_sensor;
 mod global_waypoint;

@@ -94,14 +94,14 @@ fn accept(elements: &Elements, codes: [u16; 2]) {
 }
 
 fn local(exchange: &Exchange<'_, '_>) -> Option<PathSegment> {
-    match exchange.cockpit.place()? {
+    match exchange.controls.place()? {
         Place::LocalPath(path) => Some(path),
         _ => None,
     }
 }
 
 fn global(exchange: &Exchange<'_, '_>) -> Option<PathSegment> {
-    match exchange.cockpit.place()? {
+    match exchange.controls.place()? {
         Place::GlobalPath(path) => Some(path),
         _ => None,
     }

@@ -2,7 +2,7 @@
 
 use super::behaviour::Behaviour;
 use super::both_versions;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::{Command, Exchange};
 use super::wanted::Wanted;
 use crate::motion::{Effort, Goal, Ticket};
@@ -35,7 +35,7 @@ impl Behaviour for PrimitiveDriver {
             }
             QueryWrenchEffort::CODE => {
                 if let Some(query) = exchange.query() {
-                    self.forget_what_others_replaced(exchange.cockpit);
+                    self.forget_what_others_replaced(exchange.controls);
                     exchange.reply(&self.report(&query));
                 }
             }
@@ -48,7 +48,7 @@ impl Behaviour for PrimitiveDriver {
         Some(SetWrenchEffort::NAME)
     }
 
-    fn handle_stop(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+    fn handle_stop(&mut self, _: &mut Controls, context: &mut Context<'_>) {
         *self = Self::default();
         context.changed::<QueryWrenchEffort>();
     }
@@ -71,10 +71,10 @@ impl PrimitiveDriver {
     }
 
     /// What another driver has replaced is no longer what the vehicle does.
-    fn forget_what_others_replaced(&mut self, cockpit: &Cockpit) {
+    fn forget_what_others_replaced(&mut self, controls: &Controls) {
         if self
             .ticket
-            .is_some_and(|ticket| !cockpit.pilot.pursues(ticket))
+            .is_some_and(|ticket| !controls.pilot.pursues(ticket))
         {
             *self = Self::default();
         }

@@ -1,7 +1,7 @@
 //! What the drivers that go to places do with the messages that all of them have: the travel speed,
 //! and the execution of a list.
 
-use super::cockpit::changed;
+use super::controls::changed;
 use super::exchange::{Command, Exchange};
 use jaus::codec::Message;
 use jaus::messages::mobility::set_travel_speed_ext::{Speed, SpeedSpeedOverGround};
@@ -54,7 +54,7 @@ pub(super) fn handle_list(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled
             }
         }
         QueryActiveElement::CODE => {
-            let element_uid = exchange.cockpit.travel.active().unwrap_or_default();
+            let element_uid = exchange.controls.travel.active().unwrap_or_default();
             exchange.reply(&ReportActiveElement { element_uid });
         }
         _ => return handle_query(code, exchange),
@@ -63,7 +63,7 @@ pub(super) fn handle_list(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled
 }
 
 fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
-    let speed = exchange.cockpit.travel.speed();
+    let speed = exchange.controls.travel.speed();
     match code {
         QueryTravelSpeed::CODE => {
             let mut report = ReportTravelSpeed::default();
@@ -82,9 +82,9 @@ fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
 /// A speed for a place; without a place there is nothing to drive to.
 fn set_speed(speed: f64, acts: bool, exchange: &mut Exchange<'_, '_>) {
     let source = exchange.message.source;
-    if exchange.cockpit.travel.has_place() {
+    if exchange.controls.travel.has_place() {
         tracing::info!(%source, speed, acts, "travel speed set");
-        exchange.cockpit.set_speed(speed, acts);
+        exchange.controls.set_speed(speed, acts);
         accept(exchange);
         changed(exchange.context);
     } else {
@@ -97,17 +97,17 @@ fn set_speed(speed: f64, acts: bool, exchange: &mut Exchange<'_, '_>) {
 fn execute(code: u16, uid: Option<u16>, speed: f64, acts: bool, exchange: &mut Exchange<'_, '_>) {
     let source = exchange.message.source;
     match uid {
-        Some(uid) if !exchange.cockpit.execute(uid, speed, acts) => {
+        Some(uid) if !exchange.controls.execute(uid, speed, acts) => {
             tracing::info!(%source, uid, "list not executed: there is no such element");
             return;
         }
         Some(uid) => {
             tracing::info!(%source, uid, speed, acts, "list executed");
-            exchange.cockpit.take_up(code, exchange.context);
+            exchange.controls.take_up(code, exchange.context);
         }
-        None if exchange.cockpit.travel.active().is_some() => {
+        None if exchange.controls.travel.active().is_some() => {
             tracing::info!(%source, speed, "travel speed of the list set");
-            exchange.cockpit.set_speed(speed, acts);
+            exchange.controls.set_speed(speed, acts);
         }
         None => tracing::info!(%source, "travel speed ignored: no list is executed"),
     }
@@ -117,7 +117,7 @@ fn execute(code: u16, uid: Option<u16>, speed: f64, acts: bool, exchange: &mut E
 
 /// A journey that has been set out on is in force until it is done.
 pub(super) fn accept(exchange: &mut Exchange<'_, '_>) {
-    if exchange.cockpit.is_travelling() {
+    if exchange.controls.is_travelling() {
         exchange.accept(Validity::UntilDone);
     }
 }

@@ -1,7 +1,7 @@
 //! Local and Global Vector Driver: keep a speed and a heading.
 
 use super::behaviour::Behaviour;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::{Command, Exchange};
 use super::wanted::Wanted;
 use crate::mobility::travel::metres_per_second;
@@ -58,9 +58,9 @@ impl Vector {
     }
 
     /// What is in force, or is kept in standby: nothing if another driver has replaced it.
-    fn current(&self, cockpit: &Cockpit) -> Self {
+    fn current(&self, controls: &Controls) -> Self {
         match self.ticket {
-            Some(ticket) if !cockpit.pilot.pursues(ticket) => Self::default(),
+            Some(ticket) if !controls.pilot.pursues(ticket) => Self::default(),
             _ => *self,
         }
     }
@@ -96,14 +96,14 @@ impl Behaviour for LocalVectorDriver {
             }
             QueryLocalVector::CODE => {
                 if let Some(query) = exchange.query::<QueryLocalVector>() {
-                    let vector = self.0.current(exchange.cockpit);
+                    let vector = self.0.current(exchange.controls);
                     let report = local(&vector, Wanted(query.presence_vector.into()));
                     exchange.reply_if(report);
                 }
             }
             QueryLocalVectorExt::CODE => {
                 if let Some(query) = exchange.query::<QueryLocalVectorExt>() {
-                    let vector = self.0.current(exchange.cockpit);
+                    let vector = self.0.current(exchange.controls);
                     let report = local_ext(&vector, Wanted(query.presence_vector.into()));
                     exchange.reply_if(report);
                 }
@@ -117,7 +117,7 @@ impl Behaviour for LocalVectorDriver {
         Some(SetLocalVector::NAME)
     }
 
-    fn handle_stop(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+    fn handle_stop(&mut self, _: &mut Controls, context: &mut Context<'_>) {
         *self = Self::default();
         changed(context);
     }
@@ -133,7 +133,7 @@ impl Behaviour for GlobalVectorDriver {
             SetGlobalVector::CODE => {
                 if let Some(Command { message, acts }) = exchange.command::<SetGlobalVector>() {
                     let speed = message.speed_m_per_s();
-                    let speed = speed.unwrap_or(self.0.current(exchange.cockpit).speed);
+                    let speed = speed.unwrap_or(self.0.current(exchange.controls).speed);
                     let vector = (speed, message.heading_rad());
                     self.0.set(vector, Heading::North, acts, exchange);
                 }
@@ -148,13 +148,13 @@ impl Behaviour for GlobalVectorDriver {
             }
             QueryGlobalVector::CODE => {
                 if let Some(query) = exchange.query::<QueryGlobalVector>() {
-                    let vector = self.0.current(exchange.cockpit);
+                    let vector = self.0.current(exchange.controls);
                     exchange.reply(&global(&vector, Wanted(query.presence_vector.into())));
                 }
             }
             QueryGlobalVectorExt::CODE => {
                 if let Some(query) = exchange.query::<QueryGlobalVectorExt>() {
-                    let vector = self.0.current(exchange.cockpit);
+                    let vector = self.0.current(exchange.controls);
                     let report = global_ext(&vector, Wanted(query.presence_vector.into()));
                     exchange.reply_if(report);
                 }
@@ -168,7 +168,7 @@ impl Behaviour for GlobalVectorDriver {
         Some(SetGlobalVector::NAME)
     }
 
-    fn handle_stop(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+    fn handle_stop(&mut self, _: &mut Controls, context: &mut Context<'_>) {
         *self = Self::default();
         changed(context);
     }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::acceleration_state_sensor::AccelerationStateSensor;
 use super::behaviour::Behaviour;
 use super::clock::SampleClock;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::Exchange;
 use super::global_pose_sensor::GlobalPoseSensor;
 use super::list_driver::ListDriver;
@@ -31,7 +31,7 @@ use jaus::service::{
 /// A vehicle as the mobility services see it. Cheap to clone; the clones are one vehicle.
 #[derive(Clone)]
 pub struct Vehicle {
-    cockpit: Arc<Mutex<Cockpit>>,
+    controls: Arc<Mutex<Controls>>,
 }
 
 impl Vehicle {
@@ -40,7 +40,7 @@ impl Vehicle {
     #[must_use]
     pub fn new(pilot: Pilot) -> Self {
         Self {
-            cockpit: Arc::new(Mutex::new(Cockpit::new(pilot))),
+            controls: Arc::new(Mutex::new(Controls::new(pilot))),
         }
     }
 
@@ -79,8 +79,8 @@ impl Vehicle {
     /// Whether it has done what it was driven to do.
     #[must_use]
     pub fn has_arrived(&self) -> bool {
-        let cockpit = self.lock();
-        cockpit.pilot.is_there() && cockpit.travel.active().is_none()
+        let controls = self.lock();
+        controls.pilot.is_there() && controls.travel.active().is_none()
     }
 
     /// How much of the list that it works off lies behind it, in percent.
@@ -218,8 +218,8 @@ impl Vehicle {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Cockpit> {
-        self.cockpit.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Controls> {
+        self.controls.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -281,17 +281,17 @@ impl Service for OnVehicle {
         let Some(code) = code_of(&message.payload) else {
             return Handled::No;
         };
-        let mut cockpit = self.vehicle.lock();
+        let mut controls = self.vehicle.lock();
         follow(
             now,
-            &mut cockpit,
+            &mut controls,
             &mut self.stops,
             self.behaviour.as_mut(),
             context,
         );
         let mut exchange = Exchange {
             now,
-            cockpit: &mut cockpit,
+            controls: &mut controls,
             message,
             context,
         };
@@ -299,33 +299,33 @@ impl Service for OnVehicle {
     }
 
     fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {
-        let mut cockpit = self.vehicle.lock();
+        let mut controls = self.vehicle.lock();
         follow(
             now,
-            &mut cockpit,
+            &mut controls,
             &mut self.stops,
             self.behaviour.as_mut(),
             context,
         );
-        let steps = cockpit.pilot.steps();
+        let steps = controls.pilot.steps();
         if self.steps != steps {
             self.steps = steps;
-            self.behaviour.handle_motion(&mut cockpit, context);
+            self.behaviour.handle_motion(&mut controls, context);
         }
     }
 
     fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
-        let mut cockpit = self.vehicle.lock();
-        cockpit.halt(cause);
-        self.stops = cockpit.stops;
-        self.behaviour.handle_stop(&mut cockpit, context);
+        let mut controls = self.vehicle.lock();
+        controls.halt(cause);
+        self.stops = controls.stops;
+        self.behaviour.handle_stop(&mut controls, context);
     }
 
     /// What was kept in standby does not come into force when the component is made ready.
     fn handle_standing(&mut self, _: Instant, before: &Standing, context: &mut Context<'_>) {
         if context.standing().may_act() && !before.may_act() {
-            let mut cockpit = self.vehicle.lock();
-            self.behaviour.handle_stop(&mut cockpit, context);
+            let mut controls = self.vehicle.lock();
+            self.behaviour.handle_stop(&mut controls, context);
         }
     }
 
@@ -350,22 +350,22 @@ impl Service for OnVehicle {
     }
 
     fn poll_timeout(&self) -> Option<Instant> {
-        let cockpit = self.vehicle.lock();
-        let ends = [cockpit.pilot.poll_timeout(), cockpit.guard.expires_at()];
-        ends.into_iter().flatten().min().or(cockpit.next_look())
+        let controls = self.vehicle.lock();
+        let ends = [controls.pilot.poll_timeout(), controls.guard.expires_at()];
+        ends.into_iter().flatten().min().or(controls.next_look())
     }
 }
 
 /// Moves the vehicle on to `now`, and has a service follow if that stopped it.
 fn follow(
     now: Instant,
-    cockpit: &mut Cockpit,
+    controls: &mut Controls,
     stops: &mut u64,
     behaviour: &mut dyn Behaviour,
     context: &mut Context<'_>,
 ) {
-    cockpit.advance(now, context);
-    if std::mem::replace(stops, cockpit.stops) != cockpit.stops {
-        behaviour.handle_stop(cockpit, context);
+    controls.advance(now, context);
+    if std::mem::replace(stops, controls.stops) != controls.stops {
+        behaviour.handle_stop(controls, context);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::behaviour::Behaviour;
 use super::both_versions;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::Exchange;
 use super::wanted::Wanted;
 use crate::motion::{Acceleration, Goal, Limits, Ticket, Velocity};
@@ -108,12 +108,12 @@ impl Behaviour for VelocityStateDriver {
         Some(SetVelocityCommand::NAME)
     }
 
-    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
+    fn handle_stop(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
         self.current = Velocity::default();
         self.ticket = None;
         if context.standing().state == State::Initialize {
             self.default = Velocity::default();
-            cockpit.pilot.reset_limits();
+            controls.pilot.reset_limits();
         }
         changed(context);
     }
@@ -139,13 +139,13 @@ impl VelocityStateDriver {
             tracing::debug!(%source, command_type, "unknown kind of velocity command");
             return;
         };
-        let velocity = wanted(self.velocity(which, exchange.cockpit));
-        let pilot = &mut exchange.cockpit.pilot;
+        let velocity = wanted(self.velocity(which, exchange.controls));
+        let pilot = &mut exchange.controls.pilot;
         let limits = *pilot.limits();
         match which {
             Which::Current => {
                 let acts = exchange.context.standing().acts_for(source)
-                    && !exchange.cockpit.is_in_trouble();
+                    && !exchange.controls.is_in_trouble();
                 tracing::debug!(%source, x = velocity.x, yaw = velocity.yaw, acts, "velocity set");
                 self.current = velocity;
                 let goal = Goal::Velocity(velocity);
@@ -165,11 +165,11 @@ impl VelocityStateDriver {
         changed(exchange.context);
     }
 
-    fn velocity(&self, which: Which, cockpit: &Cockpit) -> Velocity {
-        let limits = cockpit.pilot.limits();
+    fn velocity(&self, which: Which, controls: &Controls) -> Velocity {
+        let limits = controls.pilot.limits();
         match which {
             Which::Current => match self.ticket {
-                Some(ticket) if !cockpit.pilot.pursues(ticket) => Velocity::default(),
+                Some(ticket) if !controls.pilot.pursues(ticket) => Velocity::default(),
                 _ => self.current,
             },
             Which::Greatest => Velocity::forward(limits.speed, limits.yaw_rate),
@@ -182,7 +182,7 @@ impl VelocityStateDriver {
         let Some(which) = Which::of(query.command_type) else {
             return;
         };
-        let velocity = self.velocity(which, exchange.cockpit);
+        let velocity = self.velocity(which, exchange.controls);
         let wanted = Wanted(query.presence_vector.into());
         exchange.reply(&ReportVelocityCommand {
             command_type: command::CommandType(query.command_type),
@@ -199,7 +199,7 @@ impl VelocityStateDriver {
         let Some(which) = Which::of(query.command_type) else {
             return;
         };
-        let velocity = self.velocity(which, exchange.cockpit);
+        let velocity = self.velocity(which, exchange.controls);
         let wanted = Wanted(query.presence_vector.into());
         exchange.reply(&ReportVelocityCommandExt {
             command_type: ext::CommandType(query.command_type),
@@ -216,7 +216,7 @@ impl VelocityStateDriver {
 /// Narrows the acceleration. A limit for slowing down may come with either sign. One of 0 would
 /// leave the vehicle without brakes, and is ignored.
 fn limit_acceleration(message: &SetAccelerationLimit, exchange: &mut Exchange<'_, '_>) {
-    let pilot = &mut exchange.cockpit.pilot;
+    let pilot = &mut exchange.controls.pilot;
     let limits = *pilot.limits();
     let along = message.acceleration_x_m_per_s2().map(f64::abs);
     let along = along.filter(|&along| along > LEAST_ACCELERATION);
@@ -242,7 +242,7 @@ fn limit_acceleration(message: &SetAccelerationLimit, exchange: &mut Exchange<'_
 const LEAST_ACCELERATION: f64 = 0.01;
 
 fn report_limit(query: &QueryAccelerationLimit, exchange: &mut Exchange<'_, '_>) {
-    let limits = *exchange.cockpit.pilot.limits();
+    let limits = *exchange.controls.pilot.limits();
     let (x, yaw) = match query.command_type {
         SPEEDING_UP => (limits.acceleration, limits.yaw_acceleration),
         SLOWING_DOWN => (-limits.deceleration, -limits.yaw_acceleration),

@@ -2,7 +2,7 @@
 
 use super::behaviour::Behaviour;
 use super::both_versions;
-use super::cockpit::Cockpit;
+use super::controls::Controls;
 use super::exchange::Exchange;
 use super::wanted::Wanted;
 use jaus::codec::{Message, ServiceId};
@@ -44,14 +44,14 @@ impl Behaviour for VelocityStateSensor {
         Handled::Yes
     }
 
-    fn handle_motion(&mut self, _: &mut Cockpit, context: &mut Context<'_>) {
+    fn handle_motion(&mut self, _: &mut Controls, context: &mut Context<'_>) {
         context.changed::<QueryVelocityState>();
         context.changed::<QueryVelocityStateExt>();
     }
 }
 
 fn report(query: &QueryVelocityState, exchange: &mut Exchange<'_, '_>) -> ReportVelocityState {
-    let velocity = exchange.cockpit.pilot.motion().velocity;
+    let velocity = exchange.controls.pilot.motion().velocity;
     let wanted = Wanted(query.presence_vector.into());
     ReportVelocityState {
         velocity_x: wanted.real(0, velocity.x, VelocityX::new),
@@ -71,7 +71,7 @@ fn report_ext(
     exchange: &mut Exchange<'_, '_>,
 ) -> ReportVelocityStateExt {
     let (seconds, nanoseconds) = exchange.seconds_and_nanoseconds();
-    let velocity = exchange.cockpit.pilot.motion().velocity;
+    let velocity = exchange.controls.pilot.motion().velocity;
     let wanted = Wanted(query.velocity_var_presence_vector.into());
     let along = VelocityVehicleXyzRec {
         velocity_x: wanted.real(0, velocity.x, VelocityX::new),

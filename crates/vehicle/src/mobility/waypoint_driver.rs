@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use super::behaviour::Behaviour;
 use super::both_versions;
-use super::cockpit::{Cockpit, changed};
+use super::controls::{Controls, changed};
 use super::exchange::{Command, Exchange};
 use super::kind::Waypoints;
 use super::place::Place;
@@ -45,12 +45,12 @@ impl<K: Waypoints> Behaviour for WaypointDriver<K> {
         command == K::Set::CODE || command == K::SetExt::CODE
     }
 
-    fn handle_motion(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        cockpit.work_off(context);
+    fn handle_motion(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
+        controls.work_off(context);
     }
 
-    fn handle_stop(&mut self, cockpit: &mut Cockpit, context: &mut Context<'_>) {
-        cockpit.abandon(context);
+    fn handle_stop(&mut self, controls: &mut Controls, context: &mut Context<'_>) {
+        controls.abandon(context);
     }
 }
 
@@ -61,13 +61,13 @@ fn set<M: Message + Into<Place>>(command: Option<Command<M>>, exchange: &mut Exc
     };
     let place = message.into();
     let source = exchange.message.source;
-    if !exchange.cockpit.can_reach(&place) {
+    if !exchange.controls.can_reach(&place) {
         tracing::warn!(%source, ?place, "waypoint ignored: it is out of reach");
         return;
     }
     tracing::info!(%source, ?place, "waypoint set");
-    let cockpit = &mut exchange.cockpit;
-    cockpit.set_place(place, M::CODE, acts, exchange.context);
+    let controls = &mut exchange.controls;
+    controls.set_place(place, M::CODE, acts, exchange.context);
     travel::accept(exchange);
     changed(exchange.context);
 }

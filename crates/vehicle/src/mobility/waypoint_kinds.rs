@@ -31,7 +31,7 @@ impl Kind for Global {
     }
 
     fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
-        let Some(Place::Global(waypoint)) = exchange.cockpit.place() else {
+        let Some(Place::Global(waypoint)) = exchange.controls.place() else {
             return Handled::No;
         };
         match code {
@@ -69,7 +69,7 @@ impl Kind for Local {
     }
 
     fn handle_query(code: u16, exchange: &mut Exchange<'_, '_>) -> Handled {
-        let Some(Place::Local(waypoint)) = exchange.cockpit.place() else {
+        let Some(Place::Local(waypoint)) = exchange.controls.place() else {
             return Handled::No;
         };
         match code {

@@ -88,8 +88,8 @@ pub struct Pilot {
     trouble: Option<Trouble>,
 }
 
-/// What a course wants of the platform.
-enum Wish {
+/// What a course demands of the platform.
+enum Setpoint {
     Drive(Drive),
     Head { heading: f64, speed: f64 },
 }
@@ -376,13 +376,13 @@ impl Pilot {
         let pose = self.motion().pose;
         let limits = self.limits;
         let north = -self.frame.heading;
-        let wish = match &mut self.course {
+        let setpoint = match &mut self.course {
             Some(course) => course.command(&pose, north, &limits),
-            None => Wish::Drive(Drive::Stop),
+            None => Setpoint::Drive(Drive::Stop),
         };
-        match wish {
-            Wish::Drive(command) => self.drive(command),
-            Wish::Head { heading, speed } => {
+        match setpoint {
+            Setpoint::Drive(command) => self.drive(command),
+            Setpoint::Head { heading, speed } => {
                 self.command = Drive::Velocity(Velocity::forward(speed, 0.0));
                 self.platform.head(heading, speed, &limits);
             }
@@ -398,9 +398,9 @@ impl Pilot {
     }
 }
 
-fn head_for(pose: &Pose, to: (f64, f64), speed: f64, way: f64, limits: &Limits) -> Wish {
+fn head_for(pose: &Pose, to: (f64, f64), speed: f64, way: f64, limits: &Limits) -> Setpoint {
     let (heading, speed) = towards(pose, to, speed, way, limits);
-    Wish::Head { heading, speed }
+    Setpoint::Head { heading, speed }
 }
 
 impl Drop for Pilot {
@@ -422,11 +422,11 @@ impl Goal {
 
 impl Course {
     /// What to do now; notes the arrival.
-    fn command(&mut self, pose: &Pose, north: f64, limits: &Limits) -> Wish {
+    fn command(&mut self, pose: &Pose, north: f64, limits: &Limits) -> Setpoint {
         match self.goal {
-            Goal::Effort(effort) => Wish::Drive(Drive::Effort(effort)),
-            Goal::Velocity(velocity) => Wish::Drive(Drive::Velocity(velocity)),
-            Goal::Vector { speed, heading } => Wish::Head {
+            Goal::Effort(effort) => Setpoint::Drive(Drive::Effort(effort)),
+            Goal::Velocity(velocity) => Setpoint::Drive(Drive::Velocity(velocity)),
+            Goal::Vector { speed, heading } => Setpoint::Head {
                 heading: match heading {
                     Some(Heading::Local(heading)) => heading,
                     Some(Heading::North(heading)) => heading + north,
@@ -457,13 +457,13 @@ impl Course {
         speed: f64,
         goes_on: bool,
         limits: &Limits,
-    ) -> Wish {
+    ) -> Setpoint {
         self.has_arrived |= to.is_reached(pose) && (goes_on || to.heading.is_none());
         match to.heading {
             Some(heading) if !goes_on && (self.is_turning || to.is_reached(pose)) => {
                 self.turn(pose, heading, limits)
             }
-            _ if self.has_arrived && !goes_on => Wish::Drive(Drive::Stop),
+            _ if self.has_arrived && !goes_on => Setpoint::Drive(Drive::Stop),
             _ => {
                 let distance = pose.distance(to.x, to.y);
                 let way = if goes_on { f64::INFINITY } else { distance };
@@ -473,16 +473,16 @@ impl Course {
     }
 
     /// At the waypoint, turns to the heading that is wanted there.
-    fn turn(&mut self, pose: &Pose, heading: f64, limits: &Limits) -> Wish {
+    fn turn(&mut self, pose: &Pose, heading: f64, limits: &Limits) -> Setpoint {
         // From here on it turns, even should it slip out of the tolerance.
         self.is_turning = true;
         let error = wrap(heading - pose.yaw).abs();
         self.has_arrived |= error <= Waypoint::HEADING_TOLERANCE;
         if self.has_arrived {
-            return Wish::Drive(Drive::Stop);
+            return Setpoint::Drive(Drive::Stop);
         }
         let turn = Velocity::forward(0.0, turn_rate(pose.yaw, heading, limits));
-        Wish::Drive(Drive::Velocity(turn))
+        Setpoint::Drive(Drive::Velocity(turn))
     }
 
     fn follow(
@@ -492,10 +492,10 @@ impl Course {
         speed: f64,
         goes_on: bool,
         limits: &Limits,
-    ) -> Wish {
+    ) -> Setpoint {
         self.has_arrived |= self.ahead.len() <= 2 && end.is_reached(pose);
         if self.has_arrived && !goes_on {
-            return Wish::Drive(Drive::Stop);
+            return Setpoint::Drive(Drive::Stop);
         }
         let look = Self::LOOK_AHEAD.max(speed * Self::LOOK_AHEAD_TIME);
         self.pass(pose, look);

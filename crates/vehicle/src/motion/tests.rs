@@ -254,9 +254,9 @@ fn whoever_is_told_to_stop_stops_within_its_brakes_and_then_wants_no_more_time()
 #[test]
 fn a_platform_whose_pilot_goes_away_is_told_to_stop() {
     /// A platform that shows what it was told last.
-    struct Told(Arc<Mutex<Drive>>);
+    struct Reported(Arc<Mutex<Drive>>);
 
-    impl Platform for Told {
+    impl Platform for Reported {
         fn handle_time(&mut self, _: Instant) {}
         fn motion(&self) -> Motion {
             Motion::default()
@@ -273,7 +273,7 @@ fn a_platform_whose_pilot_goes_away_is_told_to_stop() {
 
     let told = Arc::new(Mutex::new(Drive::Stop));
     let mut track = Track::new();
-    track.pilot = Pilot::new(Told(told.clone()), Frame::default());
+    track.pilot = Pilot::new(Reported(told.clone()), Frame::default());
     track.pilot.handle_time(track.now);
     let forward = Velocity::forward(1.0, 0.0);
     track.pilot.pursue(Goal::Velocity(forward));

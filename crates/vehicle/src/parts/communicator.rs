@@ -9,7 +9,7 @@ use std::convert::Infallible;
 use std::future::pending;
 use std::net::SocketAddr;
 
-use super::{Part, PartError, Seat};
+use super::{Part, PartError, Slot};
 use jaus::component::{Component, Watch};
 use jaus::endpoint::{Event, Remote};
 use jaus::node::{ComponentEvents, Events, Node};
@@ -35,15 +35,15 @@ pub struct Communicator {
 }
 
 impl Part for Communicator {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
-        let Some(node) = seat.node.clone() else {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
+        let Some(node) = slot.node.clone() else {
             let words = "the communicator is the host's node itself: leave --attach out, and say \
                          --local for others to attach";
             return Err(PartError::Broken(words.to_owned()));
         };
         let news = (node.events(), node.component_events());
         let _journal = self.start_journal(&node)?;
-        let component = seat.component("Communicator").live_on(seat.port)?;
+        let component = slot.component("Communicator").live_on(slot.port)?;
         tell_place(&node, self.log.as_ref());
         let view = self.serve(&node, &component).await?;
         tokio::pin!(view);

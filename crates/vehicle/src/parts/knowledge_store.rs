@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use bytes::Bytes;
 use tokio::sync::mpsc;
 
-use super::{Part, PartError, Seat};
+use super::{Part, PartError, Slot};
 use crate::ground::WorldStore;
 use crate::motion::Frame;
 use crate::world::{Change, Done, OpenError, Picture, Raster, World};
@@ -78,7 +78,7 @@ impl KnowledgeStore {
 }
 
 impl Part for KnowledgeStore {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let frame = self.frame;
         let opening = tokio::task::spawn_blocking(move || self.open());
         let world = opening.await.map_err(|_| PartError::NodeStopped)??;
@@ -87,11 +87,11 @@ impl Part for KnowledgeStore {
             // Without a listener the part has ended already.
             let _ = fail.send(error.to_string());
         });
-        let component = seat
+        let component = slot
             .component("Vector Knowledge Store")
             .offer(store.vector_knowledge_store())
             .offer(store.raster_maps())
-            .live_on(seat.port)?;
+            .live_on(slot.port)?;
         // Whoever holds the store beside the component would keep the file open after its end.
         drop(store);
         tokio::select! {

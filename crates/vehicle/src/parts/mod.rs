@@ -1,7 +1,7 @@
 //! Ready components of a ground vehicle: what the programs `jaus-…` run, and what a system in one
 //! process is put together from.
 //!
-//! A [`Part`] is a set of plain settings with sensible defaults. Given a [`Seat`] on a node it runs
+//! A [`Part`] is a set of plain settings with sensible defaults. Given a [`Slot`] on a node it runs
 //! until it is dropped. Parts find each other by discovery alone, in any order of start, and go on
 //! when another one is started again.
 
@@ -41,12 +41,12 @@ pub use velocity_sensor::VelocitySensor;
 /// A ready component: what it is to do, not yet running.
 pub trait Part: Send + 'static {
     /// Runs, and ends only when it can not go on. Dropping the future stops the component.
-    fn run(self, seat: Seat) -> impl Future<Output = Result<Infallible, PartError>> + Send;
+    fn run(self, slot: Slot) -> impl Future<Output = Result<Infallible, PartError>> + Send;
 }
 
 /// A component's place on a node, and what its subsystem is called.
 #[derive(Debug)]
-pub struct Seat {
+pub struct Slot {
     /// Its door to the node.
     pub port: Port,
     /// The node, if it is in the same process.
@@ -57,8 +57,8 @@ pub struct Seat {
     pub name: String,
 }
 
-impl Seat {
-    /// A component of the seat's subsystem, to be [brought to life](Builder::live_on) on its port.
+impl Slot {
+    /// A component of this subsystem, to be [started](Builder::live_on) on the slot's port.
     pub fn component(&self, name: &str) -> Builder {
         Component::builder(self.kind, self.name.clone()).component_name(name)
     }

@@ -4,9 +4,10 @@ use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
 use super::drivers::{
-    FaultMonitor, Helm, HelmSettings, Language, Next, Order, Sense, guard, shut_down,
+    FaultMonitor, Language, Next, Order, RemotePlatform, RemotePlatformSettings, Sense, guard,
+    shut_down,
 };
-use super::{Part, PartError, Seat};
+use super::{Part, PartError, Slot};
 use crate::ground::StageBoard;
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, Limits, Motion, Pilot};
@@ -50,27 +51,27 @@ impl PathDriver {
 }
 
 impl Part for PathDriver {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
-        let helm = Helm::new(HelmSettings {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
+        let remote_platform = RemotePlatform::new(RemotePlatformSettings {
             limits: self.limits,
             stale: self.stale,
             by_heading: true,
         });
-        let vehicle = Vehicle::new(Pilot::new(helm.clone(), Frame::default()));
+        let vehicle = Vehicle::new(Pilot::new(remote_platform.clone(), Frame::default()));
         let board = StageBoard::default();
-        let component = seat
+        let component = slot
             .component("Local Path Segment Driver")
             .management(guard(self.control_timeout))
             .offer(vehicle.list_manager())
             .offer(vehicle.local_path_segment_driver())
             .offer(board.service())
-            .live_on(seat.port)?;
+            .live_on(slot.port)?;
         let poses = Sense::pose(&component, Self::HZ)?;
         let own = component.clone();
         let next = Next {
             component,
             vehicle,
-            helm: helm.clone(),
+            remote_platform: remote_platform.clone(),
             board,
             language: Vectors,
             authority: self.authority,
@@ -79,7 +80,7 @@ impl Part for PathDriver {
             sensors: FaultMonitor::default(),
         };
         tokio::select! {
-            end = poses.steer(&helm) => end,
+            end = poses.steer(&remote_platform) => end,
             end = next.run() => end,
             end = shut_down(&own) => end,
         }

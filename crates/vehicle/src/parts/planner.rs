@@ -7,9 +7,9 @@
 #![expect(clippy::disallowed_methods, reason = "here patience is counted")]
 
 pub(super) mod chain;
-mod desk;
 mod hand_over;
 pub(super) mod map;
+mod task;
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -18,12 +18,12 @@ use std::time::Duration;
 use tokio::sync::{Notify, mpsc};
 
 use super::drivers::{Sense, shut_down};
-use super::{Part, PartError, Seat};
+use super::{Part, PartError, Slot};
 use crate::ground::Missions;
 use crate::mission::{Link, Settings, Vehicle};
-use desk::Desk;
 use jaus::address::JausId;
 use jaus::component::{AccessControl, Component, Management};
+use task::PlannerTask;
 
 /// The settings of a planner.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,23 +57,23 @@ impl Default for Planner {
 }
 
 impl Part for Planner {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let wake = Arc::new(Notify::new());
         let waker = Arc::clone(&wake);
         let missions = Missions::new(self.mission, move || waker.notify_one());
         let control = AccessControl::new().authority(self.least_authority);
-        let component = seat
+        let component = slot
             .component("Planner")
             .management(Management::new().access_control(control))
             .offer(missions.service())
-            .live_on(seat.port)?;
-        let (tell, news) = mpsc::channel(Desk::NEWS);
-        let desk = Desk::new(&self, &component, missions, &wake);
+            .live_on(slot.port)?;
+        let (tell, news) = mpsc::channel(PlannerTask::NEWS);
+        let task = PlannerTask::new(&self, &component, missions, &wake);
         let watch = |link| chain::watch(&component, link, &tell);
         let poses = Sense::pose(&component, POSES)?;
         // They go on until one of them can not.
         tokio::select! {
-            () = desk.work(news) => {}
+            () = task.work(news) => {}
             () = watch(Link::Path) => {}
             () = watch(Link::Vector) => {}
             () = watch(Link::Primitive) => {}

@@ -13,7 +13,7 @@ use tokio::time::timeout;
 use super::drivers::{Freshness, Sense};
 use super::keeper::{Keeper, keeper};
 use super::pose_file::{self, Kept};
-use super::{Part, PartError, Seat};
+use super::{Part, PartError, Slot};
 use crate::mobility::Vehicle;
 use crate::motion::{DeadReckoning, Frame, Motion, Observed, Pilot, Pose, WheelCount};
 use jaus::component::{AccessControl, Component};
@@ -49,16 +49,16 @@ impl Default for PoseSensor {
 }
 
 impl Part for PoseSensor {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let reckoning = self.begin().await?;
         let observed = Observed::new(standing(unknown(), None));
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
             .with_clock(super::host_clock());
-        let component = seat
+        let component = slot
             .component("Local Pose Sensor")
             .access_control(AccessControl::new())
             .offer(vehicle.local_pose_sensor())
-            .live_on(seat.port)?;
+            .live_on(slot.port)?;
         let query = QueryWheelOdometry {};
         let counts = Sense::of(
             &component,

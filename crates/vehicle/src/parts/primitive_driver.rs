@@ -12,7 +12,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use super::drivers::{FaultMonitor, Watchman, guard, shut_down};
 use super::stop_line::StopLine;
-use super::{Part, PartError, Seat};
+use super::{Part, PartError, Slot};
 use crate::actuator::{
     Actuator, Interlock, MotorConfig, Odometer, SimulatedMotor, StopFile, StopInput, Wheels,
     WheelsConfig,
@@ -162,10 +162,10 @@ impl GpioMotors {
 }
 
 impl Part for PrimitiveDriver {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let [left, right] = self.motors.start()?;
         let stop = self.stop.as_ref().map(Stop::open).transpose()?;
-        self.run_on(Hardware { left, right, stop }, seat).await
+        self.run_on(Hardware { left, right, stop }, slot).await
     }
 }
 
@@ -175,7 +175,7 @@ impl PrimitiveDriver {
     ///
     /// # Errors
     /// Why it cannot go on.
-    pub async fn run_on(self, hardware: Hardware, seat: Seat) -> Result<Infallible, PartError> {
+    pub async fn run_on(self, hardware: Hardware, slot: Slot) -> Result<Infallible, PartError> {
         let Hardware { left, right, stop } = hardware;
         let interlock = Interlock::default();
         let stop = stop.map(|input| StopLine::start(input, interlock.clone()));
@@ -189,13 +189,13 @@ impl PrimitiveDriver {
         let policy = MotionPolicy::Expire(self.silence);
         let vehicle = Vehicle::new(pilot).motion_policy(policy);
         let board = StageBoard::default();
-        let component = seat
+        let component = slot
             .component("Primitive Driver")
             .management(guard(self.control_timeout))
             .offer(vehicle.primitive_driver())
             .offer(WheelOdometry::new(odometer.clone(), vehicle.clone()))
             .offer(board.service())
-            .live_on(seat.port)?;
+            .live_on(slot.port)?;
         let driver = Running {
             component,
             vehicle,

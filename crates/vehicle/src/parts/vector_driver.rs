@@ -4,9 +4,10 @@ use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
 use super::drivers::{
-    FaultMonitor, Helm, HelmSettings, Language, Next, Order, Sense, guard, shut_down,
+    FaultMonitor, Language, Next, Order, RemotePlatform, RemotePlatformSettings, Sense, guard,
+    shut_down,
 };
-use super::{Part, PartError, Seat};
+use super::{Part, PartError, Slot};
 use crate::ground::StageBoard;
 use crate::mobility::Vehicle;
 use crate::motion::{Effort, Frame, Limits, Motion, Pilot, Throttle};
@@ -49,28 +50,28 @@ impl VectorDriver {
 }
 
 impl Part for VectorDriver {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
-        let helm = Helm::new(HelmSettings {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
+        let remote_platform = RemotePlatform::new(RemotePlatformSettings {
             limits: self.limits,
             stale: self.stale,
             by_heading: false,
         });
-        let pilot = Pilot::new(helm.clone(), Frame::default());
+        let pilot = Pilot::new(remote_platform.clone(), Frame::default());
         let vehicle = Vehicle::new(pilot);
         let board = StageBoard::default();
-        let component = seat
+        let component = slot
             .component("Local Vector Driver")
             .management(guard(self.control_timeout))
             .offer(vehicle.local_vector_driver())
             .offer(board.service())
-            .live_on(seat.port)?;
+            .live_on(slot.port)?;
         let poses = Sense::pose(&component, Self::HZ)?;
         let velocities = Sense::velocity(&component, Self::HZ)?;
         let own = component.clone();
         let next = Next {
             component,
             vehicle,
-            helm: helm.clone(),
+            remote_platform: remote_platform.clone(),
             board,
             language: Efforts(Throttle::new(self.limits)),
             authority: self.authority,
@@ -78,8 +79,8 @@ impl Part for VectorDriver {
             sensors: FaultMonitor::default(),
         };
         tokio::select! {
-            end = poses.steer(&helm) => end,
-            end = velocities.steer(&helm) => end,
+            end = poses.steer(&remote_platform) => end,
+            end = velocities.steer(&remote_platform) => end,
             end = next.run() => end,
             end = shut_down(&own) => end,
         }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use tokio::time::timeout;
 
 use super::drivers::{Freshness, Sense};
-use super::{Part, PartError, Seat};
+use super::{Part, PartError, Slot};
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, Motion, Observed, Pilot, Speedometer, Velocity, WheelCount};
 use jaus::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
@@ -38,14 +38,14 @@ impl Default for VelocitySensor {
 }
 
 impl Part for VelocitySensor {
-    async fn run(self, seat: Seat) -> Result<Infallible, PartError> {
+    async fn run(self, slot: Slot) -> Result<Infallible, PartError> {
         let observed = Observed::new(moving(unknown(), None));
         let vehicle = Vehicle::new(Pilot::new(observed.clone(), Frame::default()))
             .with_clock(super::host_clock());
-        let component = seat
+        let component = slot
             .component("Velocity State Sensor")
             .offer(vehicle.velocity_state_sensor())
-            .live_on(seat.port)?;
+            .live_on(slot.port)?;
         let query = QueryWheelOdometry {};
         let mut counts: Sense<ReportWheelOdometry> = Sense::of(
             &component,

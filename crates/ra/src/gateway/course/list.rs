@@ -45,12 +45,12 @@ pub(in crate::gateway) struct Course {
     told_speed: Option<Bytes>,
     /// Whether it tells its speed, as far as is known.
     pub(in crate::gateway) tells_speed: bool,
-    said: Said,
+    said: Effects,
 }
 
 /// What is to be sent, told and counted.
 #[derive(Debug, Default)]
-pub(in crate::gateway) struct Said {
+pub(in crate::gateway) struct Effects {
     /// Answers to the client whose message was handled.
     pub(in crate::gateway) answers: Vec<Bytes>,
     /// Code and data of messages for the driver.
@@ -111,7 +111,7 @@ impl Course {
             speed: None,
             told_speed: None,
             tells_speed: true,
-            said: Said::default(),
+            said: Effects::default(),
         }
     }
 
@@ -242,7 +242,7 @@ impl Course {
     }
 
     /// What is to be sent and counted since this was asked last.
-    pub(in crate::gateway) fn take_said(&mut self) -> Said {
+    pub(in crate::gateway) fn take_said(&mut self) -> Effects {
         std::mem::take(&mut self.said)
     }
 

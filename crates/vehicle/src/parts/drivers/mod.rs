@@ -3,15 +3,15 @@
 
 mod fault_monitor;
 mod freshness;
-mod helm;
 mod next;
+mod remote_platform;
 mod senses;
 mod standing;
 mod verdict;
 
 pub(super) use fault_monitor::FaultMonitor;
 pub(super) use freshness::Freshness;
-pub(super) use helm::{Helm, HelmSettings, Order};
 pub(super) use next::{Language, Next};
+pub(super) use remote_platform::{Order, RemotePlatform, RemotePlatformSettings};
 pub(super) use senses::Sense;
 pub(super) use standing::{Watchman, guard, shut_down};

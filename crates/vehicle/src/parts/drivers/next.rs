@@ -15,8 +15,8 @@ use std::time::{Duration, Instant};
 
 use tokio::time::{Interval, MissedTickBehavior, interval, sleep, timeout};
 
-use super::helm::{Helm, Order, Plan};
-use super::verdict::{Told, Verdict, judge};
+use super::remote_platform::{Order, Plan, RemotePlatform};
+use super::verdict::{DriverStatus, Verdict, judge};
 use super::{FaultMonitor, Watchman};
 use crate::ground::{StageBoard, StageReport, StageState};
 use crate::mobility::Vehicle;
@@ -52,7 +52,7 @@ pub(in crate::parts) trait Language: Send + 'static {
 pub(in crate::parts) struct Next<L> {
     pub(in crate::parts) component: Component,
     pub(in crate::parts) vehicle: Vehicle,
-    pub(in crate::parts) helm: Helm,
+    pub(in crate::parts) remote_platform: RemotePlatform,
     pub(in crate::parts) board: StageBoard,
     pub(in crate::parts) language: L,
     /// The authority with which the next one is controlled.
@@ -124,7 +124,7 @@ impl<L: Language> Next<L> {
         mut down: Option<String>,
     ) {
         let before = self.component.standing();
-        while self.helm.plan(Instant::now()) == Plan::Rest {
+        while self.remote_platform.plan(Instant::now()) == Plan::Rest {
             let standing = self.component.standing();
             watchman.note(standing);
             if standing.controller != before.controller {
@@ -245,7 +245,7 @@ impl<L: Language> Next<L> {
         loop {
             watchman.note(self.component.standing());
             let now = Instant::now();
-            let command = match self.helm.plan(now) {
+            let command = match self.remote_platform.plan(now) {
                 Plan::Go(order, motion) => {
                     busy = now;
                     self.check_sensors(None).await;
@@ -294,7 +294,11 @@ impl<L: Language> Next<L> {
         let now = Instant::now();
         let condition = match lack {
             Some(why) => self.sensors.lacks(now, why, FaultMonitor::LIMIT),
-            None if self.sensors.failure().is_some() && self.helm.lack(now).is_some() => None,
+            None if self.sensors.failure().is_some()
+                && self.remote_platform.lack(now).is_some() =>
+            {
+                None
+            }
             None => self.sensors.is_over(),
         };
         if let Some(condition) = condition {
@@ -373,7 +377,7 @@ async fn examine(component: &Component, peer: JausId) -> Result<Verdict, QueryEr
     let control: ReportControl = component.query(peer, &QueryControl {}).await?;
     let stage: ReportStage = component.query(peer, &QueryStage {}).await?;
     let controller = JausId::new(control.subsystem_id, control.node_id, control.component_id);
-    let told = Told {
+    let told = DriverStatus {
         status: status.status.0,
         controller: controller.is_unicast().then_some(controller),
         stage: StageReport::from(&stage),

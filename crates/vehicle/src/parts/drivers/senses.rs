@@ -8,7 +8,7 @@
 use std::convert::Infallible;
 use std::time::Instant;
 
-use super::Helm;
+use super::RemotePlatform;
 use super::freshness::time_in_month;
 use crate::parts::PartError;
 use jaus::address::JausId;
@@ -100,17 +100,20 @@ impl Sense<ReportLocalPose> {
         Self::of(component, local_pose_sensor::URN, &query, hz, "pose")
     }
 
-    /// Hands all reports to a helm.
-    pub(in crate::parts) async fn steer(mut self, helm: &Helm) -> Result<Infallible, PartError> {
+    /// Passes all reports to a remote platform.
+    pub(in crate::parts) async fn steer(
+        mut self,
+        remote_platform: &RemotePlatform,
+    ) -> Result<Infallible, PartError> {
         loop {
             let report = self.next().await?;
             let now = Instant::now();
             if self.take_loss() {
-                helm.handle_pose(now, None, None);
+                remote_platform.handle_pose(now, None, None);
             }
             let place = report.x_m().zip(report.y_m()).zip(report.yaw_rad());
             let stamp = report.time_stamp.and_then(time_in_month);
-            helm.handle_pose(now, stamp, place.map(|((x, y), yaw)| (x, y, yaw)));
+            remote_platform.handle_pose(now, stamp, place.map(|((x, y), yaw)| (x, y, yaw)));
         }
     }
 }
@@ -133,17 +136,20 @@ impl Sense<ReportVelocityState> {
         )
     }
 
-    /// Hands all reports to a helm.
-    pub(in crate::parts) async fn steer(mut self, helm: &Helm) -> Result<Infallible, PartError> {
+    /// Passes all reports to a remote platform.
+    pub(in crate::parts) async fn steer(
+        mut self,
+        remote_platform: &RemotePlatform,
+    ) -> Result<Infallible, PartError> {
         loop {
             let report = self.next().await?;
             let now = Instant::now();
             if self.take_loss() {
-                helm.handle_velocity(now, None, None);
+                remote_platform.handle_velocity(now, None, None);
             }
             let velocity = report.velocity_x_m_per_s().zip(report.yaw_rate_rad_per_s());
             let stamp = report.time_stamp.and_then(time_in_month);
-            helm.handle_velocity(now, stamp, velocity);
+            remote_platform.handle_velocity(now, stamp, velocity);
         }
     }
 }

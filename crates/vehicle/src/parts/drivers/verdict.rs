@@ -7,7 +7,7 @@ use jaus::component::State;
 
 /// How the next driver is, as it tells.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::parts) struct Told {
+pub(in crate::parts) struct DriverStatus {
     /// The code of its state, of Report Status.
     pub(in crate::parts) status: u8,
     /// Who controls it.
@@ -30,7 +30,7 @@ pub(in crate::parts) enum Verdict {
 }
 
 /// What to make of what `peer` has told, it being commanded by `own`.
-pub(in crate::parts) fn judge(own: JausId, peer: JausId, told: &Told) -> Verdict {
+pub(in crate::parts) fn judge(own: JausId, peer: JausId, told: &DriverStatus) -> Verdict {
     let ready = State::Ready as u8;
     let standby = State::Standby as u8;
     match told.controller {
@@ -61,7 +61,7 @@ mod tests {
     const OPERATOR: JausId = JausId::new(42, 1, 1);
 
     fn judged(state: State, controller: Option<JausId>, stage: StageReport) -> Verdict {
-        let told = Told {
+        let told = DriverStatus {
             status: state as u8,
             controller,
             stage,

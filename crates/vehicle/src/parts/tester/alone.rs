@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use tokio::task::{AbortHandle, JoinSet};
 
 use crate::parts::{
-    KnowledgeStore, Part, PartError, PathDriver, Planner, PoseSensor, PrimitiveDriver, Seat,
+    KnowledgeStore, Part, PartError, PathDriver, Planner, PoseSensor, PrimitiveDriver, Slot,
     VectorDriver, VelocitySensor,
 };
 use jaus::component::Kind;
@@ -67,35 +67,35 @@ impl Alone {
     /// If its node does not start.
     pub fn start_part(&mut self, number: u8) -> Result<(), AloneError> {
         let node = Node::start(Config::loopback(self.subsystem, number))?;
-        let seat = Seat {
+        let slot = Slot {
             port: node.attach(number)?,
             node: Some(node.clone()),
             kind: Kind::Vehicle,
             name: "Tested".to_owned(),
         };
         let task = match number {
-            33 => self.spawn(PrimitiveDriver::default(), seat),
-            36 => self.spawn(Planner::default(), seat),
-            41 => self.spawn(PoseSensor::default(), seat),
-            42 => self.spawn(VelocitySensor::default(), seat),
-            44 => self.spawn(VectorDriver::default(), seat),
-            48 => self.spawn(PathDriver::default(), seat),
+            33 => self.spawn(PrimitiveDriver::default(), slot),
+            36 => self.spawn(Planner::default(), slot),
+            41 => self.spawn(PoseSensor::default(), slot),
+            42 => self.spawn(VelocitySensor::default(), slot),
+            44 => self.spawn(VectorDriver::default(), slot),
+            48 => self.spawn(PathDriver::default(), slot),
             _ => {
                 let store = KnowledgeStore {
                     file: self.directory.join(KnowledgeStore::FILE),
                     map: Some(KnowledgeStore::demo_map()),
                     ..KnowledgeStore::default()
                 };
-                self.spawn(store, seat)
+                self.spawn(store, slot)
             }
         };
         self.running.insert(number, (node, task));
         Ok(())
     }
 
-    fn spawn(&mut self, part: impl Part, seat: Seat) -> AbortHandle {
+    fn spawn(&mut self, part: impl Part, slot: Slot) -> AbortHandle {
         self.tasks.spawn(async move {
-            let Err(error) = part.run(seat).await;
+            let Err(error) = part.run(slot).await;
             error
         })
     }

@@ -32,7 +32,7 @@ const LEFT: f64 = 80.0;
 const RIGHT: f64 = 160.0;
 const TOP: f64 = 50.0;
 const BOTTOM: f64 = 60.0;
-/// Told apart by people who see few colours, too, and by their dashes on paper.
+/// DriverStatus apart by people who see few colours, too, and by their dashes on paper.
 const STYLES: [(&str, &str); 5] = [
     ("#0072b2", ""),
     ("#009e73", "8 4"),

@@ -9,7 +9,7 @@ use jaus::address::JausId;
 use jaus::component::Kind;
 use jaus::node::{Config, Node};
 use jaus_cli::failure::Failure;
-use jaus_vehicle::parts::{KnowledgeStore, Part, PartError, Seat};
+use jaus_vehicle::parts::{KnowledgeStore, Part, PartError, Slot};
 use tokio::task::JoinSet;
 
 /// The operator's subsystem.
@@ -69,14 +69,14 @@ impl System {
             OPERATOR => (Kind::OperatorControlUnit, "Operator"),
             _ => (Kind::Vehicle, NAME),
         };
-        let seat = Seat {
+        let slot = Slot {
             port,
             node: Some(node.clone()),
             kind,
             name: subsystem.to_owned(),
         };
         self.parts.spawn(async move {
-            let Err(error): Result<Infallible, _> = part.run(seat).await;
+            let Err(error): Result<Infallible, _> = part.run(slot).await;
             (name, error)
         });
         Ok(id)

@@ -15,7 +15,7 @@ use clap::Args;
 use serde_json::json;
 
 use self::finding::{Finding, Mark};
-use self::peer::{Target, Wish};
+use self::peer::{Options, Target};
 use jaus::node::Config;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::network::Network;
@@ -72,14 +72,14 @@ impl Doctor {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         if let Some(target) = self.examined {
             let (id, config) = self.network.for_examination()?;
-            let wish = Wish {
+            let options = Options {
                 target,
                 listen: self.seconds,
                 control: self.control,
                 json: self.json,
                 colours: colours_wanted(&std::io::stdout()),
             };
-            return runtime::run(peer::examine(wish, id, config));
+            return runtime::run(peer::examine(options, id, config));
         }
         let mut report = Report {
             output: Output::new(),

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::report::conclusion;
 use super::subject::Subject;
-use super::verdict::{Proceeding, Said, StepResult, Tally};
+use super::verdict::{ObservedMessage, Proceeding, StepResult, Tally};
 
 /// A step as a line.
 #[derive(Serialize)]
@@ -101,7 +101,7 @@ fn exchange<'a>(dictionary: &'a Dictionary, proceeding: &'a Proceeding) -> Excha
     }
 }
 
-fn message<'a>(dictionary: &'a Dictionary, said: &Said) -> Message<'a> {
+fn message<'a>(dictionary: &'a Dictionary, said: &ObservedMessage) -> Message<'a> {
     Message {
         source: said.from.to_string(),
         destination: said.to.to_string(),

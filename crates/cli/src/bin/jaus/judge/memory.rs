@@ -44,7 +44,7 @@ pub(super) struct Memory {
     /// Who is judged.
     pub(super) subject: JausId,
     /// The judge's own ids, in the order of [`Speaker::ALL`].
-    pub(super) panel: [JausId; 5],
+    pub(super) judge_nodes: [JausId; 5],
     /// The event stream of the steps on events.
     pub(super) event: Option<u8>,
     /// All event streams that were confirmed and not cancelled, the oldest first.
@@ -62,10 +62,10 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    pub(super) fn new(subject: JausId, panel: [JausId; 5]) -> Self {
+    pub(super) fn new(subject: JausId, judge_nodes: [JausId; 5]) -> Self {
         Self {
             subject,
-            panel,
+            judge_nodes,
             event: None,
             streams: Vec::new(),
             position: None,
@@ -78,7 +78,7 @@ impl Memory {
 
     /// The id of one of the judge's components.
     pub(super) const fn id(&self, speaker: Speaker) -> JausId {
-        self.panel[speaker as usize]
+        self.judge_nodes[speaker as usize]
     }
 
     /// The event stream that an earlier step created.

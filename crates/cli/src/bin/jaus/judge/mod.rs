@@ -2,10 +2,10 @@
 //! says in words what is wrong.
 
 mod json;
+mod judge_nodes;
 mod junit;
 mod memory;
-mod panel;
-mod papers;
+mod outputs;
 mod recording;
 mod report;
 mod runner;
@@ -27,8 +27,8 @@ use jaus_cli::output::{Output, say};
 use jaus_cli::runtime;
 use jaus_view::Dictionary;
 
-use panel::Panel;
-use papers::Papers;
+use judge_nodes::JudgeNodes;
+use outputs::Outputs;
 use recording::Recording;
 use runner::Runner;
 use step::{Form, Name, Step};
@@ -215,29 +215,29 @@ impl Judge {
         let (id, config) = self.network.for_own_node_as(MAIN, "jaus judge")?;
         let recording = self.record.as_deref().map(Recording::create).transpose()?;
         let dictionary = Dictionary::new();
-        let mut papers = Papers::open(self, &dictionary)?;
-        let mut panel = Panel::start(id, config, address, recording)?;
-        let Some(subject) = Subject::meet(&mut panel, address, self.limit).await? else {
-            panel.end().await?;
+        let mut outputs = Outputs::open(self, &dictionary)?;
+        let mut judge_nodes = JudgeNodes::start(id, config, address, recording)?;
+        let Some(subject) = Subject::meet(&mut judge_nodes, address, self.limit).await? else {
+            judge_nodes.end().await?;
             say(format_args!(
                 "{address} gave no sign of life, so nothing was judged. `jaus discover` shows who \
                  is there; --interface chooses the network, --peer reaches where multicast does not"
             ));
             return Ok(Outcome::Incomplete);
         };
-        papers.begin(&subject)?;
-        let mut runner = Runner::new(panel, &subject, self.limit);
+        outputs.begin(&subject)?;
+        let mut runner = Runner::new(judge_nodes, &subject, self.limit);
         let end = runtime::end(None);
         tokio::pin!(end);
         let finished = tokio::select! {
             () = &mut end => false,
-            result = self.carry_out(&mut runner, &subject, &mut papers) => { result?; true }
+            result = self.carry_out(&mut runner, &subject, &mut outputs) => { result?; true }
         };
         if !finished {
             runner.tidy().await?;
         }
         runner.end().await?;
-        let conforms = papers.end(&subject)?;
+        let conforms = outputs.end(&subject)?;
         Ok(Outcome::complete_if(conforms && finished))
     }
 
@@ -246,19 +246,19 @@ impl Judge {
         &self,
         runner: &mut Runner,
         subject: &Subject,
-        papers: &mut Papers<'_>,
+        outputs: &mut Outputs<'_>,
     ) -> Result<(), Failure> {
         let steps = self.steps(Some(subject));
         for form in self.forms() {
-            papers.form(form)?;
+            outputs.form(form)?;
             runner.begin(form);
             for step in &steps {
                 if step.by_unicast_only && form == Form::Multicast {
                     continue;
                 }
-                papers.step_begins(step)?;
+                outputs.step_begins(step)?;
                 let result = runner.carry_out(step, form, subject).await?;
-                papers.step_ends(result)?;
+                outputs.step_ends(result)?;
             }
             runner.tidy().await?;
         }

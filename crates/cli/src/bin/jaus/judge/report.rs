@@ -7,7 +7,7 @@ use jaus_view::{Content, Dictionary, to_hex};
 
 use super::step::Form;
 use super::subject::Subject;
-use super::verdict::{Proceeding, Said, StepResult, Tally, Verdict};
+use super::verdict::{ObservedMessage, Proceeding, StepResult, Tally, Verdict};
 
 /// Octets of a message that are shown at most, as text; lists of services can be long.
 const LONGEST: usize = 400;
@@ -115,8 +115,8 @@ impl<'d> Report<'d> {
         lines
     }
 
-    fn said(&self, said: &Said) -> String {
-        let Said { from, to, octets } = said;
+    fn said(&self, said: &ObservedMessage) -> String {
+        let ObservedMessage { from, to, octets } = said;
         format!("{from} -> {to}  {}", in_words(self.dictionary, octets))
     }
 

@@ -11,18 +11,18 @@ use jaus::messages::core::{
 use jaus_cli::failure::Failure;
 use tokio::time::{Instant, sleep_until};
 
+use super::judge_nodes::{Heard, JudgeNodes};
 use super::memory::Memory;
-use super::panel::{Heard, Panel};
 use super::step::{
     Act, Check, Exchange, Expectation, Form, Reach, Speaker, Step, Throughout, Until,
 };
 use super::subject::Subject;
-use super::verdict::{Proceeding, Said, StepResult, Verdict};
+use super::verdict::{ObservedMessage, Proceeding, StepResult, Verdict};
 use super::watch::Observation;
 
 /// Carries out one step after the other.
 pub(super) struct Runner {
-    panel: Panel,
+    judge_nodes: JudgeNodes,
     memory: Memory,
     /// How long an answer may take.
     limit: Duration,
@@ -34,10 +34,10 @@ pub(super) struct Runner {
 type Came = Result<Check, Failure>;
 
 impl Runner {
-    pub(super) fn new(panel: Panel, subject: &Subject, limit: Duration) -> Self {
-        let memory = Memory::new(subject.id, panel.ids());
+    pub(super) fn new(judge_nodes: JudgeNodes, subject: &Subject, limit: Duration) -> Self {
+        let memory = Memory::new(subject.id, judge_nodes.ids());
         Self {
-            panel,
+            judge_nodes,
             memory,
             limit,
             step: String::new(),
@@ -46,8 +46,8 @@ impl Runner {
 
     /// Says everything in this form from now on, and forgets what was before.
     pub(super) fn begin(&mut self, form: Form) {
-        self.panel.use_form(form);
-        self.memory = Memory::new(self.memory.subject, self.panel.ids());
+        self.judge_nodes.use_form(form);
+        self.memory = Memory::new(self.memory.subject, self.judge_nodes.ids());
     }
 
     /// Carries out a step.
@@ -123,14 +123,14 @@ impl Runner {
 
     /// Says something, and waits for all that must come.
     async fn exchange(&mut self, exchange: &Exchange, proceedings: &mut Vec<Proceeding>) -> Came {
-        self.panel.clear(&self.step).await?;
+        self.judge_nodes.clear(&self.step).await?;
         let octets = match (exchange.content)(&self.memory) {
             Ok(octets) => octets,
             Err(reason) => return Ok(Err(reason)),
         };
         let start = Instant::now();
         let said = self
-            .panel
+            .judge_nodes
             .say(exchange.from, exchange.reach, octets, &self.step)?;
         let expected = exchange.expects.iter().map(|one| self.in_words(one));
         let mut proceeding = Proceeding::of(Some(said), expected.collect());
@@ -146,7 +146,7 @@ impl Runner {
         // Why the latest part of an answer is not the one that is looked for.
         let mut wrong = None;
         while check.is_ok() && !missing.is_empty() {
-            let Some(heard) = self.panel.hear(deadline, &self.step).await? else {
+            let Some(heard) = self.judge_nodes.hear(deadline, &self.step).await? else {
                 check = match wrong {
                     Some(reason) => Err(reason),
                     None if is_optional => Ok(()),
@@ -189,7 +189,7 @@ impl Runner {
         let words = format!("nothing for {} s", lasting.as_secs_f64());
         let mut proceeding = Proceeding::of(None, vec![words]);
         let mut check = Ok(());
-        while let Some(heard) = self.panel.hear(deadline, &self.step).await? {
+        while let Some(heard) = self.judge_nodes.hear(deadline, &self.step).await? {
             if heard.code() != Some(Event::CODE) && heard.to == exchange.from {
                 check = Err(format!("it was answered with {}", name_of(&heard.octets)));
                 proceeding.came.push(self.said(&heard));
@@ -209,13 +209,13 @@ impl Runner {
         proceedings: &mut Vec<Proceeding>,
     ) -> Came {
         let deadline = Instant::now() + within;
-        while !self.panel.was_asked(code) && Instant::now() < deadline {
+        while !self.judge_nodes.was_asked(code) && Instant::now() < deadline {
             let soon = Instant::now() + Duration::from_millis(50);
             self.listen_until(soon.min(deadline)).await?;
         }
         let expected = format!("{name} ({code:04X}h) from the subject itself");
         proceedings.push(Proceeding::of(None, vec![expected]));
-        if self.panel.was_asked(code) {
+        if self.judge_nodes.was_asked(code) {
             return Ok(Ok(()));
         }
         Ok(Err(format!(
@@ -236,7 +236,7 @@ impl Runner {
         };
         let deadline = Instant::now() + observation.at_most(self.limit);
         while !observation.is_complete() {
-            let Some(heard) = self.panel.hear(deadline, &self.step).await? else {
+            let Some(heard) = self.judge_nodes.hear(deadline, &self.step).await? else {
                 break;
             };
             if heard.to == Speaker::Main {
@@ -331,14 +331,16 @@ impl Runner {
 
     fn tell(&mut self, from: Speaker, message: &impl Message) -> Result<(), Failure> {
         let octets = message.encode().map_err(Failure::of)?;
-        let said = self.panel.say(from, Reach::Component, octets, &self.step);
+        let said = self
+            .judge_nodes
+            .say(from, Reach::Component, octets, &self.step);
         said.map(drop)
     }
 
     /// Lets time pass; questions of the subject are answered meanwhile.
     async fn listen_until(&mut self, deadline: Instant) -> Result<(), Failure> {
         // What comes is of no interest; the next exchange begins with a clear desk anyway.
-        while let Some(heard) = self.panel.hear(deadline, &self.step).await? {
+        while let Some(heard) = self.judge_nodes.hear(deadline, &self.step).await? {
             drop(heard);
         }
         sleep_until(deadline).await;
@@ -347,11 +349,11 @@ impl Runner {
 
     /// Ends the judge's nodes.
     pub(super) async fn end(self) -> Result<(), Failure> {
-        self.panel.end().await
+        self.judge_nodes.end().await
     }
 
-    fn said(&self, heard: &Heard) -> Said {
-        Said {
+    fn said(&self, heard: &Heard) -> ObservedMessage {
+        ObservedMessage {
             from: self.memory.subject,
             to: self.memory.id(heard.to),
             octets: heard.octets.clone(),
@@ -391,7 +393,7 @@ const TIDYING: Duration = Duration::from_millis(100);
 
 /// The name of a message, or its code.
 fn name_of(octets: &Bytes) -> String {
-    let Some(code) = super::panel::code_of(octets) else {
+    let Some(code) = super::judge_nodes::code_of(octets) else {
         return "a message without a code".to_owned();
     };
     let known = jaus::messages::registry()
@@ -401,7 +403,7 @@ fn name_of(octets: &Bytes) -> String {
 }
 
 impl Proceeding {
-    fn of(sent: Option<Said>, expected: Vec<String>) -> Self {
+    fn of(sent: Option<ObservedMessage>, expected: Vec<String>) -> Self {
         Self {
             sent,
             expected,

@@ -16,7 +16,7 @@ use jaus::messages::core::{
 use jaus_cli::failure::Failure;
 use tokio::time::Instant;
 
-use super::panel::{Panel, SETTLING, code_of};
+use super::judge_nodes::{JudgeNodes, SETTLING, code_of};
 use super::step::{Reach, Speaker};
 
 /// How often each question is put, because the first datagrams may be lost while addresses are
@@ -37,7 +37,7 @@ pub(super) struct Subject {
 impl Subject {
     /// Finds out about the subject. `None` if it answers nothing at all.
     pub(super) async fn meet(
-        panel: &mut Panel,
+        judge_nodes: &mut JudgeNodes,
         id: JausId,
         limit: Duration,
     ) -> Result<Option<Self>, Failure> {
@@ -45,7 +45,7 @@ impl Subject {
             query_type: QueryType::SUBSYSTEM_IDENTIFICATION,
         };
         let code = ReportIdentification::CODE;
-        let report = ask_again(panel, &identify, code, limit).await?;
+        let report = ask_again(judge_nodes, &identify, code, limit).await?;
         let name = report.as_ref().and_then(|octets| {
             let report = ReportIdentification::decode(octets).ok()?;
             Some(report.identification.to_string_lossy().into_owned())
@@ -54,15 +54,15 @@ impl Subject {
         // Everybody asks, so that the address is known on both nodes.
         for speaker in Speaker::ALL {
             let answer = if is_there {
-                ask(panel, speaker, &identify, code, SETTLING).await?
+                ask(judge_nodes, speaker, &identify, code, SETTLING).await?
             } else {
                 let code = ReportHeartbeatPulse::CODE;
-                ask(panel, speaker, &QueryHeartbeatPulse, code, SETTLING).await?
+                ask(judge_nodes, speaker, &QueryHeartbeatPulse, code, SETTLING).await?
             };
             is_there |= answer.is_some();
         }
         let code = ReportServices::CODE;
-        let report = ask_again(panel, &query_services(id), code, limit).await?;
+        let report = ask_again(judge_nodes, &query_services(id), code, limit).await?;
         is_there |= report.is_some();
         let services = report.and_then(|octets| services(&octets, id));
         Ok(is_there.then_some(Self { id, name, services }))
@@ -82,13 +82,13 @@ impl Subject {
 }
 
 async fn ask_again(
-    panel: &mut Panel,
+    judge_nodes: &mut JudgeNodes,
     query: &impl Message,
     report: u16,
     limit: Duration,
 ) -> Result<Option<Bytes>, Failure> {
     for _ in 0..TRIES {
-        let answer = ask(panel, Speaker::Main, query, report, limit).await?;
+        let answer = ask(judge_nodes, Speaker::Main, query, report, limit).await?;
         if answer.is_some() {
             return Ok(answer);
         }
@@ -97,16 +97,16 @@ async fn ask_again(
 }
 
 async fn ask(
-    panel: &mut Panel,
+    judge_nodes: &mut JudgeNodes,
     from: Speaker,
     query: &impl Message,
     report: u16,
     limit: Duration,
 ) -> Result<Option<Bytes>, Failure> {
     let query = query.encode().map_err(Failure::of)?;
-    panel.say(from, Reach::Component, query, STEP)?;
+    judge_nodes.say(from, Reach::Component, query, STEP)?;
     let deadline = Instant::now() + limit;
-    while let Some(heard) = panel.hear(deadline, STEP).await? {
+    while let Some(heard) = judge_nodes.hear(deadline, STEP).await? {
         if code_of(&heard.octets) == Some(report) {
             return Ok(Some(heard.octets));
         }

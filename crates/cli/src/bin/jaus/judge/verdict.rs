@@ -50,10 +50,10 @@ pub(super) struct StepResult {
 /// One exchange or observation of a step.
 #[derive(Debug)]
 pub(super) struct Proceeding {
-    pub(super) sent: Option<Said>,
+    pub(super) sent: Option<ObservedMessage>,
     /// What had to come, in words; empty if nothing had to.
     pub(super) expected: Vec<String>,
-    pub(super) came: Vec<Said>,
+    pub(super) came: Vec<ObservedMessage>,
     /// What was measured, in words.
     pub(super) measured: Option<String>,
     /// From the request to the last of the answers that had to come.
@@ -62,7 +62,7 @@ pub(super) struct Proceeding {
 
 /// A message between the judge and the subject.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Said {
+pub(super) struct ObservedMessage {
     pub(super) from: JausId,
     pub(super) to: JausId,
     pub(super) octets: Bytes,

@@ -7,7 +7,7 @@ use jaus::codec::Message;
 use jaus::messages::core::Event;
 use tokio::time::Instant;
 
-use super::panel::code_of;
+use super::judge_nodes::code_of;
 use super::step::{Check, Stream, Watch};
 
 /// How far the mean of a stream's intervals may be from its period.

@@ -17,7 +17,7 @@ use tokio::io::AsyncReadExt;
 use tokio::net::unix::pipe;
 use tokio::task::JoinHandle;
 
-use super::console::Voice;
+use super::console::PrefixedConsole;
 use super::leash;
 use super::supervisor::Exit;
 use super::system::Part;
@@ -30,11 +30,11 @@ pub(super) struct Child {
 }
 
 impl Child {
-    /// Starts a part, whose output is said by its voice.
+    /// Starts a part, whose output is said by its prefixed_console.
     ///
     /// # Errors
     /// What the operating system has against it.
-    pub(super) fn start(part: &Part, voice: Voice) -> io::Result<Self> {
+    pub(super) fn start(part: &Part, prefixed_console: PrefixedConsole) -> io::Result<Self> {
         if let Some(directory) = &part.directory {
             fs::create_dir_all(directory)?;
         }
@@ -53,7 +53,7 @@ impl Child {
         if let Some(directory) = &part.directory {
             command.current_dir(directory);
         }
-        let listening = listen(reader, voice)?;
+        let listening = listen(reader, prefixed_console)?;
         let process = command.spawn().inspect_err(|_| listening.abort())?;
         let group = i32::try_from(process.id()).map(Pid::from_raw);
         Ok(Self {
@@ -114,16 +114,16 @@ const LAST_WORDS: std::time::Duration = std::time::Duration::from_millis(200);
     clippy::disallowed_methods,
     reason = "the command owns its tasks, and this one ends with the pipe"
 )]
-fn listen(reader: PipeReader, voice: Voice) -> io::Result<JoinHandle<()>> {
+fn listen(reader: PipeReader, prefixed_console: PrefixedConsole) -> io::Result<JoinHandle<()>> {
     let mut pipe = pipe::Receiver::from_owned_fd(OwnedFd::from(reader))?;
     Ok(tokio::spawn(async move {
         let mut lines = Lines::default();
         let mut buffer = vec![0; Lines::LONGEST];
         while let Ok(length @ 1..) = pipe.read(&mut buffer).await {
             let octets = buffer.get(..length).unwrap_or_default();
-            lines.take(octets, &voice);
+            lines.take(octets, &prefixed_console);
         }
-        lines.end(&voice);
+        lines.end(&prefixed_console);
     }))
 }
 
@@ -137,25 +137,25 @@ impl Lines {
     /// A longer line is broken.
     const LONGEST: usize = 4096;
 
-    fn take(&mut self, octets: &[u8], voice: &Voice) {
+    fn take(&mut self, octets: &[u8], prefixed_console: &PrefixedConsole) {
         for mut piece in octets.split_inclusive(|&octet| octet == b'\n') {
             while !piece.is_empty() {
                 let room = Self::LONGEST.saturating_sub(self.begun.len());
                 let (fits, rest) = piece.split_at(room.clamp(1, piece.len()));
                 self.begun.extend_from_slice(fits);
                 if fits.ends_with(b"\n") || self.begun.len() >= Self::LONGEST {
-                    self.end(voice);
+                    self.end(prefixed_console);
                 }
                 piece = rest;
             }
         }
     }
 
-    fn end(&mut self, voice: &Voice) {
+    fn end(&mut self, prefixed_console: &PrefixedConsole) {
         let line = self.begun.strip_suffix(b"\n").unwrap_or(&self.begun);
         let line = line.strip_suffix(b"\r").unwrap_or(line);
         if !self.begun.is_empty() {
-            voice.say(&String::from_utf8_lossy(line));
+            prefixed_console.say(&String::from_utf8_lossy(line));
         }
         self.begun.clear();
     }

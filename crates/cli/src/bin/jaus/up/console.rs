@@ -34,7 +34,7 @@ pub(super) struct Printer {
 
 /// One who speaks.
 #[derive(Clone)]
-pub(super) struct Voice {
+pub(super) struct PrefixedConsole {
     console: Console,
     prefix: String,
 }
@@ -68,7 +68,7 @@ impl Console {
     }
 
     /// Somebody who may speak; the number chooses a colour. Without one it is `jaus up` itself.
-    pub(super) fn voice(&self, name: &str, number: Option<usize>) -> Voice {
+    pub(super) fn prefixed_console(&self, name: &str, number: Option<usize>) -> PrefixedConsole {
         let width = self.width;
         let plain = format!("{name:width$} | ");
         let colour = number.map_or(Some(&1), |number| COLOURS.get(number % COLOURS.len()));
@@ -76,7 +76,7 @@ impl Console {
             Some(colour) => format!("\x1b[{colour}m{plain}\x1b[0m"),
             None => plain,
         };
-        Voice {
+        PrefixedConsole {
             console: self.clone(),
             prefix,
         }
@@ -92,7 +92,7 @@ impl Console {
     }
 }
 
-impl Voice {
+impl PrefixedConsole {
     /// Says a line; control characters in it are made visible.
     pub(super) fn say(&self, line: &str) {
         let visible: String = line.chars().map(visible).collect();

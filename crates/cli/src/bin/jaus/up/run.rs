@@ -11,7 +11,7 @@ use nix::sys::signal::Signal;
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::child::Child;
-use super::console::{Console, Voice};
+use super::console::{Console, PrefixedConsole};
 use super::status::{self, StatusFile, in_words};
 use super::supervisor::{Exit, News, Order, Supervisor};
 use super::system::{OURSELVES, System};
@@ -97,8 +97,8 @@ struct Running<'f> {
     supervisor: Supervisor,
     /// A place for each part.
     children: Vec<Option<Child>>,
-    voices: Vec<Voice>,
-    own: Voice,
+    voices: Vec<PrefixedConsole>,
+    own: PrefixedConsole,
     guard: Guard,
     status: Option<StatusFile>,
     stopping: bool,
@@ -111,7 +111,7 @@ impl<'f> Running<'f> {
         let restarts = system.parts.iter().map(|part| part.restart);
         let supervisor = Supervisor::new(Instant::now(), restarts, flags.grace);
         let names = system.parts.iter().map(|part| &part.name).enumerate();
-        let voices = names.map(|(number, name)| console.voice(name, Some(number)));
+        let voices = names.map(|(number, name)| console.prefixed_console(name, Some(number)));
         let guard = Guard::start(flags.grace)
             .map_err(|error| Failure::new(format!("cannot start a second process: {error}")))?;
         Ok(Self {
@@ -119,7 +119,7 @@ impl<'f> Running<'f> {
             supervisor,
             children: system.parts.iter().map(|_| None).collect(),
             voices: voices.collect(),
-            own: console.voice(OURSELVES, None),
+            own: console.prefixed_console(OURSELVES, None),
             guard,
             status: flags.status.clone().map(StatusFile::new),
             stopping: false,
@@ -168,10 +168,10 @@ impl<'f> Running<'f> {
 
     fn start(&mut self, part: usize) {
         let places = (self.system.parts.get(part), self.voices.get(part));
-        let (Some(plan), Some(voice)) = places else {
+        let (Some(plan), Some(prefixed_console)) = places else {
             return;
         };
-        let started = Child::start(plan, voice.clone());
+        let started = Child::start(plan, prefixed_console.clone());
         let now = Instant::now();
         match (started, self.children.get_mut(part)) {
             (Ok(child), Some(place)) => {

@@ -13,7 +13,7 @@ use super::case::{Case, Offer, Question};
 use super::exchange::{Exchange, Mark, Verdict};
 use super::judgement::{Begin, Judgement};
 use super::reach::query_identification;
-use super::seen::{Door, Heard};
+use super::seen::{Heard, Listener};
 
 pub(super) fn identification(case: &mut Case) -> Begin {
     if let Some(skip) = case.nobody() {
@@ -163,7 +163,7 @@ pub(super) fn heard_by_multicast(case: &mut Case) -> Judgement {
     let by_group = |heard: &&Heard| {
         let same = id.is_some_and(|id| id.subsystem() == heard.frame.source.subsystem());
         let there = address.is_some_and(|address| address.ip() == heard.from.ip());
-        heard.door == Door::Group && same && there
+        heard.listener == Listener::Group && same && there
     };
     match case.seen.all().iter().find(by_group) {
         Some(heard) => Judgement::Over(Verdict::ok(format!(

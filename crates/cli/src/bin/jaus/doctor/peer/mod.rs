@@ -44,8 +44,8 @@ pub(super) use self::target::Target;
 /// How long to wait for a first sign if nobody says: JAUS++ speaks to everybody every 5 s.
 const LISTEN: Duration = Duration::from_secs(6);
 
-/// What is to be done, and how it is shown.
-pub(super) struct Wish {
+/// Options of an examination, and how its result is shown.
+pub(super) struct Options {
     pub(super) target: Target,
     /// How long to wait for a first sign.
     pub(super) listen: Option<Duration>,
@@ -57,36 +57,36 @@ pub(super) struct Wish {
 
 /// Examines the peer. `wanted` is the id that our node is to have.
 pub(super) async fn examine(
-    wish: Wish,
+    options: Options,
     wanted: Option<JausId>,
     config: Config,
 ) -> Result<Outcome, Failure> {
     let config = config.or_any_free_port();
-    let mut sockets = Sockets::open(interfaces(&config, wish.target)?, &config)?;
+    let mut sockets = Sockets::open(interfaces(&config, options.target)?, &config)?;
     let local = sockets.local();
     let settings = Settings {
-        target: wish.target,
+        target: options.target,
         own: JausId::new(config.subsystem, config.node, 1),
         wanted,
         port: local.map_or(0, |local| local.port()),
         no_group: sockets.no_group.take(),
-        listen: wish.listen.unwrap_or(LISTEN),
-        control: wish.control,
+        listen: options.listen.unwrap_or(LISTEN),
+        control: options.control,
         payload_limit: config.payload_limit,
     };
-    if !wish.json {
+    if !options.json {
         let from = local.map_or_else(String::new, |local| format!(" at {local}"));
         let on = sockets.names();
         say(format_args!(
             "asking {} as {}{from} on {on} …",
-            wish.target, settings.own
+            options.target, settings.own
         ));
     }
     let mut output = Output::new();
     let mut examiner = Examiner::new(settings);
-    let whole = go_on(&mut examiner, &mut sockets, &wish, &mut output).await?;
+    let whole = go_on(&mut examiner, &mut sockets, &options, &mut output).await?;
     let case = examiner.case();
-    if wish.json {
+    if options.json {
         output.line(report::to_json(case, whole))?;
     } else {
         output.line(report::profile(case))?;
@@ -132,7 +132,7 @@ fn interfaces(config: &Config, target: Target) -> Result<Vec<Interface>, Failure
 async fn go_on(
     examiner: &mut Examiner,
     sockets: &mut Sockets,
-    wish: &Wish,
+    options: &Options,
     output: &mut Output,
 ) -> Result<bool, Failure> {
     let begun = Instant::now();
@@ -142,8 +142,8 @@ async fn go_on(
     loop {
         send(examiner, sockets, begun);
         while let Some((trial, before)) = examiner.poll_trial() {
-            let line = report::line(trial, before, wish.colours);
-            if let Some(line) = line.filter(|_| !wish.json) {
+            let line = report::line(trial, before, options.colours);
+            if let Some(line) = line.filter(|_| !options.json) {
                 output.line(line)?;
             }
         }

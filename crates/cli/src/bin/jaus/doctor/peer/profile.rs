@@ -5,7 +5,7 @@ use jaus::wire::{Version, ra::RaId};
 use serde_json::{Value as Json, json};
 
 use super::case::Case;
-use super::seen::Door;
+use super::seen::Listener;
 
 /// What a peer is taken for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,7 +37,7 @@ impl Case {
         let all = self.seen.all().iter();
         for heard in all.filter(|heard| Some(heard.frame.source) == self.id) {
             recogniser.handle_frame(&heard.frame, heard.stale);
-            if heard.door == Door::Group {
+            if heard.listener == Listener::Group {
                 recogniser.handle_frame_to_all(&heard.frame);
             }
         }

@@ -11,7 +11,7 @@ use jaus::wire::{Flags, Frame, Priority, Version, judp};
 use super::case::{Case, Question, Send};
 use super::exchange::Verdict;
 use super::judgement::{Begin, Judgement};
-use super::seen::{Door, Heard};
+use super::seen::{Heard, Listener};
 
 /// Who speaks for the subsystem: the communicator.
 const COMMUNICATOR: u8 = 35;
@@ -90,7 +90,7 @@ pub(super) fn verdict(case: &Case, address: SocketAddr, name: Option<&str>) -> V
         .next()
         .map(|heard| format!(": subsystem {}", RaId::from(heard.frame.source).subsystem));
     let name = name.map(|name| format!(" \"{name}\""));
-    let multicast = of_ra(case, address).any(|heard| heard.door == Door::RaGroup);
+    let multicast = of_ra(case, address).any(|heard| heard.listener == Listener::RaGroup);
     let multicast = if multicast {
         ", heard on 224.1.0.1"
     } else {

@@ -15,7 +15,7 @@ use super::case::{Case, Question, Send, octets};
 use super::exchange::Verdict;
 use super::judgement::{Begin, Judgement};
 use super::ra;
-use super::seen::{Door, Heard, Refusal};
+use super::seen::{Heard, Listener, Refusal};
 
 pub(super) fn query_identification() -> QueryIdentification {
     QueryIdentification {
@@ -123,7 +123,8 @@ pub(super) fn reached(case: &mut Case, stage: u8) -> Judgement {
     let Some(address) = case.address.filter(|_| stage == 0) else {
         return Judgement::Wait;
     };
-    let probed = |heard: &Heard| heard.door == Door::Probe && heard.from.ip() == address.ip();
+    let probed =
+        |heard: &Heard| heard.listener == Listener::Probe && heard.from.ip() == address.ip();
     if case.seen.all().iter().any(probed) {
         return Judgement::Over(Verdict::ok(format!("UDP {address} answers")));
     }
@@ -227,7 +228,7 @@ pub(super) fn answered(case: &mut Case, mark: usize) -> Judgement {
             Some(id) => heard.frame.source == id,
             None => heard.from.ip() == address.ip() && heard.frame.source.is_unicast(),
         };
-        of_it && heard.frame.destination == own && heard.door == Door::Unicast
+        of_it && heard.frame.destination == own && heard.listener == Listener::Unicast
     };
     let Some(heard) = case.seen.since(mark).iter().find(to_us).cloned() else {
         return overheard(case, address);

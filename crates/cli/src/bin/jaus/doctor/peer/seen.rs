@@ -14,7 +14,7 @@ const MOST: usize = 16_384;
 
 /// At which of our sockets something arrives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Door {
+pub(super) enum Listener {
     /// The one that speaks.
     Unicast,
     /// The multicast group of AS5669A.
@@ -28,7 +28,7 @@ pub(super) enum Door {
 /// A datagram that arrived.
 #[derive(Clone, Debug)]
 pub(super) struct Arrival {
-    pub(super) door: Door,
+    pub(super) listener: Listener,
     /// On which of our interfaces.
     pub(super) link: usize,
     pub(super) from: SocketAddr,
@@ -39,7 +39,7 @@ pub(super) struct Arrival {
 #[derive(Clone, Debug)]
 pub(super) struct Heard {
     pub(super) at: Duration,
-    pub(super) door: Door,
+    pub(super) listener: Listener,
     pub(super) link: usize,
     pub(super) from: SocketAddr,
     pub(super) frame: Frame,
@@ -112,7 +112,7 @@ impl Seen {
             }
             self.heard.push(Heard {
                 at: now,
-                door: arrival.door,
+                listener: arrival.listener,
                 link: arrival.link,
                 from: arrival.from,
                 frame,

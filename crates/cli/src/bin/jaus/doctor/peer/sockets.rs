@@ -26,7 +26,7 @@ use tokio::net::{TcpStream, UdpSocket};
 use tokio::time::timeout;
 
 use super::case::Send;
-use super::seen::{Arrival, Door, Refusal, TcpAnswer};
+use super::seen::{Arrival, Listener, Refusal, TcpAnswer};
 
 /// The group of the Reference Architecture.
 pub(in crate::doctor) const RA_GROUP: SocketAddrV4 =
@@ -166,9 +166,9 @@ impl Sockets {
             match receive(probe, &mut self.buffer, cx) {
                 Poll::Ready(Ok((from, datagram))) => {
                     let link = 0;
-                    let door = Door::Probe;
+                    let listener = Listener::Probe;
                     let arrival = Arrival {
-                        door,
+                        listener,
                         link,
                         from,
                         datagram,
@@ -190,10 +190,13 @@ impl Sockets {
     fn poll_links(&mut self, cx: &mut Context<'_>) -> Poll<Happening> {
         let own: Vec<SocketAddr> = self.links.iter().map(|link| link.local).collect();
         for (number, link) in self.links.iter().enumerate() {
-            let group = link.group.as_ref().map(|(socket, _)| (Door::Group, socket));
-            let ra = link.ra.as_ref().map(|socket| (Door::RaGroup, socket));
-            let doors = [Some((Door::Unicast, &link.unicast)), group, ra];
-            for (door, socket) in doors.into_iter().flatten() {
+            let group = link
+                .group
+                .as_ref()
+                .map(|(socket, _)| (Listener::Group, socket));
+            let ra = link.ra.as_ref().map(|socket| (Listener::RaGroup, socket));
+            let doors = [Some((Listener::Unicast, &link.unicast)), group, ra];
+            for (listener, socket) in doors.into_iter().flatten() {
                 while let Poll::Ready(received) = receive(socket, &mut self.buffer, cx) {
                     let Ok((from, datagram)) = received else {
                         // An ICMP answer to what was sent before.
@@ -205,7 +208,7 @@ impl Sockets {
                     self.routes.insert(from.ip(), number);
                     let link = number;
                     let arrival = Arrival {
-                        door,
+                        listener,
                         link,
                         from,
                         datagram,

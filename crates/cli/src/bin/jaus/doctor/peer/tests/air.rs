@@ -8,7 +8,7 @@ use jaus::wire::{Frame, judp};
 
 use super::super::case::{Send, Settings};
 use super::super::examiner::Examiner;
-use super::super::seen::{Arrival, Door, Refusal, TcpAnswer};
+use super::super::seen::{Arrival, Listener, Refusal, TcpAnswer};
 
 /// How long everything is under way.
 const WAY: Duration = Duration::from_millis(1);
@@ -47,13 +47,13 @@ impl Air {
         }
     }
 
-    pub(super) fn say(&mut self, door: Door, from: SocketAddr, frame: &Frame) {
-        self.say_octets(door, from, judp::encode(frame).unwrap());
+    pub(super) fn say(&mut self, listener: Listener, from: SocketAddr, frame: &Frame) {
+        self.say_octets(listener, from, judp::encode(frame).unwrap());
     }
 
-    pub(super) fn say_octets(&mut self, door: Door, from: SocketAddr, datagram: Bytes) {
+    pub(super) fn say_octets(&mut self, listener: Listener, from: SocketAddr, datagram: Bytes) {
         let arrival = Arrival {
-            door,
+            listener,
             link: 0,
             from,
             datagram,
@@ -132,8 +132,13 @@ pub(super) struct Noise(pub(super) Box<dyn FnMut() -> Vec<u8>>);
 
 impl Scripted for Noise {
     fn hear(&mut self, _: &Send, air: &mut Air) {
-        for door in [Door::Unicast, Door::Group, Door::RaGroup, Door::Probe] {
-            air.say_octets(door, ([10, 0, 0, 2], 3794).into(), (self.0)().into());
+        for listener in [
+            Listener::Unicast,
+            Listener::Group,
+            Listener::RaGroup,
+            Listener::Probe,
+        ] {
+            air.say_octets(listener, ([10, 0, 0, 2], 3794).into(), (self.0)().into());
         }
     }
 }

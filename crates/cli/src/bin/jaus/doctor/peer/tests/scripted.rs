@@ -11,7 +11,7 @@ use jaus::messages::core::*;
 use jaus::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Priority, Version, judp};
 
 use super::super::case::Send;
-use super::super::seen::{Door, Refusal, TcpAnswer};
+use super::super::seen::{Listener, Refusal, TcpAnswer};
 use super::air::{Air, Scripted};
 
 /// An event that the vehicle has for its client.
@@ -172,15 +172,15 @@ impl Vehicle {
 
     fn tell(&mut self, to: JausId, report: &impl Message, air: &mut Air) {
         let frame = self.frame(to, report.encode().unwrap());
-        self.put(Door::Unicast, &frame, air);
+        self.put(Listener::Unicast, &frame, air);
     }
 
-    fn put(&mut self, door: Door, frame: &Frame, air: &mut Air) {
+    fn put(&mut self, listener: Listener, frame: &Frame, air: &mut Air) {
         let mut datagram = BytesMut::from(&judp::encode(frame).unwrap()[..]);
         datagram.put_bytes(0xEE, self.stale);
         let datagram = datagram.freeze();
         for _ in 0..1 + usize::from(self.doubles) {
-            air.say_octets(door, self.source(), datagram.clone());
+            air.say_octets(listener, self.source(), datagram.clone());
         }
     }
 
@@ -365,7 +365,7 @@ impl Vehicle {
                 sequence: frame.sequence,
                 ..Frame::new(self.id, frame.source, Bytes::new())
             };
-            self.put(Door::Unicast, &answer, air);
+            self.put(Listener::Unicast, &answer, air);
         }
     }
 
@@ -415,7 +415,7 @@ impl Vehicle {
                 number if number == last => DataControl::Last,
                 _ => DataControl::Middle,
             });
-            self.put(Door::Unicast, &frame, air);
+            self.put(Listener::Unicast, &frame, air);
         }
     }
 }
@@ -447,9 +447,9 @@ impl Scripted for Vehicle {
             let query = QueryIdentification::default().encode().unwrap();
             let mut frame = self.frame(JausId::EVERYONE, query);
             frame.flags = frame.flags.with_broadcast(Broadcast::Global);
-            self.put(Door::Group, &frame, air);
+            self.put(Listener::Group, &frame, air);
             if let Some(twin) = self.twin {
-                air.say(Door::Group, twin, &frame);
+                air.say(Listener::Group, twin, &frame);
             }
         }
         let due = self.ticks.is_multiple_of(2) && self.fires;
@@ -498,13 +498,13 @@ impl Ra {
         }
     }
 
-    fn say(source: [u8; 4], to: [u8; 4], payload: Bytes, door: Door, air: &mut Air) {
+    fn say(source: [u8; 4], to: [u8; 4], payload: Bytes, listener: Listener, air: &mut Air) {
         let frame = Frame {
             version: Version::Ra,
             flags: Flags::new(Priority::Standard),
             ..Frame::new(JausId::from_wire(source), JausId::from_wire(to), payload)
         };
-        air.say(door, ([10, 0, 0, 2], 3794).into(), &frame);
+        air.say(listener, ([10, 0, 0, 2], 3794).into(), &frame);
     }
 }
 
@@ -518,7 +518,7 @@ impl Scripted for Ra {
             report.extend(b"OJ_a");
             report.resize(86, 0);
             let to = frame.source.to_wire();
-            Self::say([1, 35, 1, 10], to, report.into(), Door::Unicast, air);
+            Self::say([1, 35, 1, 10], to, report.into(), Listener::Unicast, air);
         }
     }
 
@@ -526,7 +526,13 @@ impl Scripted for Ra {
         self.ticks += 1;
         if self.ticks.is_multiple_of(10) {
             let pulse = Bytes::from_static(&[0x02, 0x42]);
-            Self::say([1, 35, 1, 10], [1, 1, 255, 255], pulse, Door::RaGroup, air);
+            Self::say(
+                [1, 35, 1, 10],
+                [1, 1, 255, 255],
+                pulse,
+                Listener::RaGroup,
+                air,
+            );
         }
     }
 }

@@ -1,0 +1,250 @@
+//! The judge's five components on the network: they speak, they listen, and they answer what every
+//! component is asked.
+#![expect(clippy::disallowed_methods, reason = "the judge works in real time")]
+
+use std::collections::BTreeSet;
+use std::task::Poll;
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::codec::{Message, report_code};
+use jaus::endpoint::{Outgoing, Received};
+use jaus::messages::core::{
+    QueryHeartbeatPulse, QueryIdentification, ReportHeartbeatPulse, ReportIdentification,
+    report_identification::Type,
+};
+use jaus::node::{Config, Node, Port};
+use jaus::wire::Broadcast;
+use jaus_cli::failure::Failure;
+use tokio::time::{Instant, timeout_at};
+
+use super::recording::Recording;
+use super::step::{Form, Reach, Speaker};
+use super::verdict::ObservedMessage;
+
+/// What the judge calls itself.
+const NAME: &str = "jaus judge";
+
+/// The five components, on two nodes.
+pub(super) struct JudgeNodes {
+    nodes: [Node; 2],
+    /// In the order of [`Speaker::ALL`].
+    ports: [Port; 5],
+    subject: JausId,
+    form: Form,
+    /// The questions that the subject has put to the judge by itself.
+    asked: BTreeSet<u16>,
+    recording: Option<Recording>,
+}
+
+/// Something that the subject said.
+#[derive(Debug)]
+pub(super) struct Heard {
+    pub(super) to: Speaker,
+    pub(super) at: Instant,
+    pub(super) octets: Bytes,
+}
+
+impl Heard {
+    pub(super) fn code(&self) -> Option<u16> {
+        code_of(&self.octets)
+    }
+}
+
+/// The code at the head of a message.
+pub(super) fn code_of(octets: &Bytes) -> Option<u16> {
+    octets.first_chunk().map(|&code| u16::from_le_bytes(code))
+}
+
+impl JudgeNodes {
+    /// Starts the judge's nodes: `id` is the main component's, `config` its node's. The other four
+    /// have a node beside it, on a port of its own.
+    pub(super) fn start(
+        id: JausId,
+        config: Config,
+        subject: JausId,
+        recording: Option<Recording>,
+    ) -> Result<Self, Failure> {
+        let mut other = config.clone();
+        // The last node number has no next one.
+        other.node = if config.node < JausId::ANY_NODE - 1 {
+            config.node + 1
+        } else {
+            config.node - 1
+        };
+        other.port = 0;
+        let nodes = [Node::start(config), Node::start(other)];
+        let [main, other] = nodes.map(|node| node.map_err(Failure::of));
+        let (main, other) = (main?, other?);
+        let attach = |node: &Node, component| node.attach(component).map_err(Failure::of);
+        let ports = [
+            attach(&main, id.component())?,
+            attach(&other, 1)?,
+            attach(&other, 2)?,
+            attach(&other, 3)?,
+            attach(&other, 4)?,
+        ];
+        Ok(Self {
+            nodes: [main, other],
+            ports,
+            subject,
+            form: Form::Unicast,
+            asked: BTreeSet::new(),
+            recording,
+        })
+    }
+
+    /// The ids of the five, in the order of [`Speaker::ALL`].
+    pub(super) fn ids(&self) -> [JausId; 5] {
+        self.ports.each_ref().map(Port::id)
+    }
+
+    /// How requests travel from now on.
+    pub(super) const fn use_form(&mut self, form: Form) {
+        self.form = form;
+    }
+
+    /// Whether the subject has put this question to the judge.
+    pub(super) fn was_asked(&self, query: u16) -> bool {
+        self.asked.contains(&query)
+    }
+
+    /// Says something to the subject, on behalf of the step that is named.
+    pub(super) fn say(
+        &mut self,
+        from: Speaker,
+        reach: Reach,
+        octets: Bytes,
+        step: &str,
+    ) -> Result<ObservedMessage, Failure> {
+        let port = &self.ports[from as usize];
+        let (destination, broadcast) = match (self.form, reach) {
+            (Form::Unicast, _) | (_, Reach::Component) => (self.subject, Broadcast::None),
+            (Form::Multicast, Reach::Node) => {
+                let node = JausId::ANY_COMPONENT;
+                let node = JausId::new(self.subject.subsystem(), self.subject.node(), node);
+                (node, Broadcast::Global)
+            }
+            (Form::Multicast, Reach::Everyone) => (JausId::EVERYONE, Broadcast::Global),
+        };
+        let mut outgoing = Outgoing::new(port.id(), destination, octets.clone());
+        outgoing.broadcast = broadcast;
+        let said = ObservedMessage {
+            from: port.id(),
+            to: destination,
+            octets,
+        };
+        if let Some(recording) = &mut self.recording {
+            let node = &self.nodes[usize::from(from != Speaker::Main)];
+            recording.sent(node, &outgoing, step)?;
+        }
+        port.send(outgoing).map_err(Failure::of)?;
+        Ok(said)
+    }
+
+    /// Waits until the deadline for something that the subject says. Its questions are answered
+    /// here, and not passed on.
+    pub(super) async fn hear(
+        &mut self,
+        deadline: Instant,
+        step: &str,
+    ) -> Result<Option<Heard>, Failure> {
+        loop {
+            let Ok(received) = timeout_at(deadline, self.receive()).await else {
+                return Ok(None);
+            };
+            let (to, received) = received?;
+            if received.source != self.subject {
+                self.answer(to, &received)?;
+                continue;
+            }
+            if let Some(recording) = &mut self.recording {
+                let node = &self.nodes[usize::from(to != Speaker::Main)];
+                recording.received(node, &received, step)?;
+            }
+            if self.answer(to, &received)? {
+                continue;
+            }
+            return Ok(Some(Heard {
+                to,
+                at: Instant::now(),
+                octets: received.payload,
+            }));
+        }
+    }
+
+    /// Takes what has come already, which is too late for the request that it answers.
+    pub(super) async fn clear(&mut self, step: &str) -> Result<(), Failure> {
+        while self.hear(Instant::now(), step).await?.is_some() {}
+        Ok(())
+    }
+
+    /// The next message to any of the five.
+    async fn receive(&mut self) -> Result<(Speaker, Received), Failure> {
+        let ports = &mut self.ports;
+        let next = std::future::poll_fn(|cx| {
+            for (speaker, port) in Speaker::ALL.into_iter().zip(ports.iter_mut()) {
+                if let Poll::Ready(received) = port.poll_recv(cx) {
+                    return Poll::Ready(received.map(|received| (speaker, received)));
+                }
+            }
+            Poll::Pending
+        });
+        let next = next.await;
+        next.ok_or_else(|| Failure::new("the judge's node has stopped"))
+    }
+
+    /// Answers a question that any component may be asked. Whether it was a question at all.
+    fn answer(&mut self, to: Speaker, received: &Received) -> Result<bool, Failure> {
+        let Some(code) = code_of(&received.payload) else {
+            return Ok(false);
+        };
+        if report_code(code).is_none() {
+            return Ok(false);
+        }
+        if received.source == self.subject {
+            self.asked.insert(code);
+        }
+        let answer = match code {
+            QueryIdentification::CODE => identification(&received.payload),
+            QueryHeartbeatPulse::CODE => ReportHeartbeatPulse.encode().ok(),
+            _ => None,
+        };
+        if let Some(answer) = answer {
+            let port = &self.ports[to as usize];
+            let outgoing = Outgoing::new(port.id(), received.source, answer);
+            port.send(outgoing).map_err(Failure::of)?;
+        }
+        Ok(true)
+    }
+
+    /// Leaves the network. Whether the recording is on disk is told as well.
+    pub(super) async fn end(self) -> Result<(), Failure> {
+        let Self {
+            nodes,
+            ports,
+            recording,
+            ..
+        } = self;
+        drop(ports);
+        for node in nodes {
+            node.shutdown().await;
+        }
+        recording.map_or(Ok(()), Recording::end)
+    }
+}
+
+/// What the judge says about itself.
+fn identification(query: &Bytes) -> Option<Bytes> {
+    let query = QueryIdentification::decode(query).ok()?;
+    let report = ReportIdentification {
+        query_type: jaus::messages::core::report_identification::QueryType(query.query_type.0),
+        r#type: Type::OCU,
+        identification: NAME.into(),
+    };
+    report.encode().ok()
+}
+
+/// How long the nodes are given to know each other's addresses at the beginning.
+pub(super) const SETTLING: Duration = Duration::from_millis(200);

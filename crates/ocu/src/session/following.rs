@@ -1,0 +1,171 @@
+//! The subscriptions of the session: every part of the vehicle is asked to tell what it can tell, and
+//! asked again for as long as it is there.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+use tokio::task::JoinSet;
+use tokio::time::sleep;
+
+use crate::picture::Picture;
+use crate::report::Report;
+use crate::role;
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::component::{Component, SubscribeError, Update, When};
+use jaus::messages::core::{
+    QueryControl, QueryStatus, ReportControl, ReportStatus, access_control,
+};
+use jaus::messages::ground::{
+    QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission, ReportPlannedPath,
+    ReportRasterMaps, ReportStage, mission_planner, raster_maps,
+};
+use jaus::messages::mobility::{
+    QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState,
+};
+use jaus::service::Component as Known;
+
+/// What a part has told.
+pub(super) type Sighting = (JausId, Report);
+
+/// The subscriptions to the parts of one vehicle.
+pub(super) struct Following {
+    component: Component,
+    sighted: mpsc::Sender<Sighting>,
+    parts: BTreeMap<JausId, Followed>,
+}
+
+/// What is followed of one part; dropping it ends that.
+struct Followed {
+    topics: Topics,
+    _tasks: JoinSet<()>,
+}
+
+/// What a part can tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Topics {
+    status: bool,
+    control: bool,
+    stage: bool,
+    pose: bool,
+    velocity: bool,
+    mission: bool,
+    maps: bool,
+}
+
+/// Where it is and how fast.
+const MOTION: When = When::hz(10.0);
+/// What a part is doing.
+const STATUS: When = When::hz(4.0);
+/// Before a part that would not be subscribed to is asked again.
+const PAUSE: Duration = Duration::from_secs(1);
+
+impl Topics {
+    fn of(part: &Known) -> Self {
+        Self {
+            status: role::is_managed(part),
+            control: role::is_managed(part) || part.offers(access_control::URN),
+            stage: role::tells_stage(part),
+            pose: role::reports_pose(part),
+            velocity: role::reports_velocity(part),
+            mission: part.offers(mission_planner::URN),
+            maps: part.offers(raster_maps::URN),
+        }
+    }
+}
+
+impl Following {
+    pub(super) const fn new(component: Component, sighted: mpsc::Sender<Sighting>) -> Self {
+        Self {
+            component,
+            sighted,
+            parts: BTreeMap::new(),
+        }
+    }
+
+    /// Follows the parts of the vehicle as they are now, and nobody else.
+    pub(super) fn follow(&mut self, picture: &Picture) {
+        self.parts.retain(|id, _| picture.parts().contains_key(id));
+        for id in picture.parts().keys() {
+            let Some(part) = picture.directory().component(*id) else {
+                continue;
+            };
+            let topics = Topics::of(part);
+            if self.parts.get(id).is_none_or(|it| it.topics != topics) {
+                let _tasks = self.start(*id, topics);
+                self.parts.insert(*id, Followed { topics, _tasks });
+            }
+        }
+    }
+
+    fn start(&self, peer: JausId, topics: Topics) -> JoinSet<()> {
+        let mut tasks = JoinSet::new();
+        if topics.status {
+            tasks.spawn(self.ask::<ReportStatus, _>(peer, QueryStatus {}, STATUS));
+        }
+        if topics.control {
+            tasks.spawn(self.ask::<ReportControl, _>(peer, QueryControl {}, STATUS));
+        }
+        if topics.stage {
+            tasks.spawn(self.ask::<ReportStage, _>(peer, QueryStage {}, STATUS));
+        }
+        if topics.pose {
+            let query = QueryLocalPose {
+                presence_vector: u16::MAX,
+            };
+            tasks.spawn(self.ask::<ReportLocalPose, _>(peer, query, MOTION));
+        }
+        if topics.velocity {
+            let query = QueryVelocityState {
+                presence_vector: u16::MAX,
+            };
+            tasks.spawn(self.ask::<ReportVelocityState, _>(peer, query, MOTION));
+        }
+        if topics.mission {
+            tasks.spawn(self.ask::<ReportMission, _>(peer, QueryMission {}, STATUS));
+            let path = QueryPlannedPath {};
+            tasks.spawn(self.ask::<ReportPlannedPath, _>(peer, path, When::OnChange));
+        }
+        if topics.maps {
+            let maps = QueryRasterMaps {};
+            tasks.spawn(self.ask::<ReportRasterMaps, _>(peer, maps, When::OnChange));
+        }
+        tasks
+    }
+
+    /// Has one query answered again and again, until it is dropped.
+    fn ask<R, Q>(
+        &self,
+        peer: JausId,
+        query: Q,
+        when: When,
+    ) -> impl Future<Output = ()> + Send + use<R, Q>
+    where
+        R: Message + Into<Report> + Send + 'static,
+        Q: Message + Sync + Send + 'static,
+    {
+        let (component, sighted) = (self.component.clone(), self.sighted.clone());
+        async move {
+            loop {
+                match component.subscribe::<R, Q>(peer, &query, when).await {
+                    Ok(mut reports) => {
+                        while let Some(update) = reports.next().await {
+                            let report = match update {
+                                Update::Report(report) => report.into(),
+                                Update::Up => Report::Subscription { is_up: true },
+                                Update::Down { .. } => Report::Subscription { is_up: false },
+                            };
+                            if sighted.send((peer, report)).await.is_err() {
+                                return;
+                            }
+                        }
+                    }
+                    Err(SubscribeError::Stopped) => return,
+                    Err(error) => tracing::debug!(%peer, %error, "not subscribed"),
+                }
+                sleep(PAUSE).await;
+            }
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! The cells of the map that pages show: asked for block by block when the first page wants them,
+//! and kept until the map is another.
+
+use bytes::{Bytes, BytesMut};
+
+use super::client::{Client, Finished};
+use crate::state::{Edition, Map};
+use jaus::address::JausId;
+use jaus::component::Component;
+use jaus::messages::ground::{QueryRasterCells, ReportRasterCells};
+
+/// Takes the cells, or hears why there are none.
+pub(crate) type CellsReply = Box<dyn FnOnce(Result<Bytes, String>) + Send>;
+
+/// The map that is kept, and who waits for one.
+#[derive(Default)]
+pub(super) struct Maps {
+    kept: Option<(Edition, Bytes)>,
+    wanted: Option<Edition>,
+    waiting: Vec<CellsReply>,
+}
+
+impl Maps {
+    /// How many may wait for a map.
+    const MOST_WAITING: usize = 64;
+
+    /// A page wants the cells of a map, of which the session knows `map` at `store`.
+    pub(super) fn want(
+        &mut self,
+        store: Option<JausId>,
+        map: Option<Map>,
+        client: &mut Client,
+        reply: CellsReply,
+    ) {
+        let (Some(store), Some(map)) = (store, map) else {
+            return reply(Err("no such map is known".to_owned()));
+        };
+        let edition = map.edition();
+        if let Some((kept, cells)) = &self.kept
+            && *kept == edition
+        {
+            return reply(Ok(cells.clone()));
+        }
+        if self.waiting.len() >= Self::MOST_WAITING {
+            return reply(Err("too many wait for the map; try again".to_owned()));
+        }
+        self.waiting.push(reply);
+        if self.wanted.is_none() {
+            self.wanted = Some(edition);
+            let component = client.component().clone();
+            client.start(async move {
+                let result = cells(&component, store, &map).await;
+                Finished::Mapped { edition, result }
+            });
+        }
+    }
+
+    /// The cells have come, or not.
+    pub(super) fn handle_mapped(&mut self, edition: Edition, result: &Result<Bytes, String>) {
+        self.wanted = None;
+        self.kept = result.as_ref().ok().map(|cells| (edition, cells.clone()));
+        for reply in self.waiting.drain(..) {
+            reply(result.clone());
+        }
+    }
+}
+
+/// Cells that are asked for at once: what a store answers well within the time that a question has.
+const BLOCK: u32 = 1 << 18;
+
+/// All cells of a map, row by row.
+async fn cells(component: &Component, store: JausId, map: &Map) -> Result<Bytes, String> {
+    let columns = u32::from(map.columns).max(1);
+    let step = u16::try_from((BLOCK / columns).max(1)).unwrap_or(u16::MAX);
+    let mut all = BytesMut::new();
+    let mut row = 0;
+    while row < map.rows {
+        let query = QueryRasterCells {
+            map: map.id,
+            row,
+            column: 0,
+            rows: step.min(map.rows - row),
+            columns: map.columns,
+        };
+        let block: ReportRasterCells = component
+            .query(store, &query)
+            .await
+            .map_err(|error| error.to_string())?;
+        let length = usize::from(query.rows) * usize::from(query.columns);
+        if (block.map, block.row, block.cells.len()) != (map.id, row, length) {
+            return Err(format!(
+                "{store} answered with other cells than were asked for"
+            ));
+        }
+        all.extend_from_slice(&block.cells);
+        row += query.rows;
+    }
+    Ok(all.freeze())
+}

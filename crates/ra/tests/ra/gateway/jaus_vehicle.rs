@@ -1,0 +1,227 @@
+//! A JAUS vehicle as RA systems have it: listed, asked, connected to, driven.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use jaus::address::JausId;
+use jaus::service::{Kind, Management, Service, Stack, State};
+use jaus_ra::gateway::{Counter, Settings, Show};
+use jaus_ra::node::Event;
+use jaus_ra::{Message, RaId};
+use jaus_vehicle::mobility::Vehicle;
+use jaus_vehicle::motion::{Frame, Pilot, SkidSteer, SkidSteerConfig};
+
+use crate::gateway::world::{World, stack, subsystem};
+use jaus_test_kit::rover::bytes;
+
+const VEHICLE: JausId = JausId::new(101, 1, 7);
+const RA_DRIVER: RaId = RaId::new(101, 1, 33, 7);
+const RA_POSE: RaId = RaId::new(101, 1, 38, 7);
+/// The RA operator.
+const COMMANDER: RaId = RaId::new(30, 1, 32, 1);
+
+fn vehicle() -> Stack {
+    let rover = SkidSteer::new(SkidSteerConfig::default());
+    let vehicle = Vehicle::new(Pilot::new(rover, Frame::at(52.5, 13.4)));
+    let services: Vec<Box<dyn Service>> = vec![
+        Box::new(vehicle.primitive_driver()),
+        Box::new(vehicle.global_pose_sensor()),
+        Box::new(vehicle.velocity_state_sensor()),
+        Box::new(vehicle.local_vector_driver()),
+    ];
+    stack(VEHICLE, Kind::Vehicle, "Rover", services).management(Management::new())
+}
+
+fn world_with(settings: Settings) -> (World, usize, usize) {
+    let mut world = World::new(settings);
+    let operator = subsystem(30, "OCU", &[(32, 1, "Commander")]);
+    let ra = world.add_ra(operator, None);
+    let rover = world.add_jaus(vehicle());
+    world.run(Duration::from_secs(10));
+    (world, ra, rover)
+}
+
+fn world() -> (World, usize, usize) {
+    world_with(Settings::default())
+}
+
+fn says(destination: RaId, code: u16, hex: &str) -> Message {
+    Message::new(COMMANDER, destination, code, bytes(hex))
+}
+
+#[test]
+fn it_is_listed_once_for_each_of_its_services_with_names() {
+    let (world, ra, _) = world();
+    let peer = &world.ra[ra].node;
+    let shown = peer.subsystems().find(|it| it.id == 101).unwrap();
+    assert_eq!(shown.name, "Rover");
+    let parts: Vec<u8> = shown.components().map(|(id, _)| id.component).collect();
+    for part in [1, 33, 35, 38, 42, 44] {
+        assert!(parts.contains(&part), "{parts:?}");
+    }
+    let mut components = shown.components();
+    let (_, driver) = components.find(|(id, _)| *id == RA_DRIVER).unwrap();
+    assert!(driver.name.contains("Primitive Driver"), "{driver:?}");
+    let inputs = driver.services.iter().flat_map(|it| &it.inputs);
+    assert!(inputs.clone().any(|it| it.code == 0x0405));
+}
+
+#[test]
+fn the_gateway_lists_itself_as_a_commander() {
+    let (world, ra, _) = world();
+    let shown = world.ra[ra].node.subsystems().find(|it| it.id == 250);
+    let (id, _) = shown
+        .unwrap()
+        .components()
+        .find(|(id, _)| id.component == 32)
+        .unwrap();
+    assert_eq!(id, RaId::new(250, 1, 32, 1));
+}
+
+#[test]
+fn only_the_chosen_subsystems_are_shown() {
+    let settings = Settings {
+        show: Show::Only([102].into()),
+        ..Settings::default()
+    };
+    let (world, ra, _) = world_with(settings);
+    let shown: Vec<u8> = world.ra[ra].node.subsystems().map(|it| it.id).collect();
+    assert_eq!(shown, [250]);
+}
+
+#[test]
+fn its_pose_is_told_when_it_is_asked_for() {
+    let (mut world, ra, _) = world();
+    world.ra_says(ra, &says(RA_POSE, 0x2402, "ff00"));
+    world.run(Duration::from_secs(1));
+    let told = world.ra_heard(ra, 0x4402);
+    let [told] = &told[..] else {
+        panic!("{told:?}");
+    };
+    assert_eq!((told.source, told.destination), (RA_POSE, COMMANDER));
+    let latitude = i32::from_le_bytes([told.data[2], told.data[3], told.data[4], told.data[5]]);
+    let latitude = f64::from(latitude) * 90.0 / f64::from(i32::MAX);
+    assert!((latitude - 52.5).abs() < 1e-4, "{latitude}");
+}
+
+#[test]
+fn a_service_connection_runs_at_its_rate_until_it_is_terminated() {
+    let (mut world, ra, _) = world();
+    // Global poses, ten in a second.
+    world.ra_says(ra, &says(RA_POSE, 0x0008, "02445802ff000000"));
+    world.run(Duration::from_secs(5));
+    let heard = std::mem::take(&mut world.ra[ra].heard);
+    let confirms: Vec<&Message> = heard.iter().filter(|it| it.code == 0x0009).collect();
+    let [confirm] = &confirms[..] else {
+        panic!("{confirms:?}");
+    };
+    assert_eq!(
+        (&confirm.data[..2], confirm.data[5]),
+        (&[0x02, 0x44][..], 0)
+    );
+    let reports = heard.iter().filter(|it| it.code == 0x4402);
+    assert!(reports.clone().all(|it| it.connection));
+    let reports = reports.count();
+    assert!((48..=52).contains(&reports), "{reports}");
+    world.ra_says(ra, &says(RA_POSE, 0x000C, "024400"));
+    world.run(Duration::from_secs(1));
+    world.ra[ra].heard.clear();
+    world.run(Duration::from_secs(2));
+    assert_eq!(world.ra_heard(ra, 0x4402).len(), 0);
+}
+
+#[test]
+fn a_service_connection_for_what_is_not_there_is_refused() {
+    let (mut world, ra, _) = world();
+    world.ra_says(ra, &says(RA_POSE, 0x0008, "00405802ff000000"));
+    let told = world.ra_heard(ra, 0x0009);
+    assert_eq!(told[0].data[5], 2, "the component is not capable");
+}
+
+#[test]
+fn it_is_driven_by_the_ra_component_that_controls_it() {
+    let (mut world, ra, rover) = world();
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
+    world.run(Duration::from_secs(1));
+    let told = world.ra_heard(ra, 0x000F);
+    assert_eq!(told[0].data, Bytes::from_static(&[0]));
+    let standing = *world.jaus[rover].stack.standing();
+    assert_eq!(standing.controller.unwrap().id, JausId::new(30, 1, 32));
+    world.ra_says(ra, &says(RA_DRIVER, 0x0004, ""));
+    assert_eq!(world.jaus[rover].stack.standing().state, State::Ready);
+    for _ in 0..10 {
+        // Half of the propulsion forward.
+        world.ra_says(ra, &says(RA_DRIVER, 0x0405, "0100ff3f"));
+        world.run(Duration::from_millis(100));
+    }
+    let velocity = RaId::new(101, 1, 42, 7);
+    world.ra_says(ra, &says(velocity, 0x2404, "0100"));
+    world.run(Duration::from_secs(1));
+    let told = world.ra_heard(ra, 0x4404);
+    let speed = i32::from_le_bytes([
+        told[0].data[2],
+        told[0].data[3],
+        told[0].data[4],
+        told[0].data[5],
+    ]);
+    assert!(speed > 0, "{told:?}");
+    world.ra_says(ra, &says(RA_DRIVER, 0x000E, ""));
+    world.run(Duration::from_secs(1));
+    assert_eq!(world.jaus[rover].stack.standing().controller, None);
+}
+
+#[test]
+fn control_that_is_not_to_be_had_is_rejected_as_openjaus_does() {
+    let (mut world, ra, rover) = world();
+    let operator = world.add_operator();
+    let now = world.now;
+    let patience = jaus::service::Patience::default();
+    let stack = &mut world.jaus[operator].stack;
+    stack.request_control(now, VEHICLE, 200, patience).unwrap();
+    world.run(Duration::from_secs(1));
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
+    world.run(Duration::from_secs(1));
+    assert_eq!(world.ra_heard(ra, 0x0010).len(), 1);
+    let controller = world.jaus[rover].stack.standing().controller.unwrap();
+    assert_eq!(controller.authority, 200);
+}
+
+#[test]
+fn control_is_lost_with_the_ra_system_that_had_it() {
+    let (mut world, ra, rover) = world();
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
+    world.run(Duration::from_secs(1));
+    assert!(world.jaus[rover].stack.standing().controller.is_some());
+    world.ra.remove(ra);
+    world.run(Duration::from_secs(10));
+    assert!(world.jaus[rover].stack.standing().controller.is_none());
+}
+
+#[test]
+fn a_question_that_is_repeated_while_it_waits_is_asked_once() {
+    let (mut world, ra, rover) = world();
+    world.jaus[rover].up = false;
+    for _ in 0..50 {
+        world.ra_says(ra, &says(RA_POSE, 0x2402, "ff00"));
+    }
+    assert_eq!(world.count(Counter::QueriesFromRa), 1);
+    assert_eq!(world.count(Counter::Repeated), 49);
+}
+
+#[test]
+fn its_departure_is_told() {
+    let (mut world, ra, rover) = world();
+    world.jaus[rover].up = false;
+    world.run(Duration::from_secs(25));
+    assert!(world.ra[ra].seen.contains(&Event::Lost(101)));
+}
+
+#[test]
+fn what_has_no_counterpart_is_refused_and_counted() {
+    let (mut world, ra, _) = world();
+    world.ra_says(ra, &says(RA_DRIVER, 0x000D, "7f"));
+    world.run(Duration::from_secs(1));
+    let before = world.count(Counter::NoCounterpart);
+    world.ra_says(ra, &says(RA_DRIVER, 0x0406, "0000"));
+    assert_eq!(world.count(Counter::NoCounterpart), before + 1);
+}

@@ -1,0 +1,5 @@
+//! The Reference Architecture: its messages against independent encoders, recorded traffic, the gateway.
+
+mod gateway;
+mod ra33;
+mod ra_captures;

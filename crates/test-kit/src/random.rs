@@ -1,0 +1,49 @@
+//! Numbers that look random and follow from a seed.
+
+use std::ops::Range;
+use std::time::Duration;
+
+/// A small generator of numbers that look random (SplitMix64).
+pub struct Random(u64);
+
+impl Random {
+    /// The generator of a seed.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// Any number.
+    pub fn number(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        mixed ^ (mixed >> 31)
+    }
+
+    /// A number below `end`, which is not 0.
+    pub fn below(&mut self, end: usize) -> usize {
+        (self.number() % end as u64) as usize
+    }
+
+    /// One of several.
+    pub fn choose<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.below(choices.len())]
+    }
+
+    /// True `of_1000` times of 1000.
+    pub fn happens(&mut self, of_1000: u32) -> bool {
+        self.number() % 1000 < u64::from(of_1000)
+    }
+
+    /// A time within the range.
+    pub fn between(&mut self, range: &Range<Duration>) -> Duration {
+        let spread = (range.end - range.start).as_nanos().max(1) as u64;
+        range.start + Duration::from_nanos(self.number() % spread)
+    }
+
+    /// A time of up to so many milliseconds.
+    pub fn up_to_millis(&mut self, millis: u64) -> Duration {
+        self.between(&(Duration::ZERO..Duration::from_millis(millis.max(1))))
+    }
+}

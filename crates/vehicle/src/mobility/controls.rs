@@ -1,0 +1,367 @@
+//! What all services of a vehicle have their hands on: who steers, the time, the list, and the
+//! journey to a place or along the list.
+//!
+//! A component has one of each, whichever of its drivers is asked.
+
+use std::time::{Duration, Instant};
+
+use super::clock::SampleClock;
+use super::place::Place;
+use crate::motion::{Pilot, Ticket, Trouble};
+use jaus::messages::core::set_element::ElementRec;
+use jaus::messages::mobility::{
+    QueryActiveElement, QueryGlobalPathSegment, QueryGlobalPathSegmentExt, QueryGlobalWaypoint,
+    QueryGlobalWaypointExt, QueryLocalPathSegment, QueryLocalPathSegmentExt, QueryLocalWaypoint,
+    QueryLocalWaypointExt, QueryTravelSpeed, QueryTravelSpeedExt,
+};
+use jaus::service::{Context, Elements, MotionGuard, State, StopCause};
+
+/// A journey to a place, or along a list of places.
+#[derive(Debug, Default)]
+pub(super) struct Travel {
+    /// Metres per second, as a client wants it; what the vehicle cannot do it does not.
+    speed: f64,
+    place: Option<Place>,
+    /// Where the way to the place begins, in the local frame.
+    start: (f64, f64),
+    /// The element that is driven to, if a list is worked off.
+    active: Option<u16>,
+    /// The element after it, 0 if it is the last.
+    next: u16,
+    ticket: Option<Ticket>,
+    /// The code of the command that the journey carries out, until its end is told.
+    command: Option<u16>,
+}
+
+impl Travel {
+    /// The element that is driven to, if a list is worked off.
+    pub(super) const fn active(&self) -> Option<u16> {
+        self.active
+    }
+
+    /// The wanted speed in metres per second.
+    pub(super) const fn speed(&self) -> f64 {
+        self.speed
+    }
+
+    /// Whether there is a place to drive to.
+    pub(super) const fn has_place(&self) -> bool {
+        self.place.is_some()
+    }
+}
+
+/// Between two looks at a vehicle in trouble.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// State shared by the services of a vehicle: pilot, motion guard, list.
+pub(super) struct Controls {
+    pub(super) pilot: Pilot,
+    pub(super) guard: MotionGuard,
+    /// How often it has been stopped, for each service to see that it was.
+    pub(super) stops: u64,
+    /// What keeps it from driving until it is gone.
+    trouble: Option<StopCause>,
+    looked: Option<Instant>,
+    /// The list that the list drivers work off.
+    pub(super) elements: Elements,
+    pub(super) travel: Travel,
+    pub(super) clock: Option<SampleClock>,
+    /// Magnetic north as seen from true north, in radians, once set.
+    pub(super) magnetic_variation: f64,
+}
+
+impl Controls {
+    /// Nobody drives yet, and nobody knows what time it is.
+    pub(super) fn new(pilot: Pilot) -> Self {
+        Self {
+            pilot,
+            guard: MotionGuard::default(),
+            stops: 0,
+            trouble: None,
+            looked: None,
+            elements: Elements::new(),
+            travel: Travel::default(),
+            clock: None,
+            magnetic_variation: 0.0,
+        }
+    }
+
+    /// Moves on to `now`, and stops at the end of the setpoint in force, or in trouble.
+    pub(super) fn advance(&mut self, now: Instant, context: &mut Context<'_>) {
+        self.guard.note_life(|owner| context.last_sign(owner));
+        self.advance_within(now);
+        if let Some(cause) = self.guard.expire(now) {
+            self.halt(&cause);
+        }
+        self.pilot.handle_time(now);
+        self.looked = Some(now);
+        if self.pilot.is_there() && self.travel.active.is_none() {
+            self.guard.finish();
+        }
+        self.follow_trouble(now, context);
+    }
+
+    /// Moves on to `now`, but not beyond the end of the setpoint in force.
+    pub(super) fn advance_within(&mut self, now: Instant) {
+        let end = self.guard.expires_at().unwrap_or(now);
+        self.pilot.handle_time(now.min(end));
+    }
+
+    /// The one stop of a vehicle.
+    pub(super) fn halt(&mut self, cause: &StopCause) {
+        if self.guard.is_active() || self.pilot.is_under_way() {
+            self.stops += 1;
+        }
+        self.guard.stop(cause.clone());
+        self.pilot.stop();
+    }
+
+    /// A vehicle in trouble puts its component into failure, until the trouble is gone.
+    fn follow_trouble(&mut self, now: Instant, context: &mut Context<'_>) {
+        let trouble = self.pilot.take_trouble().or_else(|| self.pilot.fault());
+        if let Some(cause) = trouble.map(StopCause::from) {
+            if self.trouble.is_none() {
+                self.halt(&cause);
+                context.fail(cause.clone());
+                self.trouble = Some(cause);
+            }
+        } else if let Some(cause) = &self.trouble {
+            let is_gone = match cause {
+                StopCause::Fault(_) => true,
+                _ => self.pilot.pose_trouble(now).is_none(),
+            };
+            if is_gone {
+                self.trouble = None;
+                context.recover();
+            }
+        }
+    }
+
+    /// Whether something keeps it from driving.
+    pub(super) const fn is_in_trouble(&self) -> bool {
+        self.trouble.is_some()
+    }
+
+    /// When to look again whether the trouble is gone.
+    pub(super) fn next_look(&self) -> Option<Instant> {
+        self.looked
+            .filter(|_| self.trouble.is_some())
+            .map(|at| at + LOOK)
+    }
+
+    /// Whether it drives to a place.
+    pub(super) fn is_travelling(&self) -> bool {
+        let ticket = self.travel.ticket;
+        ticket.is_some_and(|ticket| self.pilot.pursues(ticket))
+    }
+
+    /// How many elements of the list lie before the one that is driven to, in percent of all.
+    pub(super) fn progress(&self) -> u8 {
+        let Some(active) = self.travel.active else {
+            return 0;
+        };
+        let (before, all) = self.elements.place_of(active);
+        u8::try_from(100 * before / all.max(1)).unwrap_or(100)
+    }
+
+    /// The place that was set last, or that is the first one of the list.
+    pub(super) fn place(&self) -> Option<Place> {
+        let first = || Place::of(&self.elements.get(0)?);
+        self.travel.place.or_else(first)
+    }
+
+    /// Whether a place is close enough to be driven to.
+    pub(super) fn can_reach(&self, place: &Place) -> bool {
+        place
+            .goal(self.pilot.frame(), (0.0, 0.0), 0.0, false)
+            .is_some()
+    }
+
+    /// Sets the place to drive to, for a command with this code, and sets out if it acts and there is
+    /// a speed.
+    pub(super) fn set_place(
+        &mut self,
+        place: Place,
+        command: u16,
+        acts: bool,
+        context: &mut Context<'_>,
+    ) {
+        self.take_up(command, context);
+        self.travel.place = Some(place);
+        self.travel.start = self.here();
+        self.travel.active = None;
+        self.travel.next = 0;
+        self.set_out(acts);
+    }
+
+    /// From now on the journey is for another command.
+    pub(super) fn take_up(&mut self, command: u16, context: &mut Context<'_>) {
+        let before = self.travel.command.replace(command);
+        // Another command of the same code replaces the one before by itself.
+        if let Some(before) = before.filter(|&before| before != command) {
+            context.ended(before, false);
+        }
+    }
+
+    /// Tells the end of the command that the journey was for.
+    fn finish(&mut self, successful: bool, context: &mut Context<'_>) {
+        if let Some(command) = self.travel.command.take() {
+            context.ended(command, successful);
+        }
+    }
+
+    /// Changes the speed; if it acts, sets out or stops accordingly.
+    pub(super) fn set_speed(&mut self, speed: f64, acts: bool) {
+        self.travel.speed = speed;
+        match self.travel.ticket.filter(|_| speed > 0.0) {
+            Some(ticket) if self.pilot.pursues(ticket) => self.pilot.set_speed(ticket, speed),
+            _ => self.set_out(acts),
+        }
+    }
+
+    /// Works the list off from an element on; 0 stands for the first one. Says whether that is in
+    /// the list.
+    pub(super) fn execute(&mut self, uid: u16, speed: f64, acts: bool) -> bool {
+        let Some(element) = self.elements.get(uid) else {
+            return false;
+        };
+        self.travel.start = self.here();
+        self.begin(&element, speed, acts);
+        true
+    }
+
+    /// Drives to an element of the list.
+    fn begin(&mut self, element: &ElementRec, speed: f64, acts: bool) {
+        self.travel.place = Place::of(element);
+        self.travel.active = Some(element.element_uid);
+        self.travel.next = element.next_uid;
+        self.travel.speed = speed;
+        self.set_out(acts);
+    }
+
+    /// Where the vehicle is, in the local frame.
+    fn here(&self) -> (f64, f64) {
+        let pose = self.pilot.motion().pose;
+        (pose.x, pose.y)
+    }
+
+    /// Drives to the place if it acts and there is a speed, and stops otherwise.
+    fn set_out(&mut self, acts: bool) {
+        let Travel {
+            speed, next, start, ..
+        } = self.travel;
+        let place = self.travel.place.filter(|_| acts && speed > 0.0);
+        let goal = place.and_then(|place| place.goal(self.pilot.frame(), start, speed, next != 0));
+        if let Some(goal) = goal {
+            self.travel.ticket = Some(self.pilot.pursue(goal));
+            return;
+        }
+        if place.is_some() {
+            tracing::warn!(?place, "out of reach");
+            self.travel.active = None;
+        }
+        if let Some(ticket) = self.travel.ticket.take() {
+            self.pilot.give_up(ticket);
+        }
+    }
+
+    /// The local frame lies elsewhere now: what is on the globe is elsewhere in it.
+    pub(super) fn handle_new_frame(&mut self) {
+        let on_globe = matches!(
+            self.travel.place,
+            Some(Place::Global(_) | Place::GlobalPath(_))
+        );
+        let is_under_way = |ticket| self.pilot.pursues(ticket) && !self.pilot.has_arrived(ticket);
+        if on_globe && self.travel.ticket.is_some_and(is_under_way) {
+            self.travel.start = self.here();
+            self.set_out(true);
+        }
+    }
+
+    /// Goes on to the next element of the list when one has been reached.
+    pub(super) fn work_off(&mut self, context: &mut Context<'_>) {
+        let Some(ticket) = self.travel.ticket else {
+            return;
+        };
+        if !self.pilot.pursues(ticket) {
+            // Another driver has taken over.
+            self.abandon(context);
+            return;
+        }
+        let Some(active) = self.travel.active else {
+            if self.pilot.has_arrived(ticket) {
+                self.finish(true, context);
+            }
+            return;
+        };
+        // The list may have been changed meanwhile.
+        let Some(element) = self.elements.get(active) else {
+            tracing::warn!(active, "the element that was driven to has been deleted");
+            self.pilot.give_up(ticket);
+            self.abandon(context);
+            return;
+        };
+        let place = Place::of(&element);
+        if self.travel.next != element.next_uid || self.travel.place != place {
+            self.travel.next = element.next_uid;
+            self.travel.place = place;
+            self.set_out(true);
+        } else if self.pilot.has_arrived(ticket) {
+            tracing::info!(element = active, next = element.next_uid, "element reached");
+            // The next way begins where this one should have ended.
+            if let Some(place) = self.travel.place {
+                let end = place.waypoint(self.pilot.frame());
+                self.travel.start = (end.x, end.y);
+            }
+            let next = self.elements.get(element.next_uid);
+            match next.filter(|_| element.next_uid != 0) {
+                Some(next) => self.begin(&next, self.travel.speed, true),
+                None => {
+                    self.travel.active = None;
+                    self.finish(true, context);
+                }
+            }
+            changed(context);
+        }
+    }
+
+    /// Gives the journey up and forgets it, but not the place.
+    pub(super) fn abandon(&mut self, context: &mut Context<'_>) {
+        if let Some(ticket) = self.travel.ticket {
+            self.pilot.give_up(ticket);
+        }
+        self.finish(false, context);
+        let place = self.travel.place;
+        let is_reset = context.standing().state == State::Initialize;
+        self.travel = Travel {
+            place: place.filter(|_| !is_reset),
+            ..Travel::default()
+        };
+        changed(context);
+    }
+}
+
+/// Says that everything about a journey may be another now.
+pub(super) fn changed(context: &mut Context<'_>) {
+    context.changed::<QueryTravelSpeed>();
+    context.changed::<QueryTravelSpeedExt>();
+    context.changed::<QueryActiveElement>();
+    context.changed::<QueryLocalWaypoint>();
+    context.changed::<QueryLocalWaypointExt>();
+    context.changed::<QueryGlobalWaypoint>();
+    context.changed::<QueryGlobalWaypointExt>();
+    context.changed::<QueryLocalPathSegment>();
+    context.changed::<QueryLocalPathSegmentExt>();
+    context.changed::<QueryGlobalPathSegment>();
+    context.changed::<QueryGlobalPathSegmentExt>();
+}
+
+impl From<Trouble> for StopCause {
+    fn from(trouble: Trouble) -> Self {
+        match trouble {
+            Trouble::Fault(what) => Self::Fault(what),
+            Trouble::PoseStale(age) => Self::PoseStale(age),
+            Trouble::PoseUnknown => Self::PoseUnknown,
+        }
+    }
+}

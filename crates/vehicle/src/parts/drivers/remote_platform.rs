@@ -1,0 +1,312 @@
+//! The platform of a driver that commands another driver: its motion is what sensors report, and what
+//! it is to do is an order for the next one.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::Freshness;
+use crate::motion::{CommandDeadline, Drive, Limits, Motion, Platform, Pose, Velocity};
+
+/// What a driver knows and wants. Cheap to clone; the clones are one.
+#[derive(Debug, Clone)]
+pub(in crate::parts) struct RemotePlatform(Arc<Mutex<State>>);
+
+#[derive(Debug)]
+struct State {
+    settings: RemotePlatformSettings,
+    limits: Limits,
+    motion: Motion,
+    pose: Freshness,
+    velocity: Freshness,
+    order: Option<Order>,
+    /// Since the pilot has controlled this platform last.
+    deadline: CommandDeadline,
+}
+
+/// How a driver does its work.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::parts) struct RemotePlatformSettings {
+    /// What the vehicle can do at most.
+    pub(in crate::parts) limits: Limits,
+    /// It stops when the samples of the sensors are older.
+    pub(in crate::parts) stale: Duration,
+    /// Whether the next driver keeps headings by itself. Else it needs to be told velocities, and
+    /// they need to be measured.
+    pub(in crate::parts) by_heading: bool,
+}
+
+/// What the next driver is to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::parts) enum Order {
+    /// To move like this.
+    Velocity(Velocity),
+    /// To keep a heading in radians, from -π to π, and a speed in metres per second.
+    Heading { heading: f64, speed: f64 },
+}
+
+/// What can be done about an order now.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::parts) enum Plan {
+    /// There is none.
+    Rest,
+    /// It can be carried out, the vehicle moving like this.
+    Go(Order, Motion),
+    /// It can not, and why.
+    Wait(String),
+}
+
+impl RemotePlatform {
+    pub(in crate::parts) fn new(settings: RemotePlatformSettings) -> Self {
+        Self(Arc::new(Mutex::new(State {
+            settings,
+            limits: settings.limits,
+            motion: Motion::default(),
+            pose: Freshness::default(),
+            velocity: Freshness::default(),
+            order: None,
+            deadline: CommandDeadline::default(),
+        })))
+    }
+
+    /// A sensor has reported a pose: X, Y and yaw, sampled at `stamp` of its clock. Without a pose it
+    /// does not know where the vehicle is, and the vehicle stops at once.
+    pub(in crate::parts) fn handle_pose(
+        &self,
+        now: Instant,
+        stamp: Option<Duration>,
+        pose: Option<(f64, f64, f64)>,
+    ) {
+        let mut state = self.lock();
+        match pose {
+            None => state.pose.forget(),
+            Some((x, y, yaw)) => {
+                state.pose.handle(now, stamp);
+                state.motion.pose = Pose {
+                    yaw,
+                    ..Pose::at(x, y)
+                };
+            }
+        }
+    }
+
+    /// The same for a velocity: speed forward and yaw rate.
+    pub(in crate::parts) fn handle_velocity(
+        &self,
+        now: Instant,
+        stamp: Option<Duration>,
+        velocity: Option<(f64, f64)>,
+    ) {
+        let mut state = self.lock();
+        match velocity {
+            None => state.velocity.forget(),
+            Some((x, yaw)) => {
+                state.velocity.handle(now, stamp);
+                state.motion.velocity = Velocity::forward(x, yaw);
+            }
+        }
+    }
+
+    /// What is to be done now.
+    pub(in crate::parts) fn plan(&self, now: Instant) -> Plan {
+        let mut state = self.lock();
+        let Some(order) = state.order else {
+            return Plan::Rest;
+        };
+        if state.deadline.has_passed(now) {
+            return Plan::Wait("the driver's control loop does not run".to_owned());
+        }
+        match state.lack(now) {
+            Some(why) => Plan::Wait(why),
+            None => Plan::Go(order, state.motion),
+        }
+    }
+
+    /// Which sensor's samples are missing or too old, if any are.
+    pub(in crate::parts) fn lack(&self, now: Instant) -> Option<String> {
+        self.lock().lack(now)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn lack(&self, now: Instant) -> Option<String> {
+        let needs = [
+            (&self.pose, "pose", true),
+            (&self.velocity, "velocity", !self.settings.by_heading),
+        ];
+        let mut needs = needs.into_iter().filter(|&(_, _, needed)| needed);
+        needs.find_map(|(sensor, what, _)| match sensor.age(now) {
+            None => Some(format!("no {what} is known")),
+            Some(age) if age > self.settings.stale => {
+                Some(format!("the {what} is {:.1} s old", age.as_secs_f64()))
+            }
+            Some(_) => None,
+        })
+    }
+}
+
+impl Platform for RemotePlatform {
+    /// An order holds as long as the pilot goes on controlling this platform.
+    fn handle_time(&mut self, now: Instant) {
+        self.lock().deadline.restart(Some(now));
+    }
+
+    fn motion(&self) -> Motion {
+        self.lock().motion
+    }
+
+    fn set_pose(&mut self, _: Pose) {
+        // Where it is the sensor says.
+    }
+
+    fn drive(&mut self, command: Drive) {
+        let mut state = self.lock();
+        let by_heading = state.settings.by_heading;
+        let heading = state.motion.pose.yaw;
+        state.order = match command.or_stop() {
+            Drive::Velocity(velocity) if by_heading => Some(Order::Heading {
+                heading,
+                speed: velocity.x.max(0.0),
+            }),
+            Drive::Velocity(velocity) => Some(Order::Velocity(velocity)),
+            // No driver above the primitive one is told efforts.
+            Drive::Stop | Drive::Effort(_) => None,
+        };
+    }
+
+    fn head(&mut self, heading: f64, speed: f64, limits: &Limits) {
+        if !heading.is_finite() || !speed.is_finite() {
+            return self.drive(Drive::Stop);
+        }
+        if !self.lock().settings.by_heading {
+            let yaw = self.motion().pose.yaw;
+            let velocity = crate::motion::along(yaw, heading, speed, limits);
+            return self.drive(Drive::Velocity(limits.clamp(velocity)));
+        }
+        self.lock().order = Some(Order::Heading {
+            heading: crate::motion::wrap(heading),
+            speed: speed.clamp(0.0, limits.speed),
+        });
+    }
+
+    fn limits(&self) -> Limits {
+        self.lock().settings.limits
+    }
+
+    fn set_limits(&mut self, limits: Limits) {
+        let mut state = self.lock();
+        state.limits = limits.and(&state.settings.limits);
+    }
+}
+
+#[cfg(test)]
+#[expect(
+    clippy::disallowed_methods,
+    reason = "any moment will do as the beginning of virtual time"
+)]
+mod tests {
+    use super::*;
+
+    fn remote_platform(by_heading: bool) -> RemotePlatform {
+        RemotePlatform::new(RemotePlatformSettings {
+            limits: Limits::default(),
+            stale: Duration::from_millis(600),
+            by_heading,
+        })
+    }
+
+    fn wait(plan: &Plan) -> &str {
+        match plan {
+            Plan::Wait(why) => why,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn an_order_is_carried_out_only_with_fresh_reports() {
+        let mut remote_platform = remote_platform(false);
+        let start = Instant::now();
+        assert_eq!(remote_platform.plan(start), Plan::Rest);
+        let order = Velocity::forward(1.0, 0.1);
+        remote_platform.drive(Drive::Velocity(order));
+        assert_eq!(wait(&remote_platform.plan(start)), "no pose is known");
+        remote_platform.handle_pose(start, None, Some((1.0, 2.0, 0.5)));
+        assert_eq!(wait(&remote_platform.plan(start)), "no velocity is known");
+        remote_platform.handle_velocity(start, None, Some((0.5, 0.0)));
+        let Plan::Go(Order::Velocity(velocity), motion) = remote_platform.plan(start) else {
+            panic!("it can go");
+        };
+        assert_eq!((velocity, motion.pose.y), (order, 2.0));
+        let later = start + Duration::from_millis(800);
+        remote_platform.handle_time(later);
+        remote_platform.handle_velocity(later, None, Some((0.5, 0.0)));
+        assert_eq!(wait(&remote_platform.plan(later)), "the pose is 0.8 s old");
+        remote_platform.handle_pose(later, None, Some((1.0, 2.0, 0.5)));
+        assert!(matches!(remote_platform.plan(later), Plan::Go(..)));
+        remote_platform.handle_pose(later, None, None);
+        assert_eq!(wait(&remote_platform.plan(later)), "no pose is known");
+        remote_platform.drive(Drive::Stop);
+        assert_eq!(remote_platform.plan(later), Plan::Rest);
+    }
+
+    #[test]
+    fn a_heading_is_left_to_a_driver_that_keeps_headings() {
+        let mut remote_platform = remote_platform(true);
+        let now = Instant::now();
+        remote_platform.handle_pose(now, None, Some((0.0, 0.0, 0.0)));
+        remote_platform.head(4.0, 9.0, &Limits::default());
+        let Plan::Go(Order::Heading { heading, speed }, _) = remote_platform.plan(now) else {
+            panic!("it can go");
+        };
+        assert!((heading - (4.0 - std::f64::consts::TAU)).abs() < 1e-9);
+        assert_eq!(speed, 2.0, "as fast as the vehicle can");
+    }
+
+    #[test]
+    fn a_frozen_pose_is_no_pose_within_the_limit() {
+        let mut remote_platform = remote_platform(true);
+        let start = Instant::now();
+        let period = Duration::from_millis(40);
+        let mut plan = |count: u32, stamp: u32| {
+            let now = start + period * count;
+            remote_platform.handle_time(now);
+            remote_platform.head(0.0, 1.0, &Limits::default());
+            let stamp = Duration::from_secs(3600) + period * stamp;
+            remote_platform.handle_pose(now, Some(stamp), Some((1.0, 2.0, 0.5)));
+            remote_platform.plan(now)
+        };
+        for count in 0..10 {
+            let goes = matches!(plan(count, count), Plan::Go(..));
+            assert_eq!(goes, count > 0, "{count}");
+        }
+        // Reports go on coming, with the pose of the same moment.
+        let plans: Vec<_> = (10..30).map(|count| plan(count, 9)).collect();
+        assert!(matches!(plans[14], Plan::Go(..)), "0.6 s old");
+        assert_eq!(wait(&plans[15]), "the pose is 0.6 s old");
+    }
+
+    #[test]
+    fn an_order_ends_when_the_control_loop_hangs() {
+        let mut remote_platform = remote_platform(true);
+        let start = Instant::now();
+        remote_platform.handle_time(start);
+        remote_platform.head(0.0, 1.0, &Limits::default());
+        let later = start + CommandDeadline::DEFAULT;
+        remote_platform.handle_pose(later, None, Some((0.0, 0.0, 0.0)));
+        assert!(matches!(remote_platform.plan(later), Plan::Go(..)));
+        let too_late = later + Duration::from_millis(1);
+        assert!(wait(&remote_platform.plan(too_late)).contains("control loop"));
+    }
+
+    #[test]
+    fn a_heading_that_is_no_number_is_no_order() {
+        for by_heading in [true, false] {
+            let mut remote_platform = remote_platform(by_heading);
+            remote_platform.head(f64::NAN, 1.0, &Limits::default());
+            assert_eq!(remote_platform.plan(Instant::now()), Plan::Rest);
+        }
+    }
+}

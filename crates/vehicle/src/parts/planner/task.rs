@@ -1,0 +1,406 @@
+//! The planner at work: does what the mission asks for, one thing after the other, and tells it
+//! what happens.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "here the mission gets its time, and planning a thread"
+)]
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use tokio::sync::{Notify, mpsc};
+
+use super::chain::{self, News};
+use super::map::{self, Map};
+use super::{Planner, find_soon, hand_over};
+use crate::ground::Missions;
+use crate::mission::{
+    self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Run, Stage,
+};
+use jaus::address::JausId;
+use jaus::component::{Component, Control};
+use jaus::messages::core::report_status::Status;
+use jaus::messages::core::{
+    QueryControl, QueryHeartbeatPulse, QueryStatus, ReportControl, ReportHeartbeatPulse,
+    ReportStatus,
+};
+use jaus::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, ReportStage, stage};
+
+/// How long the driver may take to stop and to be given back.
+const HALT: Duration = Duration::from_secs(2);
+
+type Job = Pin<Box<dyn Future<Output = Done> + Send>>;
+
+/// What a job has come to.
+enum Done {
+    Map(Run, Result<Map, String>),
+    Planned(Run, Result<Path, NotPlanned>),
+    HandedOver(Run, Result<(Control, Vec<(Link, LinkState)>), String>),
+    /// Whether the client that has lost control is alive.
+    Checked(Run, bool),
+    /// Why control was lost; `Err` if somebody has taken it or there is an emergency.
+    Lost(Run, Result<String, String>),
+}
+
+/// What the planner has before it.
+pub(super) struct PlannerTask<'a> {
+    settings: &'a Planner,
+    component: &'a Component,
+    missions: Missions,
+    wake: &'a Notify,
+    map: Option<Map>,
+    /// Of the path segment driver, while it drives for us.
+    control: Option<Control>,
+    job: Option<Job>,
+    /// The drivers, by link.
+    peers: [Option<JausId>; 3],
+    controllers: [Option<JausId>; 3],
+    told: Option<(Run, Stage)>,
+}
+
+impl<'a> PlannerTask<'a> {
+    /// News that may wait.
+    pub(super) const NEWS: usize = 64;
+
+    pub(super) fn new(
+        settings: &'a Planner,
+        component: &'a Component,
+        missions: Missions,
+        wake: &'a Notify,
+    ) -> Self {
+        Self {
+            settings,
+            component,
+            missions,
+            wake,
+            map: None,
+            control: None,
+            job: None,
+            peers: [None; 3],
+            controllers: [None; 3],
+            told: None,
+        }
+    }
+
+    /// Works until the component has stopped.
+    pub(super) async fn work(mut self, mut news: mpsc::Receiver<News>) {
+        loop {
+            self.act().await;
+            let (timeout, _) = self.missions.tell(|mission| mission.poll_timeout());
+            tokio::select! {
+                () = self.wake.notified() => {}
+                done = working(&mut self.job) => {
+                    self.job = None;
+                    self.handle(done).await;
+                }
+                news = news.recv() => match news {
+                    Some(news) => self.hear(news).await,
+                    None => return,
+                },
+                () = until(timeout) => {
+                    self.tell(|mission, now| mission.handle_time(now)).await;
+                }
+                error = lost(&mut self.control) => self.look_why_lost(&error.to_string()),
+            }
+        }
+    }
+
+    /// Tells the mission something, and others what has changed by that.
+    async fn tell<T>(&mut self, words: impl FnOnce(&mut Mission, Instant) -> T) -> T {
+        let now = Instant::now();
+        let (answer, news) = self.missions.tell(|mission| words(mission, now));
+        if news.mission {
+            self.component.changed::<QueryMission>().await;
+        }
+        if news.path {
+            self.component.changed::<QueryPlannedPath>().await;
+        }
+        self.log();
+        answer
+    }
+
+    /// Tells people when a stage begins.
+    fn log(&mut self) {
+        let (report, _) = self.missions.tell(|mission| mission.report().clone());
+        let now = Some((report.run, report.stage));
+        if self.told == now || report.stage == Stage::Idle {
+            return;
+        }
+        self.told = now;
+        let Run { mission, attempt } = report.run;
+        let reason = match report.reason.as_str() {
+            "" => String::new(),
+            reason => format!(" ({reason})"),
+        };
+        tracing::info!(
+            "mission {mission} to x {:.2} m, y {:.2} m, attempt {attempt} of {}: {}{reason}",
+            report.destination.x,
+            report.destination.y,
+            report.attempts,
+            report.stage
+        );
+    }
+
+    /// Begins what the mission asks for. While the vehicle is being stopped nothing else begins.
+    async fn act(&mut self) {
+        self.log();
+        loop {
+            let (action, _) = self.missions.tell(Mission::poll_action);
+            match action {
+                None => return,
+                Some(Action::Halt) => {
+                    self.job = None;
+                    if let Some(control) = self.control.take() {
+                        // Not longer than that, and before anything else.
+                        let _ = tokio::time::timeout(HALT, halt(control)).await;
+                    }
+                }
+                Some(Action::FetchMap(run)) => self.job = Some(self.fetch_map(run)),
+                Some(Action::Plan(run, to)) => self.job = Some(self.plan(run, to)),
+                Some(Action::CheckClient(run, client)) => {
+                    let component = self.component.clone();
+                    self.job = Some(Box::pin(async move {
+                        let query = QueryHeartbeatPulse {};
+                        let answer = component.query::<ReportHeartbeatPulse, _>(client, &query);
+                        Done::Checked(run, answer.await.is_ok())
+                    }));
+                }
+                Some(Action::HandOver(run, path, speed)) => {
+                    self.job = Some(self.hand_over(run, path, speed));
+                }
+            }
+        }
+    }
+
+    fn fetch_map(&self, run: Run) -> Job {
+        let (component, name) = (self.component.clone(), self.settings.map.clone());
+        let known = self.map.clone();
+        Box::pin(async move { Done::Map(run, map::fetch(&component, &name, known).await) })
+    }
+
+    fn plan(&self, run: Run, to: Destination) -> Job {
+        let component = self.component.clone();
+        let vehicle = self.settings.vehicle;
+        let terrain = self.map.as_ref().map(|map| Arc::clone(&map.terrain));
+        Box::pin(async move {
+            let passing = |reason| NotPlanned {
+                reason,
+                hopeless: false,
+            };
+            let start = match map::fetch_pose(&component).await {
+                Ok(start) => start,
+                Err(reason) => return Done::Planned(run, Err(passing(reason))),
+            };
+            let plan = move || {
+                let terrain = terrain.ok_or_else(|| passing("there is no map".to_owned()))?;
+                Ok(mission::plan(&terrain, &vehicle, start, (to.x, to.y))?)
+            };
+            let planned = tokio::task::spawn_blocking(plan).await;
+            Done::Planned(
+                run,
+                planned.unwrap_or_else(|error| Err(passing(error.to_string()))),
+            )
+        })
+    }
+
+    fn hand_over(&self, run: Run, path: Arc<Path>, speed: f64) -> Job {
+        let component = self.component.clone();
+        let Planner {
+            authority,
+            tolerance,
+            ..
+        } = *self.settings;
+        Box::pin(async move {
+            let given = async {
+                let services = [chain::service(Link::Path), stage::URN];
+                let what = "local path segment driver";
+                let driver = find_soon(&component, &services, what).await?;
+                let control = component.control(driver, authority).await;
+                let control = control.map_err(hand_over::in_words)?;
+                control.resume().await.map_err(hand_over::in_words)?;
+                hand_over::hand_over(&component, &control, &path, speed, tolerance).await?;
+                Ok((control, look(&component).await))
+            };
+            Done::HandedOver(run, given.await)
+        })
+    }
+
+    async fn handle(&mut self, done: Done) {
+        match done {
+            Done::Map(run, result) => {
+                let result = result.map(|map| self.map = Some(map));
+                self.tell(|mission, now| mission.handle_map(now, run, result))
+                    .await;
+            }
+            Done::Planned(run, result) => {
+                self.tell(|mission, now| mission.handle_path(now, run, result))
+                    .await;
+            }
+            Done::HandedOver(run, Ok((control, states))) => {
+                self.control = Some(control);
+                self.tell(|mission, now| {
+                    mission.handle_handed_over(now, run, Ok(()));
+                    for (link, state) in states {
+                        mission.handle_link(now, link, state);
+                    }
+                })
+                .await;
+            }
+            Done::HandedOver(run, Err(reason)) => {
+                self.tell(|mission, now| mission.handle_handed_over(now, run, Err(reason)))
+                    .await;
+            }
+            Done::Checked(run, is_alive) => {
+                self.tell(|mission, now| mission.handle_lost_client(now, run, is_alive))
+                    .await;
+            }
+            Done::Lost(run, Ok(setback)) => {
+                self.tell(|mission, now| mission.handle_setback(now, run, &setback))
+                    .await;
+            }
+            Done::Lost(_, Err(stop)) => self.tell(|mission, _| mission.stop(&stop)).await,
+        }
+    }
+
+    async fn hear(&mut self, news: News) {
+        match news {
+            News::Pose(point) => self.tell(|mission, _| mission.handle_pose(point)).await,
+            News::Found(link, peer) => self.peers[link as usize] = peer,
+            News::Stage(link, state, progress) => {
+                self.tell(|mission, now| {
+                    if link == Link::Path {
+                        let run = mission.report().run;
+                        let length = mission.path().length();
+                        let ahead = length * (1.0 - f64::from(progress.min(100)) / 100.0);
+                        mission.handle_progress(now, run, progress, ahead);
+                    }
+                    mission.handle_link(now, link, state);
+                })
+                .await;
+            }
+            News::Controller(link, controller) => {
+                let before = std::mem::replace(&mut self.controllers[link as usize], controller);
+                if let Some(client) = controller.filter(|_| controller != before) {
+                    self.check_controller(link, client).await;
+                }
+            }
+            News::StoodDown(link, reason) => {
+                let reason = format!("the {link}{} has stood down: {reason}", self.named(link));
+                self.stop_if_driving(&reason).await;
+            }
+            News::Emergency(link) => {
+                let reason = format!("the {link}{} is in emergency", self.named(link));
+                self.stop_if_driving(&reason).await;
+            }
+        }
+    }
+
+    /// Whoever is not of the chain has taken over.
+    async fn check_controller(&mut self, link: Link, client: JausId) {
+        let before = match link {
+            Link::Path => Some(self.component.id()),
+            Link::Vector => self.peers[Link::Path as usize],
+            Link::Primitive => self.peers[Link::Vector as usize],
+        };
+        if before != Some(client) {
+            let reason = format!(
+                "{client} has taken control of the {link}{}",
+                self.named(link)
+            );
+            self.stop_if_driving(&reason).await;
+        }
+    }
+
+    async fn stop_if_driving(&mut self, reason: &str) {
+        self.tell(|mission, _| {
+            if mission.report().stage.is_handed_over() {
+                mission.stop(reason);
+            }
+        })
+        .await;
+    }
+
+    fn named(&self, link: Link) -> String {
+        self.peers[link as usize].map_or_else(String::new, |id| format!(" ({id})"))
+    }
+
+    /// Control over the path segment driver is lost: asks it why.
+    fn look_why_lost(&mut self, error: &str) {
+        let Some(control) = self.control.take() else {
+            return;
+        };
+        let (run, _) = self.missions.tell(|mission| mission.report().run);
+        let (component, peer) = (self.component.clone(), control.peer());
+        let error = error.to_owned();
+        self.job = Some(Box::pin(async move {
+            let why = why_lost(&component, peer, error).await;
+            Done::Lost(run, why)
+        }));
+    }
+}
+
+/// Why control over a driver was lost; an error if that ends the mission.
+async fn why_lost(component: &Component, peer: JausId, error: String) -> Result<String, String> {
+    let status = component.query(peer, &QueryStatus {}).await;
+    if status.is_ok_and(|report: ReportStatus| report.status == Status::EMERGENCY) {
+        return Err(format!("the {} ({peer}) is in emergency", Link::Path));
+    }
+    let control = component.query(peer, &QueryControl {}).await;
+    let client = control
+        .ok()
+        .and_then(|it: ReportControl| chain::controller(&it));
+    match client.filter(|&client| client != component.id()) {
+        Some(client) => Err(format!(
+            "{client} has taken control of the {} ({peer})",
+            Link::Path
+        )),
+        None => Ok(error),
+    }
+}
+
+/// How the drivers are now, those that can be asked.
+async fn look(component: &Component) -> Vec<(Link, LinkState)> {
+    let mut states = Vec::new();
+    for link in Link::ALL {
+        let services = [chain::service(link), stage::URN];
+        if let Ok(peer) = find_soon(component, &services, "driver").await {
+            let report = component.query(peer, &QueryStage {}).await;
+            let state = report.map_or(LinkState::Silent, |it: ReportStage| chain::state(&it));
+            states.push((link, state));
+        }
+    }
+    states
+}
+
+/// Stops a driver and gives it back.
+async fn halt(control: Control) {
+    if let Err(error) = control.standby().await {
+        tracing::debug!(%error, "giving it back will stop it");
+    }
+    control.release().await;
+}
+
+/// Waits for the job, if there is one.
+async fn working(job: &mut Option<Job>) -> Done {
+    match job {
+        Some(job) => job.await,
+        None => std::future::pending().await,
+    }
+}
+
+/// Waits until control is lost, if there is any.
+async fn lost(control: &mut Option<Control>) -> jaus::component::ControlError {
+    match control {
+        Some(control) => control.lost().await,
+        None => std::future::pending().await,
+    }
+}
+
+async fn until(time: Option<Instant>) {
+    match time {
+        Some(time) => tokio::time::sleep_until(time.into()).await,
+        None => std::future::pending().await,
+    }
+}

@@ -1,0 +1,7 @@
+//! The reference vehicle: missions, the store under power cuts, faults, hostile clients.
+
+mod mission;
+mod part_faults;
+mod store;
+mod vehicle_hostile;
+mod waterfall;

@@ -1,0 +1,427 @@
+//! Faults of motors, sensors and disks below the ready components: what stops, what is reported, and
+//! how it goes on.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test with sockets"
+)]
+
+use std::future::Future;
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use jaus::address::JausId;
+use jaus::component::{Component, Control, Kind, State};
+use jaus::link::Group;
+use jaus::messages::core::{QueryStatus, ReportStatus, Shutdown};
+use jaus::messages::ground::{QueryStage, QueryWheelOdometry, ReportStage, ReportWheelOdometry};
+use jaus::messages::mobility::report_local_pose::TimeStamp;
+use jaus::messages::mobility::{
+    QueryLocalPose, ReportLocalPose, SetLocalVector, SetWrenchEffort, local_vector_driver,
+    primitive_driver,
+};
+use jaus::node::{Config, Node};
+use jaus_test_kit::group::own_group;
+use jaus_vehicle::actuator::{Actuator, MotorConfig, SimulatedMotor, SimulatedStop};
+use jaus_vehicle::ground::{StageReport, StageState};
+use jaus_vehicle::parts::{
+    Hardware, Part, PartError, PoseSensor, PrimitiveDriver, Slot, VectorDriver, VelocitySensor,
+};
+use tokio::task::JoinHandle;
+
+const PRIMITIVE: JausId = JausId::new(101, 33, 33);
+const POSE: JausId = JausId::new(101, 41, 41);
+const VELOCITY: JausId = JausId::new(101, 42, 42);
+const VECTOR: JausId = JausId::new(101, 44, 44);
+/// Longer than anything takes; reached only when a test fails.
+const LIMIT: Duration = Duration::from_secs(60);
+
+/// A client, and a group for it and the parts.
+struct Scene {
+    group: Group,
+    client: Component,
+    _node: Node,
+}
+
+/// A part that runs until it is stopped.
+struct Running(Node, JoinHandle<()>);
+
+impl Running {
+    async fn stop(self) {
+        self.1.abort();
+        let _ = self.1.await;
+        self.0.shutdown().await;
+    }
+}
+
+impl Scene {
+    fn new() -> Self {
+        let group = own_group();
+        let node = Node::start(Config::loopback(42, 1).group(group)).unwrap();
+        let client = Component::builder(Kind::OperatorControlUnit, "Operator");
+        Self {
+            group,
+            client: client.attach(&node, 1).unwrap(),
+            _node: node,
+        }
+    }
+
+    fn start<F>(&self, id: JausId, run: impl FnOnce(Slot) -> F) -> Running
+    where
+        F: Future<Output = Result<std::convert::Infallible, PartError>> + Send + 'static,
+    {
+        let config = Config::loopback(id.subsystem(), id.node()).group(self.group);
+        let node = Node::start(config).unwrap();
+        let part = run(Slot {
+            port: node.attach(id.component()).unwrap(),
+            node: Some(node.clone()),
+            kind: Kind::Vehicle,
+            name: "Rover".to_owned(),
+        });
+        let task = tokio::spawn(async move {
+            match part.await {
+                Err(PartError::ShutDown) => {}
+                Err(error) => panic!("{id} cannot go on: {error}"),
+            }
+        });
+        Running(node, task)
+    }
+
+    /// Takes control, and makes the component ready.
+    async fn control(&self, id: JausId, urn: &str) -> Control {
+        self.until("control", || async {
+            if self.client.find(urn).await.is_err() {
+                return None;
+            }
+            let control = self.client.control(id, 200).await.ok()?;
+            control.resume().await.ok()?;
+            Some(control)
+        })
+        .await
+    }
+
+    async fn state(&self, id: JausId) -> Option<u8> {
+        let report: ReportStatus = self.client.query(id, &QueryStatus {}).await.ok()?;
+        Some(report.status.0)
+    }
+
+    async fn stage(&self, id: JausId) -> Option<StageReport> {
+        let report: ReportStage = self.client.query(id, &QueryStage {}).await.ok()?;
+        Some(StageReport::from(&report))
+    }
+
+    async fn wheels(&self) -> (f64, f64) {
+        let query = QueryWheelOdometry {};
+        let report: ReportWheelOdometry = self.client.query(PRIMITIVE, &query).await.unwrap();
+        (report.left, report.right)
+    }
+
+    /// Tries until there is an answer.
+    async fn until<T, F: Future<Output = Option<T>>>(
+        &self,
+        what: &str,
+        mut attempt: impl FnMut() -> F,
+    ) -> T {
+        let start = Instant::now();
+        loop {
+            if let Some(answer) = attempt().await {
+                return answer;
+            }
+            assert!(start.elapsed() < LIMIT, "{what}: in vain");
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    }
+
+    /// Repeats a command until a component is in a state.
+    async fn until_state(
+        &self,
+        id: JausId,
+        state: State,
+        control: &Control,
+        command: &impl jaus::codec::Message,
+    ) {
+        self.until(&format!("{id} in {state}"), || async {
+            let _ = control.send(command);
+            (self.state(id).await == Some(state as u8)).then_some(())
+        })
+        .await;
+    }
+}
+
+fn ahead() -> SetWrenchEffort {
+    let mut effort = SetWrenchEffort::default();
+    effort.set_propulsive_linear_effort_x_percent(50.0).unwrap();
+    effort
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_motor_fault_stops_both_sides_and_is_a_failure_until_it_is_gone() {
+    let scene = Scene::new();
+    let [left, right] = [(); 2].map(|()| SimulatedMotor::new(MotorConfig::default()));
+    let switch = right.fault_switch();
+    let hardware = Hardware {
+        left: Box::new(left),
+        right: Box::new(right),
+        stop: None,
+    };
+    let running = scene.start(PRIMITIVE, |slot| {
+        PrimitiveDriver::default().run_on(hardware, slot)
+    });
+    let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    let moved = scene.until("motion", || async {
+        control.send(&ahead()).unwrap();
+        (scene.wheels().await.0 > 0.1).then_some(())
+    });
+    moved.await;
+    switch.fail("no current");
+    scene
+        .until_state(PRIMITIVE, State::Failure, &control, &ahead())
+        .await;
+    scene
+        .until("the reason", || async {
+            let stage = scene.stage(PRIMITIVE).await?;
+            let is_told = stage.state == StageState::Blocked && stage.reason == "no current";
+            is_told.then_some(())
+        })
+        .await;
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    let before = scene.wheels().await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert_eq!(scene.wheels().await, before, "both sides stand");
+    switch.mend();
+    scene
+        .until("recovery", || async {
+            (scene.state(PRIMITIVE).await == Some(State::Standby as u8)).then_some(())
+        })
+        .await;
+    drop(control);
+    let again = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    assert_eq!(scene.wheels().await, before, "not without a new command");
+    scene
+        .until("motion again", || async {
+            again.send(&ahead()).unwrap();
+            (scene.wheels().await.0 > before.0 + 0.1).then_some(())
+        })
+        .await;
+    running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_sensor_that_stays_away_is_a_failure_of_the_driver_until_it_is_back() {
+    let scene = Scene::new();
+    let wheels = scene.start(PRIMITIVE, |slot| PrimitiveDriver::default().run(slot));
+    let pose = scene.start(POSE, |slot| PoseSensor::default().run(slot));
+    let velocity = scene.start(VELOCITY, |slot| VelocitySensor::default().run(slot));
+    let driver = scene.start(VECTOR, |slot| VectorDriver::default().run(slot));
+    let control = scene.control(VECTOR, local_vector_driver::URN).await;
+    let mut vector = SetLocalVector::default();
+    vector.set_speed_m_per_s(0.5).unwrap();
+    scene
+        .until("motion", || async {
+            control.send(&vector).unwrap();
+            let query = QueryWheelOdometry {};
+            let report: Option<ReportWheelOdometry> =
+                scene.client.query(PRIMITIVE, &query).await.ok();
+            report.filter(|wheels| wheels.left > 0.2)
+        })
+        .await;
+    pose.stop().await;
+    scene
+        .until_state(VECTOR, State::Failure, &control, &vector)
+        .await;
+    let stage = scene
+        .until("the reason", || async {
+            let stage = scene.stage(VECTOR).await?;
+            stage.reason.starts_with("failure: ").then_some(stage)
+        })
+        .await;
+    assert_eq!(stage.state, StageState::Blocked);
+    assert!(stage.reason.contains("pose"), "{}", stage.reason);
+    let before = scene.wheels().await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert_eq!(scene.wheels().await, before, "it stands");
+    let pose = scene.start(POSE, |slot| PoseSensor::default().run(slot));
+    scene
+        .until("recovery", || async {
+            (scene.state(VECTOR).await == Some(State::Standby as u8)).then_some(())
+        })
+        .await;
+    for part in [wheels, pose, velocity, driver] {
+        part.stop().await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_stop_input_is_an_emergency_and_its_release_ends_all_of_them() {
+    let scene = Scene::new();
+    let [left, right] = [(); 2].map(|()| {
+        let motor = SimulatedMotor::new(MotorConfig::default());
+        Box::new(motor) as Box<dyn Actuator>
+    });
+    let button = SimulatedStop::default();
+    let stop = Some(Box::new(button.clone()) as _);
+    let hardware = Hardware { left, right, stop };
+    let running = scene.start(PRIMITIVE, |slot| {
+        PrimitiveDriver::default().run_on(hardware, slot)
+    });
+    let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    let moves = async |before: f64| {
+        scene
+            .until("motion", || async {
+                let _ = control.send(&ahead());
+                (scene.wheels().await.0 > before + 0.1).then_some(())
+            })
+            .await;
+    };
+    moves(0.0).await;
+    button.press();
+    scene
+        .until_state(PRIMITIVE, State::Emergency, &control, &ahead())
+        .await;
+    // Another one, whose setter does not come back.
+    scene.client.set_emergency(PRIMITIVE).await.unwrap();
+    tokio::time::sleep(Duration::from_secs(1)).await;
+    let before = scene.wheels().await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    assert_eq!(scene.wheels().await, before, "it stands");
+    button.release();
+    scene
+        .until_state(PRIMITIVE, State::Standby, &control, &ahead())
+        .await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    let _ = control.send(&ahead());
+    assert_eq!(scene.wheels().await, before, "not before it is resumed");
+    control.resume().await.unwrap();
+    moves(before.0).await;
+    running.stop().await;
+}
+
+/// A drive that shows what it was commanded last.
+struct Shown(std::sync::Arc<std::sync::Mutex<jaus_vehicle::actuator::Command>>);
+
+impl Actuator for Shown {
+    fn handle_time(&mut self, _: Instant) {}
+
+    fn command(&mut self, command: jaus_vehicle::actuator::Command) {
+        *self.0.lock().unwrap() = command;
+    }
+
+    fn travel(&self) -> f64 {
+        0.0
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn motors_are_commanded_to_stop_when_the_part_is_stopped() {
+    let scene = Scene::new();
+    let last = std::sync::Arc::<std::sync::Mutex<jaus_vehicle::actuator::Command>>::default();
+    let hardware = Hardware {
+        left: Box::new(Shown(last.clone())),
+        right: Box::new(SimulatedMotor::new(MotorConfig::default())),
+        stop: None,
+    };
+    let running = scene.start(PRIMITIVE, |slot| {
+        PrimitiveDriver::default().run_on(hardware, slot)
+    });
+    let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    scene
+        .until("a command", || async {
+            control.send(&ahead()).unwrap();
+            (last.lock().unwrap().drive > 0.0).then_some(())
+        })
+        .await;
+    running.stop().await;
+    scene
+        .until("the stop", || async {
+            (*last.lock().unwrap() == jaus_vehicle::actuator::Command::STOP).then_some(())
+        })
+        .await;
+}
+
+/// Lets a writer go that waits for a reader of this file, so that a test that fails ends.
+struct Stall(PathBuf);
+
+impl Drop for Stall {
+    fn drop(&mut self) {
+        let file = self.0.clone();
+        if file.exists() {
+            std::thread::spawn(move || std::fs::read(file));
+            std::thread::sleep(Duration::from_millis(500));
+        }
+    }
+}
+
+/// Milliseconds since midnight.
+fn milliseconds(stamp: TimeStamp) -> i64 {
+    let minutes = i64::from(stamp.hour()) * 60 + i64::from(stamp.minutes());
+    (minutes * 60 + i64::from(stamp.seconds())) * 1000 + i64::from(stamp.milliseconds())
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_disk_that_stalls_changes_neither_the_reports_of_the_pose_nor_their_stamps() {
+    let directory = std::env::temp_dir().join(format!("jaus-stall-{}", std::process::id()));
+    std::fs::create_dir_all(&directory).unwrap();
+    let file: PathBuf = directory.join("pose.toml");
+    // The sensor writes a new file beside the old one. Opening this one does not return before it
+    // is opened for reading, too.
+    let stalled = directory.join("pose.toml.new");
+    let made = Command::new("mkfifo").arg(&stalled).status().unwrap();
+    assert!(made.success());
+    let _stall = Stall(stalled.clone());
+    let scene = Scene::new();
+    let wheels = scene.start(PRIMITIVE, |slot| PrimitiveDriver::default().run(slot));
+    let sensor = PoseSensor {
+        file: Some(file.clone()),
+        ..PoseSensor::default()
+    };
+    let pose = scene.start(POSE, |slot| sensor.run(slot));
+    let ask = async || {
+        let query = QueryLocalPose {
+            presence_vector: 0x0103,
+        };
+        let report: Option<ReportLocalPose> = scene.client.query(POSE, &query).await.ok();
+        let report = report?;
+        report.x_m()?;
+        Some(milliseconds(report.time_stamp?))
+    };
+    let first = scene.until("a pose", &ask).await;
+    let start = Instant::now();
+    // As long as the disk stalls.
+    while start.elapsed() < Duration::from_secs(3) {
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    let last = scene.until("a pose", &ask).await;
+    let (passed, stamped) = (start.elapsed().as_millis() as i64, last - first);
+    assert!(
+        (stamped - passed).abs() < 1000 || stamped < 0,
+        "{passed} ms passed, and the stamps advanced by {stamped} ms"
+    );
+    assert!(!file.exists(), "the disk did stall");
+    // Read it, so that the writer can end.
+    let reader = std::thread::spawn(move || {
+        let _ = std::fs::read(&stalled);
+        std::fs::remove_file(&stalled)
+    });
+    scene
+        .until("the file", || async { file.exists().then_some(()) })
+        .await;
+    reader.join().unwrap().unwrap();
+    pose.stop().await;
+    wheels.stop().await;
+    std::fs::remove_dir_all(&directory).unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_part_ends_when_the_client_in_control_shuts_it_down() {
+    let scene = Scene::new();
+    let running = scene.start(PRIMITIVE, |slot| PrimitiveDriver::default().run(slot));
+    let control = scene.control(PRIMITIVE, primitive_driver::URN).await;
+    control.send(&Shutdown {}).unwrap();
+    let Running(_node, task) = running;
+    let ended = tokio::time::timeout(LIMIT, task).await;
+    assert!(ended.expect("it ends").is_ok());
+}

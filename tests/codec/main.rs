@@ -1,0 +1,19 @@
+//! Messages: the two codecs against each other, against independent vectors and against recordings.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that cannot go on fails"
+)]
+
+mod agreement;
+mod captures;
+mod captures_sent;
+#[path = "../support/constructs.rs"]
+mod constructs;
+mod golden;
+mod lua_captures;
+mod roundtrip;
+mod versions;

@@ -1,0 +1,248 @@
+//! Messages for many and subscriptions to many: components on nodes with real sockets on the
+//! loopback interface.
+
+use std::future::Future;
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
+use std::time::Duration;
+
+use jaus::address::JausId;
+use jaus::codec::Message;
+use jaus::component::{
+    Audience, CannotSubscribe, Component, GroupUpdate, Handlers, Kind, Messages, SubscribeError,
+    SubscriptionEnd, Timing, When,
+};
+use jaus::link::Group;
+use jaus::messages::core::{
+    QueryIdentification, ReportHeartbeatPulse, ReportIdentification, discovery,
+};
+use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::node::{Config, Node};
+
+/// Longer than anything takes; reached only when a test fails.
+const LIMIT: Duration = Duration::from_secs(30);
+
+const QUERY: QueryVelocityState = QueryVelocityState { presence_vector: 1 };
+
+/// A network of its own, so that tests beside it are not heard.
+struct Network(Group);
+
+impl Network {
+    fn new() -> Self {
+        let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
+        let port = socket.local_addr().unwrap().port();
+        Self(Group::At(SocketAddrV4::new(
+            Ipv4Addr::new(239, 255, 0, 1),
+            port,
+        )))
+    }
+
+    fn node(&self, subsystem: u16, node: u8) -> Node {
+        let mut config = Config::loopback(subsystem, node).group(self.0);
+        config.delivery.patience = Duration::from_millis(500);
+        Node::start(config).unwrap()
+    }
+
+    /// A component that tells a speed.
+    fn sensor(&self, subsystem: u16, speed: f64) -> Component {
+        let mut report = ReportVelocityState::default();
+        report.set_velocity_x_m_per_s(speed).unwrap();
+        let speedometer = Handlers::new(velocity_state_sensor::LATEST)
+            .answer(move |_: QueryVelocityState| report.clone());
+        Component::builder(Kind::Vehicle, "Sensor")
+            .offer(speedometer)
+            .attach(&self.node(subsystem, 1), 42)
+            .unwrap()
+    }
+
+    /// One that notices quickly who comes and goes.
+    fn operator(&self) -> Component {
+        let timing = Timing {
+            call: Duration::from_millis(100),
+            call_per_peer: Duration::ZERO,
+            refresh: Duration::from_millis(200),
+            refresh_per_peer: Duration::ZERO,
+            probes: 2,
+            probe_interval: Duration::from_millis(100),
+            ..Timing::default()
+        };
+        Component::builder(Kind::OperatorControlUnit, "Operator")
+            .timing(timing)
+            .attach(&self.node(42, 1), 1)
+            .unwrap()
+    }
+}
+
+async fn within_limit<T>(future: impl Future<Output = T>) -> T {
+    tokio::time::timeout(LIMIT, future)
+        .await
+        .expect("it takes too long")
+}
+
+/// Waits until an audience has so many members.
+async fn gathered(component: &Component, audience: &Audience, members: usize) {
+    let mut changes = component.watch();
+    within_limit(async {
+        while component.members(audience).len() != members {
+            changes.next().await.unwrap();
+        }
+    })
+    .await;
+}
+
+/// Whether a component is told `M` by the other.
+async fn hears<M: Message>(messages: &mut Messages, from: JausId) -> bool {
+    let heard = async {
+        while let Some(message) = messages.next().await {
+            if message.source == from && M::decode(&message.payload).is_ok() {
+                return;
+            }
+        }
+        panic!("the node has stopped");
+    };
+    tokio::time::timeout(LIMIT, heard).await.is_ok()
+}
+
+#[tokio::test]
+async fn a_message_to_a_subsystem_a_node_or_providers_reaches_those_and_nobody_else() {
+    let network = Network::new();
+    let operator = network.operator();
+    let boards = [
+        network.node(101, 2),
+        network.node(101, 3),
+        network.node(102, 2),
+    ];
+    let plain = |node: &Node, component| {
+        let plain = Component::builder(Kind::Vehicle, "Plain");
+        plain.attach(node, component).unwrap()
+    };
+    let here = plain(&boards[0], 33);
+    let beside = plain(&boards[1], 33);
+    let elsewhere = plain(&boards[2], 33);
+    let mut ears = [&here, &beside, &elsewhere].map(Component::messages);
+    gathered(&operator, &Audience::EVERYBODY, 3).await;
+
+    // In this order, so that what came too far would be heard before what is waited for.
+    let pulse = ReportHeartbeatPulse {};
+    assert_eq!(operator.send_all(Audience::node(101, 2), &pulse), Ok(1));
+    assert!(hears::<ReportHeartbeatPulse>(&mut ears[0], operator.id()).await);
+    assert_eq!(operator.send_all(Audience::subsystem(101), &pulse), Ok(2));
+    assert!(hears::<ReportHeartbeatPulse>(&mut ears[0], operator.id()).await);
+    assert!(hears::<ReportHeartbeatPulse>(&mut ears[1], operator.id()).await);
+    let providers = Audience::providers(discovery::URN).in_subsystem(102);
+    gathered(&operator, &providers, 1).await;
+    assert_eq!(operator.send_all(&providers, &pulse), Ok(1));
+    assert!(hears::<ReportHeartbeatPulse>(&mut ears[2], operator.id()).await);
+    drop((here, beside, elsewhere));
+    for mut ear in ears {
+        assert!(ear.next().await.is_none(), "a message too many");
+    }
+}
+
+#[tokio::test]
+async fn everybody_who_acknowledged_or_answered_is_told_apart_from_who_did_not() {
+    let network = Network::new();
+    let operator = network.operator();
+    let sensor = network.sensor(101, 1.0);
+    let doomed_node = network.node(102, 1);
+    let doomed = Component::builder(Kind::Vehicle, "Doomed");
+    let doomed = doomed.attach(&doomed_node, 42).unwrap();
+    let (alive, dead) = (sensor.id(), doomed.id());
+    gathered(&operator, &Audience::EVERYBODY, 2).await;
+
+    let pulse = ReportHeartbeatPulse {};
+    let told = within_limit(operator.deliver_all(Audience::EVERYBODY, &pulse)).await;
+    assert!(told.is_complete() && told.len() == 2, "{told:?}");
+    let name = QueryIdentification::default();
+    let named =
+        within_limit(operator.query_all::<ReportIdentification, _>(Audience::EVERYBODY, &name));
+    assert_eq!(named.await.successes().count(), 2);
+
+    drop((doomed, doomed_node));
+    // By their ids, so that it does not matter whether discovery has noticed.
+    let both = [alive, dead].map(Audience::from);
+    let [to_the_living, to_the_dead] = both.map(|one| operator.deliver_all(one, &pulse));
+    assert!(within_limit(to_the_living).await.is_complete());
+    let failed = within_limit(to_the_dead).await;
+    assert!(!failed.is_complete());
+    assert!(failed.failures().all(|(id, _)| id == dead), "{failed:?}");
+}
+
+#[tokio::test]
+async fn a_group_subscription_follows_providers_as_they_come_restart_and_go() {
+    let network = Network::new();
+    let operator = network.operator();
+    let mut speeds = operator
+        .subscribe_all::<ReportVelocityState, _>(velocity_state_sensor::URN, &QUERY, When::hz(20.0))
+        .unwrap();
+    let first = network.sensor(101, 1.0);
+    let mut next = async || within_limit(speeds.next()).await.expect("a running node");
+    assert_eq!(next().await, (first.id(), GroupUpdate::Up));
+    assert!(matches!(next().await, (id, GroupUpdate::Report(_)) if id == first.id()));
+
+    let second = network.sensor(102, 2.0);
+    let other = second.id();
+    while next().await != (other, GroupUpdate::Up) {}
+    // Both are heard, each with its own speed.
+    let mut heard = [false; 2];
+    while heard != [true; 2] {
+        if let (id, GroupUpdate::Report(report)) = next().await {
+            let speed = report.velocity_x_m_per_s().unwrap().round();
+            assert_eq!(speed, f64::from(id.subsystem() - 100));
+            heard[usize::from(id == other)] = true;
+        }
+    }
+
+    drop(second);
+    while next().await != (other, GroupUpdate::Gone) {}
+    let _second = network.sensor(102, 3.0);
+    while next().await != (other, GroupUpdate::Up) {}
+    loop {
+        if let (id, GroupUpdate::Report(report)) = next().await
+            && id == other
+        {
+            assert_eq!(report.velocity_x_m_per_s().unwrap().round(), 3.0);
+            break;
+        }
+    }
+    drop(first);
+    assert_eq!(speeds.members().count(), 2);
+}
+
+#[tokio::test]
+async fn a_member_that_takes_its_service_back_is_gone_and_one_that_refuses_is_told_of() {
+    let network = Network::new();
+    let operator = network.operator();
+    let slow = When::hz(1000.0).at_least(1000.0);
+    let mut speeds = operator
+        .subscribe_all::<ReportVelocityState, _>(velocity_state_sensor::URN, &QUERY, slow)
+        .unwrap();
+    let sensor = network.sensor(101, 1.0);
+    let (id, update) = within_limit(speeds.next()).await.unwrap();
+    let GroupUpdate::NotSubscribed { why, again } = update else {
+        panic!("{id} keeps no 1000 Hz: {update:?}");
+    };
+    let SubscribeError::Ended { peer, why, .. } = why else {
+        panic!("it was asked: {why}");
+    };
+    assert!(matches!(why, SubscriptionEnd::TooSlow { .. }), "{why}");
+    assert!(peer == sensor.id() && again == Duration::from_secs(1));
+
+    sensor.withdraw(velocity_state_sensor::URN).await;
+    while within_limit(speeds.next()).await != Some((id, GroupUpdate::Gone)) {}
+}
+
+#[tokio::test]
+async fn what_no_member_could_grant_is_refused_at_once_and_a_stopped_node_ends_the_stream() {
+    let network = Network::new();
+    let node = network.node(42, 1);
+    let operator = Component::builder(Kind::OperatorControlUnit, "Operator");
+    let operator = operator.attach(&node, 1).unwrap();
+    let subscribe = |when| {
+        operator.subscribe_all::<ReportVelocityState, _>(velocity_state_sensor::URN, &QUERY, when)
+    };
+    let refused = subscribe(When::hz(2000.0)).unwrap_err();
+    assert_eq!(refused, CannotSubscribe::Rate { hz: 2000.0 });
+    let mut speeds = subscribe(When::OnChange).unwrap();
+    node.shutdown().await;
+    assert!(within_limit(speeds.next()).await.is_none());
+}

@@ -1,0 +1,15 @@
+//! Components as applications build them: discovery, queries, subscriptions, control, groups.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that cannot go on fails"
+)]
+
+mod client;
+mod discovery;
+mod examples;
+mod groups;
+mod offering;

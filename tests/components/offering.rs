@@ -1,0 +1,242 @@
+//! What an application sees: components on nodes with real sockets on the loopback interface.
+
+use std::future::Future;
+use std::time::Duration;
+
+use jaus::address::JausId;
+use jaus::component::{
+    AttachError, Change, Component, FindError, Handlers, Kind, Level, Liveness, Patience,
+    QueryError, SendError,
+};
+use jaus::link::Group;
+use jaus::messages::core::{
+    QueryHeartbeatPulse, QueryStatus, ReportHeartbeatPulse, ReportStatus, liveness,
+};
+use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState, velocity_state_sensor};
+use jaus::node::{Config, Node};
+use jaus_test_kit::group::own_group;
+
+/// Longer than anything takes; reached only when a test fails.
+const LIMIT: Duration = Duration::from_secs(20);
+
+fn start(subsystem: u16, group: Group) -> Node {
+    Node::start(Config::loopback(subsystem, 1).group(group)).unwrap()
+}
+
+async fn within_limit<T>(future: impl Future<Output = T>) -> T {
+    tokio::time::timeout(LIMIT, future)
+        .await
+        .expect("it takes too long")
+}
+
+/// A rover that reports a speed of 1.5 m/s, and an operator who looks for it.
+fn rover_and_operator() -> (Component, Component) {
+    let group = own_group();
+    let mut speed = ReportVelocityState::default();
+    speed.set_velocity_x_m_per_s(1.5).unwrap();
+    let speedometer = Handlers::new(velocity_state_sensor::LATEST)
+        .answer(move |_: QueryVelocityState| speed.clone());
+    let rover = Component::builder(Kind::Vehicle, "Rover")
+        .component_name("Drive")
+        .offer(speedometer)
+        .attach(&start(101, group), 33)
+        .unwrap();
+    let operator = Component::builder(Kind::OperatorControlUnit, "Operator")
+        .patience(Patience {
+            tries: 2,
+            interval: Duration::from_millis(50),
+        })
+        .attach(&start(42, group), 1)
+        .unwrap();
+    (rover, operator)
+}
+
+#[tokio::test]
+async fn an_operator_finds_a_rover_and_asks_for_its_speed() {
+    let (rover, operator) = rover_and_operator();
+    let sensor = within_limit(operator.find(velocity_state_sensor::URN))
+        .await
+        .unwrap();
+    assert_eq!(sensor, rover.id());
+    let query = QueryVelocityState {
+        presence_vector: 0xFFFF,
+    };
+    let report: ReportVelocityState = within_limit(operator.query(sensor, &query)).await.unwrap();
+    let speed = report.velocity_x_m_per_s().expect("it was asked for");
+    assert!((speed - 1.5).abs() < 0.001, "{speed}");
+}
+
+#[tokio::test]
+async fn queries_at_the_same_time_all_get_their_answers() {
+    let (rover, operator) = rover_and_operator();
+    let beat = || operator.query::<ReportHeartbeatPulse, _>(rover.id(), &QueryHeartbeatPulse {});
+    let (first, second, third) = within_limit(async { tokio::join!(beat(), beat(), beat()) }).await;
+    assert!(first.is_ok() && second.is_ok() && third.is_ok());
+}
+
+#[tokio::test]
+async fn who_does_not_answer_is_named_with_what_was_asked_and_for_how_long() {
+    let (rover, operator) = rover_and_operator();
+    let asked = operator.query::<ReportStatus, _>(rover.id(), &QueryStatus {});
+    let error = within_limit(asked).await.unwrap_err();
+    assert!(
+        matches!(error, QueryError::NoAnswer { tries: 2, .. }),
+        "{error}"
+    );
+    let told = error.to_string();
+    assert!(
+        told.starts_with("101.1.33 did not answer QueryStatus with ReportStatus: asked 2 times"),
+        "{told}"
+    );
+}
+
+#[tokio::test]
+async fn a_query_to_nobody_is_refused_at_once() {
+    let (_rover, operator) = rover_and_operator();
+    let nobody = JausId::new(0, 1, 1);
+    let asked = operator.query::<ReportStatus, _>(nobody, &QueryStatus {});
+    let error = within_limit(asked).await.unwrap_err();
+    assert!(
+        matches!(
+            error,
+            QueryError::NotSent {
+                source: SendError::Node(_),
+                ..
+            }
+        ),
+        "{error}"
+    );
+}
+
+#[tokio::test]
+async fn a_service_that_nobody_offers_is_not_found() {
+    let (rover, operator) = rover_and_operator();
+    within_limit(operator.find(liveness::URN)).await.unwrap();
+    let found = operator
+        .find_within("urn:test:Nothing", Duration::from_millis(50))
+        .await;
+    let Err(FindError::NotFound {
+        service, others, ..
+    }) = found
+    else {
+        panic!("{found:?}")
+    };
+    assert_eq!((service.as_str(), others), ("urn:test:Nothing", 1));
+    drop(rover);
+}
+
+#[tokio::test]
+async fn changes_are_told_and_the_directory_shows_them() {
+    let (rover, operator) = rover_and_operator();
+    let mut watch = operator.watch();
+    let named = Change::Identified(Level::Component, rover.id());
+    let wait = async { while watch.next().await.expect("a living component") != named {} };
+    within_limit(wait).await;
+    let directory = operator.directory();
+    let name = |level| {
+        directory
+            .identification(level, rover.id())
+            .map(|told| told.name.as_str())
+    };
+    assert_eq!(name(Level::Component), Some("Drive"));
+    assert_eq!(watch.missed(), 0);
+}
+
+#[tokio::test]
+async fn a_message_that_no_service_handles_goes_to_the_application() {
+    let (rover, operator) = rover_and_operator();
+    let mut messages = rover.messages();
+    operator.send(rover.id(), &QueryStatus {}).unwrap();
+    let message = within_limit(messages.next())
+        .await
+        .expect("a living component");
+    assert_eq!(
+        (message.source, &message.payload[..]),
+        (operator.id(), &[0x02, 0x20][..])
+    );
+}
+
+#[tokio::test]
+async fn a_service_can_be_offered_and_withdrawn_while_the_component_runs() {
+    let (rover, operator) = rover_and_operator();
+    let ask = || operator.query::<ReportStatus, _>(rover.id(), &QueryStatus {});
+    let id = jaus::messages::core::management::LATEST;
+    rover
+        .offer(Handlers::new(id).answer(|_: QueryStatus| ReportStatus::default()))
+        .await
+        .unwrap();
+    assert!(within_limit(ask()).await.is_ok());
+    rover.withdraw(id.urn).await;
+    assert!(within_limit(ask()).await.is_err());
+}
+
+#[tokio::test]
+async fn a_heartbeat_goes_out_without_being_asked_for() {
+    let group = own_group();
+    let desk = start(42, group);
+    let operator = Component::builder(Kind::OperatorControlUnit, "Operator")
+        .attach(&desk, 1)
+        .unwrap();
+    let mut messages = operator.messages();
+    let _rover = Component::builder(Kind::Vehicle, "Rover")
+        .liveness(Liveness::with_heartbeat(
+            operator.id(),
+            Duration::from_millis(20),
+        ))
+        .attach(&start(101, group), 1)
+        .unwrap();
+    for _ in 0..3 {
+        let message = within_limit(messages.next())
+            .await
+            .expect("a living component");
+        assert_eq!(message.payload[..], [0x02, 0x42]);
+    }
+}
+
+#[tokio::test]
+async fn a_component_that_is_dropped_leaves_its_number_free() {
+    let node = start(101, own_group());
+    let first = Component::builder(Kind::Vehicle, "Rover")
+        .attach(&node, 33)
+        .unwrap();
+    let second = Component::builder(Kind::Vehicle, "Rover").attach(&node, 33);
+    assert!(matches!(second, Err(AttachError::Node(_))));
+    drop(first);
+    let third = async {
+        while Component::builder(Kind::Vehicle, "Rover")
+            .attach(&node, 33)
+            .is_err()
+        {
+            tokio::task::yield_now().await;
+        }
+    };
+    within_limit(third).await;
+}
+
+#[tokio::test]
+async fn a_component_notices_that_its_node_has_stopped() {
+    let group = own_group();
+    let node = start(101, group);
+    let rover = Component::builder(Kind::Vehicle, "Rover")
+        .attach(&node, 33)
+        .unwrap();
+    let mut watch = rover.watch();
+    within_limit(node.shutdown()).await;
+    assert_eq!(within_limit(watch.next()).await, None);
+    let asked = rover.query::<ReportStatus, _>(JausId::new(1, 1, 1), &QueryStatus {});
+    assert_eq!(within_limit(asked).await, Err(QueryError::Stopped));
+    assert_eq!(
+        rover.find("urn:test:Nothing").await,
+        Err(FindError::Stopped)
+    );
+}
+
+#[tokio::test]
+async fn a_name_that_cannot_be_told_is_refused() {
+    let node = start(101, own_group());
+    let refused = Component::builder(Kind::Vehicle, "x".repeat(256)).attach(&node, 33);
+    assert!(matches!(
+        refused,
+        Err(AttachError::NameTooLong { length: 256, .. })
+    ));
+}
