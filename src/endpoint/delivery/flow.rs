@@ -372,7 +372,8 @@ impl Flow {
                     return;
                 }
                 self.lose(now, sequence);
-                self.window.shrink(order, self.sends);
+                let is_queued = self.round_trip.has_grown();
+                self.window.lose(order, self.sends, is_queued);
             }
             self.order.pop_front();
         }
@@ -430,7 +431,8 @@ impl Flow {
         if self.repetition().is_some_and(|due| due <= now) {
             self.armed = None;
             self.round_trip.back_off();
-            self.window.collapse(self.sends);
+            let has_proven = self.round_trip.smoothed().is_some();
+            self.window.collapse(self.sends, has_proven);
             while let Some((order, sequence)) = self.order.pop_front() {
                 let is_current = |packet: &Packet| packet.order == order && !packet.lost;
                 if self.flight.get(&sequence).is_some_and(is_current) {

@@ -7,6 +7,8 @@ use std::time::Duration;
 const UNMEASURED: Duration = Duration::from_millis(100);
 /// Timers have a granularity of a millisecond, and a busy board answers some milliseconds late.
 const LEAST: Duration = Duration::from_millis(10);
+/// By so much do answers differ where nothing queues up.
+const GRANULARITY: Duration = Duration::from_micros(500);
 /// What is added to the smoothed time at the least.
 const LEAST_VARIATION: Duration = Duration::from_millis(5);
 /// Also with back-off no longer than this.
@@ -53,6 +55,12 @@ impl RoundTrip {
     /// Something new is sent after a pause: what was not answered long ago says nothing.
     pub(super) fn restart(&mut self) {
         self.doublings = 0;
+    }
+
+    /// Whether answers take so much longer than the fastest one that packets must queue up somewhere.
+    pub(super) fn has_grown(&self) -> bool {
+        self.measured
+            .is_none_or(|known| known.smoothed > known.shortest * 3 / 2 + GRANULARITY)
     }
 
     /// How long to wait for an answer before sending again.

@@ -4,9 +4,18 @@
 //! What a receiver can take is nowhere stated and so found by loss: Junior takes ten datagrams a
 //! millisecond from a buffer that holds some twenty of its full ones, a node on a slow line less, a
 //! node on the same host some hundreds.
+//!
+//! A radio loses packets at random, and a smaller window does not help. So a loss shrinks the window
+//! only if the round trip has grown, because packets queue up somewhere, or if a large share of a
+//! window was lost.
 
 /// Fewer are never allowed: a window of one would wait for the timer after each loss.
 const LEAST: usize = 2;
+
+/// A larger share of losses, in percent, is not chance.
+const MOST_LOST: usize = 20;
+/// Losses are counted over a window, and over no fewer packets than this.
+const LEAST_COUNT: usize = 64;
 
 /// The window of one destination.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +29,9 @@ pub(super) struct Window {
     answered: usize,
     /// What was sent before this belongs to a loss that has been reacted to.
     recovery: u64,
+    /// Where the next count of losses begins.
+    next_count: u64,
+    losses: usize,
 }
 
 impl Window {
@@ -34,6 +46,8 @@ impl Window {
             threshold: most,
             answered: 0,
             recovery: 0,
+            next_count: 0,
+            losses: 0,
         }
     }
 
@@ -44,6 +58,7 @@ impl Window {
 
     /// A packet that was the `order`th sent was answered while `in_flight` were on their way.
     pub(super) fn grow(&mut self, order: u64, in_flight: usize) {
+        self.begin_count(order);
         // A window that is not made use of proves nothing.
         if order < self.recovery || in_flight * 2 < self.packets {
             return;
@@ -55,10 +70,13 @@ impl Window {
         }
     }
 
-    /// The packet that was the `order`th sent was lost, and `sent` were sent so far. Losses in one
-    /// round trip count once.
-    pub(super) fn shrink(&mut self, order: u64, sent: u64) {
-        if order < self.recovery {
+    /// The packet that was the `order`th sent was lost, and `sent` were sent so far, while packets
+    /// queued up or not. Losses in one round trip count once.
+    pub(super) fn lose(&mut self, order: u64, sent: u64, is_queued: bool) {
+        self.begin_count(order);
+        self.losses += 1;
+        let is_chance = self.losses * 100 <= self.count() * MOST_LOST;
+        if order < self.recovery || (is_chance && !is_queued) {
             return;
         }
         self.recovery = sent;
@@ -67,9 +85,22 @@ impl Window {
         self.answered = 0;
     }
 
-    /// Nothing was answered in time: begins anew, and grows fast to half of what it was.
-    pub(super) fn collapse(&mut self, sent: u64) {
-        if self.packets > LEAST {
+    fn begin_count(&mut self, order: u64) {
+        if order >= self.next_count {
+            self.next_count = order + self.count() as u64;
+            self.losses = 0;
+        }
+    }
+
+    /// Over how many packets losses are counted.
+    fn count(&self) -> usize {
+        self.packets.max(LEAST_COUNT)
+    }
+
+    /// Nothing was answered in time: begins anew, and grows fast to half of what it was, if that had
+    /// ever been answered.
+    pub(super) fn collapse(&mut self, sent: u64, has_proven: bool) {
+        if has_proven && self.packets > LEAST {
             self.threshold = (self.packets / 2).max(LEAST);
         }
         self.recovery = sent;
@@ -93,14 +124,14 @@ mod tests {
         let mut window = Window::new(16, 1000);
         (0..16).for_each(|order| window.grow(order, 16));
         assert_eq!(window.packets(), 32);
-        window.shrink(20, 48);
-        window.shrink(30, 48);
+        window.lose(20, 48, true);
+        window.lose(30, 48, true);
         assert_eq!(window.packets(), 22, "losses of one round count once");
         window.grow(47, 22);
         assert_eq!(window.packets(), 22, "sent before the loss was known");
         (48..48 + 22).for_each(|order| window.grow(order, 22));
         assert_eq!(window.packets(), 23);
-        window.collapse(80);
+        window.collapse(80, true);
         assert_eq!(window.packets(), LEAST);
         (80..89).for_each(|order| window.grow(order, 20));
         assert_eq!(window.packets(), 11, "fast up to half of what it was");
@@ -113,7 +144,33 @@ mod tests {
         assert_eq!(window.packets(), 16);
         (0..100).for_each(|order| window.grow(order, 20));
         assert_eq!(window.packets(), 20);
-        (0..100).for_each(|order| window.shrink(order * 100, order * 100 + 1));
+        (0..100).for_each(|order| window.lose(order * 100, order * 100 + 1, true));
         assert_eq!(window.packets(), LEAST);
+    }
+
+    #[test]
+    fn a_loss_now_and_then_shrinks_nothing_unless_packets_queue_up() {
+        let mut window = Window::new(100, 100);
+        for order in 0..1000 {
+            match order % 10 {
+                0 => window.lose(order, order + 100, false),
+                _ => window.grow(order, 100),
+            }
+        }
+        assert_eq!(window.packets(), 100);
+        window.lose(1000, 1100, true);
+        assert_eq!(window.packets(), 70);
+    }
+
+    #[test]
+    fn many_losses_shrink_the_window_once_each_round() {
+        let mut window = Window::new(100, 100);
+        for order in 0..100 {
+            match order % 3 {
+                0 => window.lose(order, 100, false),
+                _ => window.grow(order, 100),
+            }
+        }
+        assert_eq!(window.packets(), 70);
     }
 }
