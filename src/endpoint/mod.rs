@@ -35,6 +35,7 @@ mod acknowledge;
 mod config;
 mod counters;
 mod delivery;
+mod duplicates;
 mod egress;
 mod event;
 mod forward;

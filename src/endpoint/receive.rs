@@ -1,18 +1,19 @@
 //! From a datagram to deliveries: each message is judged, learned from, acknowledged, filtered and
 //! handed out.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use bytes::Bytes;
 use tracing::{debug, trace, warn};
 
+use super::duplicates::Novelty;
 use super::peers::is_challenge;
-use super::recent::{Class, Fingerprint, Sighting};
+use super::recent::Fingerprint;
 use super::verify::Warning;
 use super::{Counter, Endpoint, Event, Ingress, Path, Received, Sink};
 use crate::address::JausId;
 use crate::peer;
-use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Framing, Version, judp};
+use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Framing, judp};
 
 /// How a message came.
 #[derive(Clone, Copy, Debug)]
@@ -20,37 +21,14 @@ pub(super) struct Arrival {
     pub(super) now: Instant,
     pub(super) path: Path,
     /// Whether it went to everybody.
-    to_all: bool,
+    pub(super) to_all: bool,
     /// Octets of memory that its payload holds on to.
     pub(super) held: usize,
 }
 
-/// The same message again within this time is a copy made on the way: nobody repeats so fast.
-const REPEAT_INTERVAL: Duration = Duration::from_millis(1);
-
 /// A repeated message is passed on this often. No sender repeats more often before it gives up; a
 /// frame that circulates between routers, corrupted or forged as if one of them had sent it, does.
 const MOST_REPETITIONS: u8 = 32;
-
-/// Result of the duplicate check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Novelty {
-    /// Not heard lately.
-    New,
-    /// Its sender has sent it again; how often so far.
-    Repeated(u8),
-    /// The network has made a copy, or brought it in a circle.
-    Copy,
-}
-
-impl Novelty {
-    const fn repetitions(self) -> u8 {
-        match self {
-            Self::Repeated(repetitions) => repetitions,
-            Self::New | Self::Copy => 0,
-        }
-    }
-}
 
 impl Endpoint {
     /// Takes a datagram, and hands the messages in it for local components to `sink`.
@@ -330,6 +308,7 @@ impl Endpoint {
                     .reassembly
                     .insert(arrival, frame, style, &mut self.counters)?;
                 let Some(whole) = whole else { return Ok(()) };
+                self.recall_beginning(arrival, frame, &whole);
                 self.peers
                     .recognise(frame.source, from, |it| it.handle_large(whole.style));
                 whole.payload
@@ -432,69 +411,6 @@ impl Endpoint {
         }
         let before = self.peers.last_heard(id).map(|(path, _)| path);
         before.filter(is_datagram).unwrap_or(from)
-    }
-
-    /// How a message stands to what was heard lately.
-    ///
-    /// The older headers' peers leave the sequence number at 0, so there only a message that wants
-    /// an acknowledgement, and hence may be repeated, can be told from another.
-    fn recall(&mut self, arrival: Arrival, frame: &Frame, seen: Fingerprint) -> Novelty {
-        let now = arrival.now;
-        let forwarding = self.config.forwarding;
-        let repeats = frame.flags.acknowledgement() != Acknowledgement::None;
-        let numbered = repeats || frame.version == Version::As5669a;
-        if !numbered && !forwarding {
-            return Novelty::New;
-        }
-        let seen = seen.in_round(self.peers.round(frame));
-        let way = self.heard.way(forwarding.then_some(arrival.path));
-        let novelty = match self.heard.sighting(seen) {
-            None => Novelty::New,
-            Some(before) => {
-                let age = now.saturating_duration_since(before.time);
-                let elsewhere = before.way != way;
-                if elsewhere && age < self.config.retransmission_window {
-                    Novelty::Copy
-                } else if numbered && age < self.duplicate_window(arrival, frame) {
-                    if repeats && age >= REPEAT_INTERVAL {
-                        Novelty::Repeated(before.repetitions.saturating_add(1))
-                    } else {
-                        Novelty::Copy
-                    }
-                } else {
-                    Novelty::New
-                }
-            }
-        };
-        if novelty != Novelty::Copy {
-            let stranger = self.peers.is_stranger(frame.source);
-            let class = Class { stranger, repeats };
-            let sighting = Sighting {
-                time: now,
-                way,
-                repetitions: novelty.repetitions(),
-            };
-            self.heard.insert_as(seen, sighting, class);
-        }
-        novelty
-    }
-
-    /// For how long the same message is taken for a duplicate.
-    fn duplicate_window(&self, arrival: Arrival, frame: &Frame) -> Duration {
-        if frame.flags.acknowledgement() == Acknowledgement::None {
-            return self.config.duplicate_window;
-        }
-        let is_call = frame.flags.broadcast() != Some(Broadcast::None);
-        let is_unmarked_call = arrival.to_all && peer::Recogniser::is_unmarked_call(frame);
-        if is_call || is_unmarked_call || self.repeats_soon(frame.source) {
-            self.config.first_contact_window
-        } else {
-            self.config.retransmission_window
-        }
-    }
-
-    fn repeats_soon(&self, source: JausId) -> bool {
-        self.peers.profile(source).repeats_soon()
     }
 
     /// Hands a whole message to its receivers.

@@ -304,7 +304,9 @@ impl Endpoint {
         }
         if !may {
             self.counters.add(Counter::UnverifiedBudget);
-            if self.warnings.is_due(now, Warning::Unverified) {
+            // A busy peer may answer the challenge yet.
+            let is_asked = self.peers.is_challenged(id);
+            if !is_asked && self.warnings.is_due(now, Warning::Unverified) {
                 warn!(
                     to = %to.peer,
                     "too much for an address that acknowledges nothing: name the peer in peers if it is real"

@@ -9,5 +9,5 @@ mod reassembly;
 mod split;
 mod style;
 
-pub(super) use reassembly::Reassembly;
+pub(super) use reassembly::{Reassembly, Whole};
 pub(super) use split::{Cut, Cutting, Numbers};

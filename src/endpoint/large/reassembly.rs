@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-use super::style::{self, Whole};
+use super::style;
 use crate::address::JausId;
 use crate::endpoint::rate::Origin;
 use crate::endpoint::receive::Arrival;
@@ -52,6 +52,16 @@ fn part_of_message(frame: &Frame, held: usize) -> Bytes {
     }
 }
 
+/// A message of which every fragment was received.
+#[derive(Debug)]
+pub(in crate::endpoint) struct Whole {
+    pub(in crate::endpoint) payload: Bytes,
+    /// How it was cut, if that can be told.
+    pub(in crate::endpoint) style: LargeStyle,
+    /// The number of its first fragment, and what was in it.
+    pub(in crate::endpoint) first: (u16, Bytes),
+}
+
 /// What the fragments of one message have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Kind {
@@ -86,6 +96,18 @@ impl Run {
         frame.flags.acknowledgement() == Acknowledgement::Request
             && self.begins
             && self.pieces.front() == Some(&frame.payload)
+    }
+
+    /// The message, of which it has both ends; its sender may be known to cut in some style.
+    fn join(&self, known: Option<LargeStyle>) -> Whole {
+        let (payload, style) = style::join(self.kind.version, &self.pieces, known);
+        let after_first = (self.pieces.len() as u16).wrapping_sub(1);
+        let piece = self.pieces.front().cloned().unwrap_or_default();
+        Whole {
+            payload,
+            style,
+            first: (self.last.wrapping_sub(after_first), piece),
+        }
     }
 
     fn cost(&self) -> usize {
@@ -290,7 +312,7 @@ impl Reassembly {
         match inserted {
             Ok(Some(run)) => {
                 self.drop_if_empty(source);
-                Ok(Some(style::join(run.kind.version, &run.pieces, style)))
+                Ok(Some(run.join(style)))
             }
             Ok(None) => {
                 self.keep_within_bounds(source, runs, counters);
@@ -365,8 +387,7 @@ impl Reassembly {
         let after = sender.cost;
         self.account(origin, before, after);
         self.drop_if_empty(source);
-        let style = Some(LargeStyle::RepeatedCode);
-        let whole = style::join(run.kind.version, &run.pieces, style);
+        let whole = run.join(Some(LargeStyle::RepeatedCode));
         Some((place.0, run.kind.priority, whole))
     }
 

@@ -8,19 +8,16 @@ use bytes::Bytes;
 use crate::peer::{JAUSPP_FRAGMENT, LargeStyle};
 use crate::wire::{Version, large};
 
-/// A message of which every fragment was received.
-#[derive(Debug, PartialEq, Eq)]
-pub(in crate::endpoint) struct Whole {
-    pub(in crate::endpoint) payload: Bytes,
-    /// How it was cut, if that can be told.
-    pub(in crate::endpoint) style: LargeStyle,
-}
-
-/// Joins the fragments of a whole message, whose sender may be known to cut in some style.
+/// Joins the fragments of a whole message, whose sender may be known to cut in some style; tells
+/// how it was cut.
 ///
 /// Nothing in a fragment tells the style. JAUS++ is known by the length of its fragments, all of
 /// which begin with the same code.
-pub(super) fn join(version: Version, pieces: &VecDeque<Bytes>, known: Option<LargeStyle>) -> Whole {
+pub(super) fn join(
+    version: Version,
+    pieces: &VecDeque<Bytes>,
+    known: Option<LargeStyle>,
+) -> (Bytes, LargeStyle) {
     let all_but_last = || pieces.iter().take(pieces.len().saturating_sub(1));
     let repeated = version == Version::As5669a
         && match known {
@@ -33,10 +30,7 @@ pub(super) fn join(version: Version, pieces: &VecDeque<Bytes>, known: Option<Lar
     } else {
         (0, LargeStyle::Standard)
     };
-    Whole {
-        payload: large::join(pieces, skip),
-        style,
-    }
+    (large::join(pieces, skip), style)
 }
 
 /// Whether these are full fragments of JAUS++, by their length.

@@ -529,3 +529,30 @@ fn what_was_acknowledged_is_kept_while_the_sender_waits_longest() {
     let patience = config.acknowledge_patience + Duration::from_secs(2);
     assert!(config.reassembly_timeout > patience);
 }
+
+#[test]
+fn parts_that_are_sent_to_everybody_make_one_message_however_long_they_took() {
+    let mut rig = Rig::new();
+    let flags = |frame: Frame| Frame {
+        flags: frame
+            .flags
+            .with_acknowledgement(Acknowledgement::Request)
+            .with_broadcast(Broadcast::Global),
+        ..frame
+    };
+    let parts: Vec<_> = fragments(7, &large(2000), 1425)
+        .into_iter()
+        .map(flags)
+        .collect();
+    let [first, last] = &parts[..] else {
+        panic!("two parts");
+    };
+    rig.hear(first);
+    rig.pass(Duration::from_millis(1200));
+    rig.hear(last);
+    assert_eq!(rig.received().len(), 1);
+    rig.pass(Duration::from_millis(400));
+    rig.hear(first);
+    rig.hear(last);
+    assert_eq!(rig.received(), [], "its acknowledgements were lost");
+}

@@ -1,4 +1,4 @@
-//! The tool `jaus` and the programs as their users run them.
+//! The tool `jaus` as its users run it.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -17,20 +17,11 @@ mod interoperability;
 mod jsidl;
 mod jsidl_explain;
 mod jsidl_make;
-#[cfg(target_os = "linux")]
-mod load;
 mod monitor;
 mod network;
-#[cfg(target_os = "linux")]
-mod packaging;
-#[cfg(target_os = "linux")]
-mod parts;
 mod ping;
 mod record;
-mod store;
 #[path = "../support/mod.rs"]
 mod support;
-#[cfg(target_os = "linux")]
-mod up;
 mod vehicle;
 mod watch;

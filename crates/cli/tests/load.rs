@@ -1,5 +1,13 @@
 //! `jaus-tester load` with few components: every message is acknowledged, and nothing of it is left
-//! behind, whether it ends or is killed.
+//! behind, whether it ends or is killed. It takes both processors, so nothing else runs in
+//! this program.
+#![cfg(target_os = "linux")]
+#![expect(
+    clippy::disallowed_methods,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test with processes"
+)]
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,0 +1,19 @@
+//! The programs started, watched and ended: components, whole systems, the package.
+#![allow(
+    clippy::disallowed_methods,
+    clippy::disallowed_types,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "tests with processes and sockets of their own"
+)]
+
+#[cfg(target_os = "linux")]
+mod packaging;
+#[cfg(target_os = "linux")]
+mod parts;
+mod store;
+#[path = "../support/mod.rs"]
+mod support;
+#[cfg(target_os = "linux")]
+mod up;
