@@ -347,12 +347,16 @@ fn time_for_4000(seed: u64, lost_of_1000: u32) -> Duration {
         ..message(number)
     };
     // The two find each other first.
-    network.send(hosts[0], acknowledged(4000)).unwrap();
+    network
+        .send(hosts[0], acknowledged(4000))
+        .expect("room for it");
     network.run_until_idle();
     network.owner(hosts[1]).take_messages();
     let begun = network.now();
     for number in 0..4000 {
-        network.send(hosts[0], acknowledged(number)).unwrap();
+        network
+            .send(hosts[0], acknowledged(number))
+            .expect("room for it");
     }
     let mut delivered = 0;
     while delivered < 4000 {
