@@ -1,15 +1,13 @@
-//! The messages of the service sets, generated from their definitions.
+//! The messages of the SAE service sets, generated from their definitions.
 //!
-//! One module per set, each but the core set behind the feature of its name. The types inside a
-//! message are in a module of the message's name, for example `core::report_services::NodeSeq`.
+//! One module per set: the core set always, the mobility set with the feature `mobility`, the
+//! others with the feature `every-set`. The types inside a message are in a module of the message's
+//! name, for example `core::report_services::NodeSeq`.
 
 use crate::codec::{MessageInfo, Registry, ServiceInfo};
 
-#[cfg(feature = "ra33")]
-pub mod ra;
-
-/// The modules of the sets.
-macro_rules! modules {
+/// The modules of the sets, and the tables of those that are switched on.
+macro_rules! sets {
     ($($(#[$doc:meta])* $set:ident $(if $feature:literal)?;)*) => {
         $(
             $(#[$doc])*
@@ -20,13 +18,6 @@ macro_rules! modules {
                 include!(concat!(env!("OUT_DIR"), "/", stringify!($set), ".rs"));
             }
         )*
-    };
-}
-
-/// The modules of the sets, and the tables of those that are switched on.
-macro_rules! sets {
-    ($($(#[$doc:meta])* $set:ident $(if $feature:literal)?;)*) => {
-        modules! { $($(#[$doc])* $set $(if $feature)?;)* }
 
         static MESSAGES: &[&[MessageInfo]] = &[
             $($(#[cfg(feature = $feature)])? $set::MESSAGES,)*
@@ -44,29 +35,18 @@ sets! {
     /// The mobility set (AS6009): sensing and commanding how a platform moves.
     mobility if "mobility";
     /// The environment sensing set (AS6060): cameras, microphones, range and force sensors.
-    environment_sensing if "environment-sensing";
+    environment_sensing if "every-set";
     /// The manipulator set (AS6057): arms, pan-tilts and what they hold.
-    manipulator if "manipulator";
+    manipulator if "every-set";
     /// The unmanned ground vehicle set (AS6091): drive train, lights, power, stabilisers.
-    ugv if "ugv";
+    ugv if "every-set";
     /// The human-machine interface set (AS6040): pointing devices, keys, drawing.
-    hmi if "hmi";
+    hmi if "every-set";
     /// The mission spooling set (AS6062): missions that are kept and worked off.
-    mission_spooler if "mission-spooler";
+    mission_spooler if "every-set";
     /// The interoperability profiles' set: cost maps, handoff, platform mode and state, CBRN
     /// sensors.
-    iop if "iop";
-    /// Our own set for a ground vehicle: world model, mission, stages, odometry.
-    ground if "ground";
-}
-
-modules! {
-    /// The Reference Architecture 3.3, which came before the standards by SAE.
-    ///
-    /// Its command codes are those of other layouts in the sets above, so it has a registry of its
-    /// own: [`ra_registry`]. A command code is in the header there; here it stands before the data,
-    /// as in a [`Frame`](crate::wire::Frame).
-    ra33 if "ra33";
+    iop if "every-set";
 }
 
 /// All messages of the service sets that are switched on.
@@ -77,17 +57,4 @@ pub const fn registry() -> Registry {
 /// All services of the service sets that are switched on.
 pub fn services() -> impl Iterator<Item = &'static ServiceInfo> {
     SERVICES.iter().copied().flatten()
-}
-
-/// All messages of the Reference Architecture.
-#[cfg(feature = "ra33")]
-pub const fn ra_registry() -> Registry {
-    static MESSAGES: &[&[MessageInfo]] = &[ra33::MESSAGES];
-    Registry::new(MESSAGES)
-}
-
-/// All services of the Reference Architecture.
-#[cfg(feature = "ra33")]
-pub fn ra_services() -> impl Iterator<Item = &'static ServiceInfo> {
-    ra33::SERVICES.iter()
 }

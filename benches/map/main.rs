@@ -23,13 +23,13 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::component::{Component, Handlers, Kind};
-use jaus::messages::ground::{
-    QueryRasterCells, QueryVksTraversability, ReportRasterCells, ReportRasterChange,
-    ReportVksTraversability, SetRasterCells, raster_maps, report_raster_change,
-};
 use jaus::node::{Config, Node};
 use jaus::service::Patience;
 use jaus_vehicle::ground::WorldStore;
+use jaus_vehicle::messages::ground::{
+    QueryRasterCells, QueryVksTraversability, ReportRasterCells, ReportRasterChange,
+    ReportVksTraversability, SetRasterCells, raster_maps, report_raster_change,
+};
 use jaus_vehicle::motion::Frame;
 use jaus_vehicle::world::{Change, Raster, World};
 

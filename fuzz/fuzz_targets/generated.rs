@@ -4,7 +4,6 @@
 
 use bytes::Bytes;
 use jaus::codec::{MessageInfo, view};
-use jaus::messages::registry;
 use jaus_fuzz::with_code;
 use libfuzzer_sys::fuzz_target;
 
@@ -13,15 +12,22 @@ fuzz_target!(|octets: &[u8]| {
         return;
     };
     let code = u16::from_le_bytes(*code);
-    let mut types: Vec<_> = registry().by_code(code).collect();
+    let mut types: Vec<_> = every_message().filter(|info| info.code == code).collect();
     if types.is_empty() {
-        let all: Vec<_> = registry().iter().collect();
+        let all: Vec<_> = every_message().collect();
         types.push(all[usize::from(code) % all.len()]);
     }
     for info in types {
         message_comes_back(info, &Bytes::from(with_code(info.code, body)));
     }
 });
+
+fn every_message() -> impl Iterator<Item = &'static MessageInfo> {
+    jaus::messages::registry()
+        .iter()
+        .chain(jaus_vehicle::messages::registry().iter())
+        .chain(jaus_ra::messages::registry().iter())
+}
 
 fn message_comes_back(info: &MessageInfo, octets: &Bytes) {
     let message = match (info.decode)(octets) {

@@ -38,19 +38,16 @@ fn id(service: &ServiceId) -> Id {
 
 /// All generated messages, those of the Reference Architecture too.
 fn every_message() -> impl Iterator<Item = &'static MessageInfo> {
-    #[cfg(feature = "ra33")]
-    return messages::registry()
+    messages::registry()
         .iter()
-        .chain(messages::ra_registry().iter());
-    #[cfg(not(feature = "ra33"))]
-    messages::registry().iter()
+        .chain(jaus_vehicle::messages::registry().iter())
+        .chain(jaus_ra::messages::registry().iter())
 }
 
 fn every_service() -> impl Iterator<Item = &'static ServiceInfo> {
-    #[cfg(feature = "ra33")]
-    return messages::services().chain(messages::ra_services());
-    #[cfg(not(feature = "ra33"))]
     messages::services()
+        .chain(jaus_vehicle::messages::services())
+        .chain(jaus_ra::messages::services())
 }
 
 /// What a service says about a generated message.

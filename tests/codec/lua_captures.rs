@@ -127,13 +127,12 @@ fn tshark_finds_the_messages_and_faults_that_our_own_reading_finds() {
     fs::create_dir_all(&directory).unwrap();
     let script = directory.join("jaus.lua");
     let mut loader = jsidl::Loader::new();
-    loader.catalogue();
-    if cfg!(feature = "ra33") {
-        loader.reference_architecture();
-    }
+    loader.catalogue().reference_architecture();
     fs::write(&script, jsidl::lua::dissector(&loader.load().library)).unwrap();
 
-    let dictionary = Dictionary::complete();
+    let dictionary = Dictionary::new()
+        .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::messages::decode)
+        .with_catalogue();
     let (mut files, mut total) = (Vec::new(), 0);
     captures(evidence::captures(), &mut files);
     // Those that are not in the repository, if they are there.

@@ -14,15 +14,9 @@ fn every_message() -> impl Iterator<Item = &'static MessageInfo> {
     let constructs = Registry::new(crate::constructs::MESSAGES);
     messages::registry()
         .iter()
-        .chain(reference_architecture())
+        .chain(jaus_vehicle::messages::registry().iter())
+        .chain(jaus_ra::messages::registry().iter())
         .chain(constructs.iter())
-}
-
-fn reference_architecture() -> impl Iterator<Item = &'static MessageInfo> {
-    #[cfg(feature = "ra33")]
-    return messages::ra_registry().iter();
-    #[cfg(not(feature = "ra33"))]
-    std::iter::empty()
 }
 
 /// Octets that a random message is made from.

@@ -353,7 +353,7 @@ fn an_interface_that_does_not_exist_is_refused_with_a_list_of_those_that_do() {
 
 /// An event goes to many subscribers at once: a call into the kernel for each would cost most of
 /// the time.
-#[cfg(all(feature = "udp-batch", target_os = "linux"))]
+#[cfg(target_os = "linux")]
 #[tokio::test]
 async fn datagrams_to_many_peers_leave_with_few_calls() {
     let mut link = UdpLink::open(&loopback(), &settings()).unwrap();

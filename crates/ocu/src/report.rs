@@ -4,8 +4,10 @@ use super::sample_clock::Stamp;
 use super::state;
 use jaus::address::JausId;
 use jaus::messages::core::{ReportControl, ReportStatus};
-use jaus::messages::ground::{ReportMission, ReportPlannedPath, ReportRasterMaps, ReportStage};
 use jaus::messages::mobility::{ReportLocalPose, ReportVelocityState};
+use jaus_vehicle::messages::ground::{
+    ReportMission, ReportPlannedPath, ReportRasterMaps, ReportStage,
+};
 
 /// What a part has told.
 #[derive(Debug, Clone, PartialEq)]
@@ -205,7 +207,7 @@ impl From<ReportRasterMaps> for Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use jaus::messages::ground::report_planned_path::PointRec;
+    use jaus_vehicle::messages::ground::report_planned_path::PointRec;
 
     #[test]
     fn a_long_path_is_thinned_out_and_keeps_its_ends() {

@@ -1,12 +1,12 @@
 //! What the components of a vehicle do in it, told by the services that they offer.
 
 use jaus::messages::core::management;
-use jaus::messages::ground::{mission_planner, raster_maps, stage};
 use jaus::messages::mobility::{
     local_path_segment_driver, local_pose_sensor, local_vector_driver, primitive_driver,
     velocity_state_sensor,
 };
 use jaus::service::{Component, Directory};
+use jaus_vehicle::messages::ground::{mission_planner, raster_maps, stage};
 
 /// What a component does. One that does several things is known by the first of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -19,9 +19,11 @@ pub mod carrier;
 pub mod connection;
 pub mod convert;
 mod counters;
+mod forgiving;
 pub mod gateway;
 pub mod ids;
 mod message;
+pub mod messages;
 pub mod node;
 
 pub use counters::{Counter, Counters};

@@ -15,6 +15,7 @@
 
 pub mod actuator;
 pub mod ground;
+pub mod messages;
 pub mod mission;
 pub mod mobility;
 pub mod motion;

@@ -53,13 +53,14 @@ struct Inner {
 }
 
 impl DebugView {
-    /// A view of `node` and of what `component`, which lives on it, has found.
+    /// A view of `node` and of what `component`, which lives on it, has found; `dictionary` has
+    /// the messages that are shown with their fields.
     #[must_use]
-    pub fn new(node: Node, component: Component) -> Self {
+    pub fn new(node: Node, component: Component, dictionary: Dictionary) -> Self {
         Self(Arc::new(Inner {
             node,
             component,
-            dictionary: Dictionary::new(),
+            dictionary,
             viewers: Arc::new(Semaphore::new(MOST_VIEWERS)),
         }))
     }

@@ -15,6 +15,9 @@ use super::Unreadable;
 use jaus::codec::view::Value;
 use jaus::codec::{AnyMessage, DecodeError, MessageInfo, ServiceId};
 
+/// Decodes a message of a generated type.
+pub type Decode = fn(&MessageInfo, &Bytes) -> Result<Box<dyn AnyMessage>, DecodeError>;
+
 /// One layout of a message, and the services that define it so, the newest first.
 #[derive(Debug)]
 pub(super) struct Definition {
@@ -24,9 +27,7 @@ pub(super) struct Definition {
 
 #[derive(Debug)]
 enum Codec {
-    Generated(&'static MessageInfo),
-    /// A generated type of the Reference Architecture, read with its peers' habits in mind.
-    Ra(&'static MessageInfo),
+    Generated(&'static MessageInfo, Decode),
     Dynamic(Arc<Message>),
 }
 
@@ -97,17 +98,8 @@ pub(super) fn parse_version(text: &str) -> Result<Version, Unreadable> {
 }
 
 impl Definition {
-    /// A generated type.
-    pub(super) fn generated(info: &'static MessageInfo) -> Self {
-        Self::of_type(info, Codec::Generated(info))
-    }
-
-    /// A generated type of the Reference Architecture.
-    pub(super) fn ra(info: &'static MessageInfo) -> Self {
-        Self::of_type(info, Codec::Ra(info))
-    }
-
-    fn of_type(info: &MessageInfo, codec: Codec) -> Self {
+    /// A generated type, whose messages `decode` reads.
+    pub(super) fn generated(info: &'static MessageInfo, decode: Decode) -> Self {
         let id = |id: &ServiceId| Id {
             urn: id.urn.into(),
             version: Version {
@@ -117,7 +109,7 @@ impl Definition {
         };
         Self {
             services: info.services.iter().map(id).collect(),
-            codec,
+            codec: Codec::Generated(info, decode),
         }
     }
 
@@ -138,8 +130,7 @@ impl Definition {
     /// The generated type, or the definition that was loaded.
     fn info(&self) -> Result<&'static MessageInfo, &Message> {
         match &self.codec {
-            Codec::Generated(info) => Ok(info),
-            Codec::Ra(info) => Ok(info),
+            Codec::Generated(info, _) => Ok(info),
             Codec::Dynamic(message) => Err(message),
         }
     }
@@ -163,13 +154,10 @@ impl Definition {
     }
 
     pub(super) fn decode(&self, octets: &Bytes) -> Result<Body, Unreadable> {
-        let generated = |message: Result<Box<dyn AnyMessage>, DecodeError>| match message {
-            Ok(message) => Ok(Body::Generated(message.view())),
-            Err(error) => Err(Unreadable::new(error.to_string(), error.offset())),
-        };
         match &self.codec {
-            Codec::Generated(info) => generated((info.decode)(octets)),
-            Codec::Ra(info) => generated(jaus::messages::ra::forgiving(octets, info.decode)),
+            Codec::Generated(info, decode) => decode(info, octets)
+                .map(|message| Body::Generated(message.view()))
+                .map_err(|error| Unreadable::new(error.to_string(), error.offset())),
             Codec::Dynamic(message) => {
                 let value = dynamic::decode(message, octets)
                     .map_err(|error| Unreadable::new(error.to_string(), error.offset))?;

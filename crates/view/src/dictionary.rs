@@ -10,8 +10,9 @@ use bytes::Bytes;
 use jsidl::model::{Id, Service, Version};
 use jsidl::{Diagnostics, Loaded, Loader};
 
-use super::definition::{Body, Definition, ServiceName};
+use super::definition::{Body, Decode, Definition, ServiceName};
 use super::{Line, Request};
+use jaus::codec::Registry;
 use jaus::messages;
 
 /// Message definitions by code and by name.
@@ -97,30 +98,45 @@ impl Default for Dictionary {
 }
 
 impl Dictionary {
-    /// Every AS5669A message that this crate was generated with.
+    /// The messages of the SAE service sets that `jaus` was built with.
     pub fn new() -> Self {
-        let mut by_code: BTreeMap<u16, Vec<Definition>> = BTreeMap::new();
-        // The registry has the newest of the types with one code first.
-        for info in messages::registry().iter() {
-            let definition = Definition::generated(info);
-            by_code.entry(info.code).or_default().push(definition);
-        }
-        Self {
-            by_code,
+        let empty = Self {
+            by_code: BTreeMap::new(),
             ra: BTreeMap::new(),
             preferred: Vec::new(),
             prefers_ra: false,
-        }
+        };
+        empty.with_messages(messages::registry())
     }
 
-    /// Everything that comes with this crate: also the sets whose features are off, read by their
-    /// definitions at run time, and the messages of the Reference Architecture, which small programs
-    /// need not carry. It costs some milliseconds and a few MiB.
-    pub fn complete() -> Self {
-        let mut dictionary = Self::new();
-        dictionary.ra = reference_architecture();
-        dictionary.load::<&Path>([]);
-        dictionary
+    /// Adds generated messages, after those that are here.
+    #[must_use]
+    pub fn with_messages(mut self, messages: Registry) -> Self {
+        // A registry has the newest of the types with one code first.
+        for info in messages.iter() {
+            let definition = Definition::generated(info, |info, octets| (info.decode)(octets));
+            self.by_code.entry(info.code).or_default().push(definition);
+        }
+        self
+    }
+
+    /// Adds the messages of the Reference Architecture. Their codes are those of other layouts in
+    /// the SAE sets, so they are used only for frames with that architecture's header.
+    #[must_use]
+    pub fn with_reference_architecture(mut self, messages: Registry, decode: Decode) -> Self {
+        let definitions = messages
+            .iter()
+            .map(|info| (info.code, Definition::generated(info, decode)));
+        self.ra.extend(definitions);
+        self
+    }
+
+    /// Adds the sets whose features are off, read by their definitions at run time. Parsing them
+    /// takes some milliseconds and a few MiB.
+    #[must_use]
+    pub fn with_catalogue(mut self) -> Self {
+        self.load::<&Path>([]);
+        self
     }
 
     /// Adds the definitions in files and directories, which may refer to one another and to the
@@ -440,14 +456,6 @@ impl<'d> Reading<'d> {
     }
 }
 
-/// The Reference Architecture's messages.
-fn reference_architecture() -> BTreeMap<u16, Definition> {
-    let infos = messages::ra_registry().iter();
-    infos
-        .map(|info| (info.code, Definition::ra(info)))
-        .collect()
-}
-
 /// Whether a service is one of those that come with the crate.
 fn comes_with_us(service: &Service) -> bool {
     jsidl::catalogue::find(&service.id)
@@ -462,7 +470,7 @@ mod tests {
     fn every_message_that_comes_with_the_crate_is_known_whatever_the_features() {
         let mut loader = Loader::new();
         loader.catalogue();
-        let dictionary = Dictionary::complete();
+        let dictionary = Dictionary::new().with_catalogue();
         let services: Vec<_> = loader.load().library.services().cloned().collect();
         assert!(services.len() > 130);
         for service in services {
@@ -483,7 +491,7 @@ mod tests {
     #[test]
     fn what_was_generated_is_tried_before_what_is_read_by_its_definition() {
         let plain = Dictionary::new();
-        let complete = Dictionary::complete();
+        let complete = Dictionary::new().with_catalogue();
         for (code, known) in &plain.by_code {
             let first = &complete.by_code[code][0];
             assert_eq!(first.services, known[0].services, "{code:04X}");

@@ -23,7 +23,7 @@ mod time;
 pub mod tree;
 
 pub use capture::{Capture, CaptureError, CaptureWriter, Frame, InterfaceNumber, LinkType};
-pub use definition::{Body, ServiceName};
+pub use definition::{Body, Decode, ServiceName};
 pub use dictionary::{Added, Dictionary, Reading, Unreadable};
 pub use hex::{from_hex, to_hex};
 pub use journal::{

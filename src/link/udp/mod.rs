@@ -5,7 +5,7 @@
 //! answer, a full network queue, a route that is missing just now) are counted and traced and
 //! never end the link.
 
-#[cfg(all(feature = "udp-batch", target_os = "linux"))]
+#[cfg(target_os = "linux")]
 mod batch;
 mod gso_batch;
 mod open;
@@ -59,7 +59,7 @@ const OUTBOX: Bounds = Bounds {
     octets: 4 << 20,
 };
 
-const CAN_BATCH: bool = cfg!(all(feature = "udp-batch", target_os = "linux"));
+const CAN_BATCH: bool = cfg!(target_os = "linux");
 
 /// The most datagrams to one peer that Linux takes as one batch.
 const MAX_SEGMENTS: usize = 64;
@@ -115,7 +115,7 @@ impl UdpLink {
             sockets.push(open::group(interface, group, settings)?);
         }
         let batch = CAN_BATCH && settings.batch;
-        #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+        #[cfg(target_os = "linux")]
         if batch {
             sockets
                 .iter()

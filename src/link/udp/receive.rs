@@ -80,7 +80,7 @@ impl UdpLink {
 
     fn fetch(&mut self, socket: usize, slab: &mut Slab) -> io::Result<()> {
         let socket = &self.sockets[socket];
-        #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+        #[cfg(target_os = "linux")]
         if self.batch {
             return super::batch::receive(socket, slab, &mut self.arrived);
         }

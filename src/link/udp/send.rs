@@ -124,9 +124,9 @@ impl UdpLink {
 
     /// Sends the first `count` batches, of one datagram each; how many the kernel has taken.
     fn send_many(&self, count: usize) -> io::Result<usize> {
-        #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+        #[cfg(target_os = "linux")]
         return super::batch::send_many(self.sockets[0].get(), self.leaving.range(..count));
-        #[cfg(not(all(feature = "udp-batch", target_os = "linux")))]
+        #[cfg(not(target_os = "linux"))]
         Ok(count)
     }
 
@@ -182,9 +182,9 @@ impl UdpLink {
 /// If the error means that batches of such datagrams cannot be sent: the most octets of those that
 /// can, perhaps.
 fn limit_after(error: &io::Error, segment: usize) -> Option<usize> {
-    #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+    #[cfg(target_os = "linux")]
     return super::batch::limit_after(error, segment);
-    #[cfg(not(all(feature = "udp-batch", target_os = "linux")))]
+    #[cfg(not(target_os = "linux"))]
     {
         let _ = (error, segment);
         None
@@ -193,13 +193,13 @@ fn limit_after(error: &io::Error, segment: usize) -> Option<usize> {
 
 /// Sends what leaves with one call.
 fn send(socket: &Socket, peer: SocketAddr, part: &[u8], segment: usize) -> io::Result<usize> {
-    #[cfg(all(feature = "udp-batch", target_os = "linux"))]
+    #[cfg(target_os = "linux")]
     if part.len() > segment {
         // Longer ones are not segmented: see `MOST_OCTETS`.
         let segment = u16::try_from(segment).unwrap_or(u16::MAX);
         return super::batch::send(socket.get(), peer, part, segment);
     }
-    #[cfg(not(all(feature = "udp-batch", target_os = "linux")))]
+    #[cfg(not(target_os = "linux"))]
     let _ = segment;
     SockRef::from(socket.get()).send_to(part, &peer.into())
 }

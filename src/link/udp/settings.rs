@@ -51,8 +51,7 @@ pub struct Settings {
     pub ttl: u8,
     /// How many octets of received datagrams the kernel is asked to hold for each socket.
     pub receive_buffer: usize,
-    /// Whether the kernel is given and asked for several datagrams at once, where it can (Linux,
-    /// feature `udp-batch`).
+    /// Whether to send and receive several datagrams with one system call. Linux only.
     pub batch: bool,
 }
 

@@ -148,7 +148,7 @@ async fn view(node: &Node) -> SocketAddr {
         .unwrap();
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).await.unwrap();
     let address = listener.local_addr().unwrap();
-    let view = DebugView::new(node.clone(), component);
+    let view = DebugView::new(node.clone(), component, Dictionary::new());
     tokio::spawn(view.serve(listener));
     address
 }

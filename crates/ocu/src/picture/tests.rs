@@ -2,13 +2,13 @@
 
 use super::*;
 use jaus::messages::core::{ReportStatus, management};
-use jaus::messages::ground::{ReportMission, mission_planner};
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{
     ReportLocalPose, ReportVelocityState, local_pose_sensor, primitive_driver,
     velocity_state_sensor,
 };
 use jaus::service::Offer;
+use jaus_vehicle::messages::ground::{ReportMission, mission_planner};
 
 const DRIVER: JausId = JausId::new(101, 2, 33);
 const SENSORS: JausId = JausId::new(101, 2, 40);

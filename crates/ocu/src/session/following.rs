@@ -17,14 +17,14 @@ use jaus::component::{Component, SubscribeError, Update, When};
 use jaus::messages::core::{
     QueryControl, QueryStatus, ReportControl, ReportStatus, access_control,
 };
-use jaus::messages::ground::{
-    QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission, ReportPlannedPath,
-    ReportRasterMaps, ReportStage, mission_planner, raster_maps,
-};
 use jaus::messages::mobility::{
     QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState,
 };
 use jaus::service::Component as Known;
+use jaus_vehicle::messages::ground::{
+    QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission, ReportPlannedPath,
+    ReportRasterMaps, ReportStage, mission_planner, raster_maps,
+};
 
 /// What a part has told.
 pub(super) type Sighting = (JausId, Report);

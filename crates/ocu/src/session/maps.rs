@@ -7,7 +7,7 @@ use super::client::{Client, Finished};
 use crate::state::{Edition, Map};
 use jaus::address::JausId;
 use jaus::component::Component;
-use jaus::messages::ground::{QueryRasterCells, ReportRasterCells};
+use jaus_vehicle::messages::ground::{QueryRasterCells, ReportRasterCells};
 
 /// Takes the cells, or hears why there are none.
 pub(crate) type CellsReply = Box<dyn FnOnce(Result<Bytes, String>) + Send>;

@@ -12,9 +12,9 @@ use crate::role::Role;
 use crate::stick::Push;
 use jaus::address::JausId;
 use jaus::component::Control;
-use jaus::messages::ground::set_destination::Approved;
-use jaus::messages::ground::{ApproveMission, SetDestination, StopMission};
 use jaus::service::State;
+use jaus_vehicle::messages::ground::set_destination::Approved;
+use jaus_vehicle::messages::ground::{ApproveMission, SetDestination, StopMission};
 
 /// What is done, or why not.
 type Outcome = Result<(), String>;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::time::Duration;
 
 use jaus::component::{Component, Handlers, Kind, Management};
-use jaus::messages::ground::{QueryMission, ReportMission, mission_planner};
+use jaus_vehicle::messages::ground::{QueryMission, ReportMission, mission_planner};
 use serde_json::{Value, json};
 
 use crate::scene::{Scene, driver_of, within_limit};

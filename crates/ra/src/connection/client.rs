@@ -3,13 +3,13 @@
 use std::time::Instant;
 
 use super::{CannotConnect, ConnectionId, Connections, Event, Request, ResponseCode, period};
-use crate::{Counter, Message, RaId};
-use jaus::codec::DecodeError;
-use jaus::messages::ra33::create_service_connection::RequestedPeriodicUpdateRate;
-use jaus::messages::ra33::{
+use crate::messages::ra33::create_service_connection::RequestedPeriodicUpdateRate;
+use crate::messages::ra33::{
     ActivateServiceConnection, ConfirmServiceConnection, CreateServiceConnection,
     SuspendServiceConnection,
 };
+use crate::{Counter, Message, RaId};
+use jaus::codec::DecodeError;
 
 /// A connection of ours to a report of somebody.
 #[derive(Debug)]

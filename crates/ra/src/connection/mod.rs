@@ -25,17 +25,17 @@ mod tests;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
-pub use jaus::messages::ra33::confirm_service_connection::ResponseCode;
+pub use crate::messages::ra33::confirm_service_connection::ResponseCode;
 pub use settings::Settings;
 
 use super::{Counter, Counters, Message, RaId};
-use client::Wanted;
-use jaus::codec::{self, Message as _};
-use jaus::endpoint::{Buckets, Rate};
-use jaus::messages::ra33::{
+use crate::messages::ra33::{
     ActivateServiceConnection, ConfirmServiceConnection, CreateServiceConnection,
     SuspendServiceConnection, TerminateServiceConnection,
 };
+use client::Wanted;
+use jaus::codec::{self, Message as _};
+use jaus::endpoint::{Buckets, Rate};
 use provider::Provided;
 
 /// The service connections of a node, in both parts. See the [module](self).

@@ -5,13 +5,13 @@ use std::time::{Duration, Instant};
 use bytes::Bytes;
 
 use super::{ConnectionId, Connections, Event, Request, ResponseCode, period};
-use crate::{Counter, Message};
-use jaus::codec::DecodeError;
-use jaus::messages::ra33::confirm_service_connection::ConfirmedPeriodicUpdateRate;
-use jaus::messages::ra33::{
+use crate::messages::ra33::confirm_service_connection::ConfirmedPeriodicUpdateRate;
+use crate::messages::ra33::{
     ActivateServiceConnection, ConfirmServiceConnection, CreateServiceConnection,
     SuspendServiceConnection, TerminateServiceConnection,
 };
+use crate::{Counter, Message};
+use jaus::codec::DecodeError;
 
 /// A connection of somebody to a report of ours.
 #[derive(Debug)]

@@ -3,8 +3,8 @@
 use bytes::Bytes;
 
 use super::*;
-use jaus::messages::ra33::confirm_service_connection::ConfirmedPeriodicUpdateRate;
-use jaus::messages::ra33::create_service_connection::RequestedPeriodicUpdateRate;
+use crate::messages::ra33::confirm_service_connection::ConfirmedPeriodicUpdateRate;
+use crate::messages::ra33::create_service_connection::RequestedPeriodicUpdateRate;
 
 const POSE: RaId = RaId::new(10, 1, 38, 1);
 const US: RaId = RaId::new(30, 1, 40, 1);

@@ -11,8 +11,9 @@ use super::carry::{Counterpart, same_fields};
 use super::pair::Pair;
 use super::{Context, Refusal};
 use crate::RaId;
+use crate::messages::ra33;
 use jaus::address::JausId;
-use jaus::messages::{core, ra33};
+use jaus::messages::core;
 
 pub(super) const PAIRS: &[Pair] = &[
     Pair::of::<ra33::RequestComponentControl, core::RequestControl>(),

@@ -3,7 +3,8 @@
 
 use super::carry::{same_fields, same_presence};
 use super::pair::Pair;
-use jaus::messages::{mobility, ra33};
+use crate::messages::ra33;
+use jaus::messages::mobility;
 
 pub(super) const PAIRS: &[Pair] = &[
     Pair::of::<ra33::SetWrenchEffort, mobility::SetWrenchEffort>(),

@@ -5,8 +5,8 @@ use bytes::{BufMut, Bytes, BytesMut};
 use super::carry::Counterpart;
 use super::{Context, Refusal};
 use crate::ids::RaComponent;
+use crate::messages::forgiving;
 use jaus::codec::Message;
-use jaus::messages::ra::forgiving;
 
 /// Octets of the message code in front of what a message says.
 const CODE_LEN: usize = 2;

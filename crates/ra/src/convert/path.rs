@@ -20,9 +20,10 @@ use super::pair::Pair;
 use super::waypoints::{ONLY, only, unlimited};
 use super::{Context, Refusal};
 use crate::ids::RaComponent;
+use crate::messages::ra33;
 use jaus::codec::{FormattedBlob, Message};
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec};
-use jaus::messages::{core, mobility, ra33};
+use jaus::messages::{core, mobility};
 
 const GLOBAL: &[RaComponent] = &[RaComponent::GLOBAL_PATH_SEGMENT_DRIVER];
 const LOCAL: &[RaComponent] = &[RaComponent::LOCAL_PATH_SEGMENT_DRIVER];

@@ -7,10 +7,11 @@ use bytes::{Bytes, BytesMut};
 
 use super::{Context, Refusal, to_jaus_with, to_ra_with};
 use crate::ids::RaComponent;
+use crate::messages::ra33;
 use jaus::codec::{FormattedBlob, Message};
 use jaus::messages::core::SetElement;
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec};
-use jaus::messages::{mobility, ra33};
+use jaus::messages::mobility;
 
 /// The kind of places that a driver of the Reference Architecture goes to, and its messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

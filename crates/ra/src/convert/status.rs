@@ -7,7 +7,8 @@
 use super::carry::{Counterpart, same_bits, same_fields, same_presence};
 use super::pair::Pair;
 use super::{Context, Refusal};
-use jaus::messages::{core, ra33};
+use crate::messages::ra33;
+use jaus::messages::core;
 
 pub(super) const PAIRS: &[Pair] = &[
     Pair::of::<ra33::Shutdown, core::Shutdown>(),

@@ -11,9 +11,10 @@
 use super::carry::{ByScale, Carry, Counterpart, Optional, refuse, require, same_fields};
 use super::pair::Pair;
 use super::{Context, Refusal};
+use crate::messages::ra33;
 use jaus::codec::Scaled;
+use jaus::messages::mobility;
 use jaus::messages::mobility::v1_0;
-use jaus::messages::{mobility, ra33};
 
 pub(super) const PAIRS: &[Pair] = &[
     Pair::of::<ra33::SetGlobalVector, mobility::SetGlobalVector>().for_minor(1),

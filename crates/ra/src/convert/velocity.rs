@@ -7,8 +7,9 @@
 use super::carry::{Carry, Counterpart};
 use super::pair::Pair;
 use super::{Context, Refusal};
+use crate::messages::ra33;
+use jaus::messages::mobility;
 use jaus::messages::mobility::set_velocity_command::CommandType;
-use jaus::messages::{mobility, ra33};
 
 pub(super) const PAIRS: &[Pair] = &[Pair::of::<
     ra33::SetVelocityState,

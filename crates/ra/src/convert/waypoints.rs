@@ -11,7 +11,8 @@
 use super::carry::{Carry, Counterpart, same_fields};
 use super::pair::Pair;
 use super::{Context, Refusal};
-use jaus::messages::{mobility, ra33};
+use crate::messages::ra33;
+use jaus::messages::mobility;
 
 pub(super) const PAIRS: &[Pair] = &[
     Pair::of::<ra33::SetTravelSpeed, mobility::SetTravelSpeed>(),

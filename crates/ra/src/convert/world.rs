@@ -3,7 +3,8 @@
 //! a step, 5 mm at most: we divide a range by 2^32 - 1, they by 2^32 - 2.)
 
 use super::pair::Pair;
-use jaus::messages::{ground, ra33};
+use crate::messages::ra33;
+use jaus_vehicle::messages::ground;
 
 pub(super) const PAIRS: &[Pair] = &[
     Pair::same_octets::<ra33::CreateVksObjects, ground::CreateVksObjects>(),

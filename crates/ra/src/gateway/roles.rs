@@ -6,7 +6,8 @@ use crate::convert::Places;
 use crate::ids::RaComponent;
 use crate::node;
 use jaus::codec::ServiceId;
-use jaus::messages::{ground, mobility};
+use jaus::messages::mobility;
+use jaus_vehicle::messages::ground;
 
 /// A component type and the service that is its counterpart.
 #[derive(Debug, Clone, Copy)]

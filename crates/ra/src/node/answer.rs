@@ -6,12 +6,12 @@
 use std::time::Instant;
 
 use super::RaNode;
-use crate::{Counter, Message, RaId};
-use jaus::codec;
-use jaus::messages::ra33::{
+use crate::messages::ra33::{
     QueryConfiguration, QueryHeartbeatPulse, QueryIdentification, QueryServices,
     ReportHeartbeatPulse,
 };
+use crate::{Counter, Message, RaId};
+use jaus::codec;
 
 impl RaNode {
     /// Answers a question for each component that it is for.

@@ -5,15 +5,15 @@ use std::time::{Duration, Instant};
 use super::RaNode;
 use super::peer::{Peer, Question, commands};
 use super::subsystem::{Command, Component, Node, Service};
-use crate::{Counter, Message, RaId};
-use jaus::codec::{Message as _, Text};
-use jaus::messages::ra33::query_configuration::QueryField as Parts;
-use jaus::messages::ra33::query_identification::QueryField as Whose;
-use jaus::messages::ra33::{
+use crate::messages::ra33::query_configuration::QueryField as Parts;
+use crate::messages::ra33::query_identification::QueryField as Whose;
+use crate::messages::ra33::{
     ConfirmEventRequest, CreateEvent, Event, QueryConfiguration, QueryIdentification,
     QueryServices, RejectEventRequest, ReportConfiguration, ReportIdentification, ReportServices,
     create_event, report_services,
 };
+use crate::{Counter, Message, RaId};
+use jaus::codec::{Message as _, Text};
 
 /// Octets of a Report Identification that is not shortened.
 const IDENTIFICATION_LEN: usize = 84;

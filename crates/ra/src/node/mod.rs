@@ -39,12 +39,12 @@ pub use subsystem::{BadSubsystem, Command, Component, Node, Service, Subsystem, 
 
 use super::carrier::{Carrier, SendError, Transmit};
 use super::{Counter, Counters, Message};
-use jaus::codec::Message as _;
-use jaus::endpoint::Buckets;
-use jaus::messages::ra33::{
+use crate::messages::ra33::{
     CancelEvent, CreateEvent, QueryConfiguration, QueryHeartbeatPulse, QueryIdentification,
     QueryServices, ReportHeartbeatPulse,
 };
+use jaus::codec::Message as _;
+use jaus::endpoint::Buckets;
 use own::Own;
 use peer::{Peer, Question};
 

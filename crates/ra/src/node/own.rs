@@ -6,12 +6,12 @@ use std::time::Instant;
 use super::subscriptions::Subscription;
 use super::subsystem::{BadSubsystem, Command, Component, Node, Service, Subsystem};
 use crate::RaId;
-use jaus::codec::{Message as _, Text};
-use jaus::messages::ra33::{
+use crate::messages::ra33::{
     CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryConfiguration, QueryHeartbeatPulse,
     QueryIdentification, QueryServices, ReportConfiguration, ReportHeartbeatPulse,
     ReportIdentification, ReportServices, report_configuration, report_services,
 };
+use jaus::codec::{Message as _, Text};
 
 /// A subsystem that we show.
 #[derive(Debug)]

@@ -3,13 +3,13 @@
 use std::time::Instant;
 
 use super::RaNode;
-use crate::{Counter, Message, RaId};
-use jaus::codec::{EncodeError, Message as _};
-use jaus::messages::ra33::confirm_event_request::ResponseCode;
-use jaus::messages::ra33::query_configuration::QueryField;
-use jaus::messages::ra33::{
+use crate::messages::ra33::confirm_event_request::ResponseCode;
+use crate::messages::ra33::query_configuration::QueryField;
+use crate::messages::ra33::{
     CancelEvent, ConfirmEventRequest, CreateEvent, Event, QueryConfiguration, ReportConfiguration,
 };
+use crate::{Counter, Message, RaId};
+use jaus::codec::{EncodeError, Message as _};
 use jaus::wire::ra::CODE_LEN;
 
 /// Somebody who wants to be told of changes.

@@ -14,12 +14,12 @@ use super::RaNode;
 use super::own::Own;
 use super::peer::Peer;
 use crate::carrier::SendError;
-use crate::{Message, RaId};
-use jaus::codec::Message as _;
-use jaus::messages::ra33::query_configuration::QueryField;
-use jaus::messages::ra33::{
+use crate::messages::ra33::query_configuration::QueryField;
+use crate::messages::ra33::{
     QueryConfiguration, QueryHeartbeatPulse, ReportConfiguration, ReportHeartbeatPulse,
 };
+use crate::{Message, RaId};
+use jaus::codec::Message as _;
 
 impl RaNode {
     /// Tells everybody that a subsystem of ours is there, if it is time to.

@@ -3,11 +3,11 @@
 use std::time::Instant;
 
 use crate::actuator::Odometer;
+use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
 use crate::motion::WheelCount;
 use jaus::codec::{Message, ServiceId};
 use jaus::endpoint::Received;
-use jaus::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use jaus::service::{Context, Handled, Service, code_of};
 
 /// Tells anyone what an odometer counts.

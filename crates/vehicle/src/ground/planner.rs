@@ -7,16 +7,16 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use crate::messages::ground::report_planned_path::{MissionRec, PointRec};
+use crate::messages::ground::set_destination::Approved;
+use crate::messages::ground::{
+    ApproveMission, QueryMission, QueryPlannedPath, ReportMission, ReportPlannedPath,
+    SetDestination, StopMission, mission_planner, report_mission,
+};
 use crate::mission::{Destination, Mission, Path, Report, Settings};
 use jaus::address::JausId;
 use jaus::codec::{Message, ServiceId};
 use jaus::endpoint::Received;
-use jaus::messages::ground::report_planned_path::{MissionRec, PointRec};
-use jaus::messages::ground::set_destination::Approved;
-use jaus::messages::ground::{
-    ApproveMission, QueryMission, QueryPlannedPath, ReportMission, ReportPlannedPath,
-    SetDestination, StopMission, mission_planner, report_mission,
-};
 use jaus::service::{
     Context, Handled, Hazards, Service, Standing, State, StopCause, code_of, read,
 };

@@ -4,14 +4,14 @@ use std::time::Instant;
 
 use bytes::Bytes;
 
-use crate::world::{Change, MapId, Raster, Window};
-use jaus::codec::{Message, ServiceId};
-use jaus::endpoint::Received;
-use jaus::messages::ground::report_raster_maps::MapRec;
-use jaus::messages::ground::{
+use crate::messages::ground::report_raster_maps::MapRec;
+use crate::messages::ground::{
     CreateRasterMap, DeleteRasterMap, QueryRasterCells, QueryRasterMaps, ReportRasterCells,
     ReportRasterMaps, SetRasterCells, raster_maps,
 };
+use crate::world::{Change, MapId, Raster, Window};
+use jaus::codec::{Message, ServiceId};
+use jaus::endpoint::Received;
 use jaus::service::{Context, Handled, Service, code_of, read};
 
 use super::WorldStore;
@@ -190,10 +190,10 @@ mod tests {
     use redb::backends::InMemoryBackend;
 
     use super::*;
+    use crate::messages::ground::ReportRasterChange;
+    use crate::messages::ground::report_raster_change::Result_ as ChangeResult;
     use crate::motion::Frame;
     use crate::world::World;
-    use jaus::messages::ground::ReportRasterChange;
-    use jaus::messages::ground::report_raster_change::Result_ as ChangeResult;
     use jaus::service::rig::{CLIENT, Rig};
 
     fn rig() -> Rig {

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use crate::messages::ground::{QueryStage, ReportStage, report_stage, stage};
 use jaus::address::JausId;
-use jaus::messages::ground::{QueryStage, ReportStage, report_stage, stage};
 use jaus::service::Handlers;
 
 /// How a driver of the chain is doing, as whoever runs it says. Cheap to clone; the clones are one.

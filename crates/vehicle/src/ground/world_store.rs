@@ -10,15 +10,15 @@ use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::motion::Frame;
-use crate::world::{Change, Done, KeepError, MapId, Refusal, World};
-use jaus::endpoint::Received;
-use jaus::messages::ground::report_raster_change::Result_ as ChangeResult;
-use jaus::messages::ground::report_vks_objects_creation::{ObjectIdRec, RequestRec};
-use jaus::messages::ground::{
+use crate::messages::ground::report_raster_change::Result_ as ChangeResult;
+use crate::messages::ground::report_vks_objects_creation::{ObjectIdRec, RequestRec};
+use crate::messages::ground::{
     QueryRasterCells, QueryRasterMaps, QueryVksBounds, QueryVksFeatureClassMetadata,
     QueryVksObjects, QueryVksTraversability, ReportRasterChange, ReportVksObjectsCreation,
 };
+use crate::motion::Frame;
+use crate::world::{Change, Done, KeepError, MapId, Refusal, World};
+use jaus::endpoint::Received;
 use jaus::service::Context;
 
 use super::{RasterMaps, VectorKnowledgeStore};

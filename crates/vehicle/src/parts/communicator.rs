@@ -10,11 +10,12 @@ use std::future::pending;
 use std::net::SocketAddr;
 
 use super::{Part, PartError, Slot};
+use crate::messages;
 use jaus::component::{Component, Watch};
 use jaus::endpoint::{Event, Remote};
 use jaus::node::{ComponentEvents, Events, Node};
 use jaus_view::debug::{self, DebugView};
-use jaus_view::{Journal, JournalSettings, tree};
+use jaus_view::{Dictionary, Journal, JournalSettings, tree};
 
 /// Where the debug view is unless another address is chosen.
 pub const DEBUG_ADDRESS: SocketAddr =
@@ -60,7 +61,7 @@ impl Communicator {
         let Some(settings) = &self.log else {
             return Ok(None);
         };
-        let journal = Journal::start(node, settings);
+        let journal = Journal::start(node, settings, dictionary());
         journal
             .map(Some)
             .map_err(|error| PartError::Broken(error.to_string()))
@@ -90,7 +91,7 @@ impl Communicator {
         if let Some(address) = listener.as_ref().and_then(|l| l.local_addr().ok()) {
             tracing::info!("debug view: ws://{address}/messages, http://{address}/tree");
         }
-        let view = DebugView::new(node.clone(), component.clone());
+        let view = DebugView::new(node.clone(), component.clone(), dictionary());
         Ok(async move {
             let Some(listener) = listener else {
                 return pending().await;
@@ -99,6 +100,11 @@ impl Communicator {
             error
         })
     }
+}
+
+/// The messages that the log and the debug view show with their fields.
+fn dictionary() -> Dictionary {
+    Dictionary::new().with_messages(messages::registry())
 }
 
 /// Tells what the node is and does.

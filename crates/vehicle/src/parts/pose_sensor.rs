@@ -14,10 +14,10 @@ use super::drivers::{Freshness, Sense};
 use super::keeper::{Keeper, keeper};
 use super::pose_file::{self, Kept};
 use super::{Part, PartError, Slot};
+use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
 use crate::motion::{DeadReckoning, Frame, Motion, Observed, Pilot, Pose, WheelCount};
 use jaus::component::{AccessControl, Component};
-use jaus::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use jaus::messages::mobility::{QueryLocalPose, QueryLocalPoseExt};
 
 /// Reckons where the vehicle is from where it was and what its wheels have travelled since.

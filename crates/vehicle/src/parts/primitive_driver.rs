@@ -18,10 +18,10 @@ use crate::actuator::{
     WheelsConfig,
 };
 use crate::ground::{StageBoard, StageReport, StageState, WheelOdometry};
+use crate::messages::ground::QueryStage;
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, Pilot};
 use jaus::component::{Component, Condition, State};
-use jaus::messages::ground::QueryStage;
 use jaus::service::{MotionPolicy, StopCause};
 
 /// Drives the wheels of a vehicle as it is told, and stops them when it is not told any more. While a

@@ -11,9 +11,9 @@ use tokio::time::timeout;
 
 use super::drivers::{Freshness, Sense};
 use super::{Part, PartError, Slot};
+use crate::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use crate::mobility::Vehicle;
 use crate::motion::{Frame, Motion, Observed, Pilot, Speedometer, Velocity, WheelCount};
-use jaus::messages::ground::{QueryWheelOdometry, ReportWheelOdometry, wheel_odometry};
 use jaus::messages::mobility::{QueryVelocityState, QueryVelocityStateExt};
 
 /// Makes the velocity of the vehicle out of the travel of its wheels.

@@ -18,7 +18,6 @@ use jaus::address::JausId;
 use jaus::component::{Component, Control, Kind, State};
 use jaus::link::Group;
 use jaus::messages::core::{QueryStatus, ReportStatus, Shutdown};
-use jaus::messages::ground::{QueryStage, QueryWheelOdometry, ReportStage, ReportWheelOdometry};
 use jaus::messages::mobility::report_local_pose::TimeStamp;
 use jaus::messages::mobility::{
     QueryLocalPose, ReportLocalPose, SetLocalVector, SetWrenchEffort, local_vector_driver,
@@ -28,6 +27,9 @@ use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_vehicle::actuator::{Actuator, MotorConfig, SimulatedMotor, SimulatedStop};
 use jaus_vehicle::ground::{StageReport, StageState};
+use jaus_vehicle::messages::ground::{
+    QueryStage, QueryWheelOdometry, ReportStage, ReportWheelOdometry,
+};
 use jaus_vehicle::parts::{
     Hardware, Part, PartError, PoseSensor, PrimitiveDriver, Slot, VectorDriver, VelocitySensor,
 };

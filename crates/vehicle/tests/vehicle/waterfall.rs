@@ -20,13 +20,15 @@ use jaus::component::{Component, Control, Kind};
 use jaus::link::Group;
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec, RequestIdRec};
 use jaus::messages::core::{ConfirmElementRequest, SetElement};
-use jaus::messages::ground::{QueryStage, QueryWheelOdometry, ReportStage, ReportWheelOdometry};
 use jaus::messages::mobility::{
     ExecuteList, QueryLocalPose, ReportLocalPathSegment, ReportLocalPose,
 };
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
 use jaus_vehicle::ground::{StageReport, StageState};
+use jaus_vehicle::messages::ground::{
+    QueryStage, QueryWheelOdometry, ReportStage, ReportWheelOdometry,
+};
 use jaus_vehicle::parts::{
     Part, PathDriver, PoseSensor, PrimitiveDriver, Slot, VectorDriver, VelocitySensor,
 };

@@ -25,7 +25,7 @@ use tokio::time::MissedTickBehavior;
 
 use self::directory::Directory;
 use self::sink::Sink;
-use super::{Filter, Links};
+use super::{Dictionary, Filter, Links, MessageStream};
 use jaus::node::{Node, Tap, Tapped};
 
 /// Passages that may wait to be written.
@@ -141,15 +141,26 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Begins a log of everything that passes `node` from now on.
+    /// Begins a log of everything that passes `node` from now on. `dictionary` has the messages
+    /// that are written with their fields, where the format is JSON.
     ///
     /// # Errors
     /// A directory that cannot be used, or bounds that cannot be.
-    pub fn start(node: &Node, settings: &JournalSettings) -> Result<Self, JournalError> {
-        Self::of(node.tap(WAITING), Links::of(node.clone()), settings)
+    pub fn start(
+        node: &Node,
+        settings: &JournalSettings,
+        dictionary: Dictionary,
+    ) -> Result<Self, JournalError> {
+        let (tap, links) = (node.tap(WAITING), Links::of(node.clone()));
+        Self::of(tap, links, settings, dictionary)
     }
 
-    fn of(tap: Tap, links: Links, settings: &JournalSettings) -> Result<Self, JournalError> {
+    fn of(
+        tap: Tap,
+        links: Links,
+        settings: &JournalSettings,
+        dictionary: Dictionary,
+    ) -> Result<Self, JournalError> {
         let (limit, file_limit) = (settings.limit, settings.file_limit);
         if file_limit < LEAST_FILE || file_limit > limit / 2 {
             return Err(JournalError::Bounds { limit, file_limit });
@@ -168,7 +179,8 @@ impl Journal {
         let (theirs, settings) = (numbers.clone(), settings.clone());
         let write = move || {
             let sink = Sink::new(directory, &settings, links);
-            runtime.block_on(write(tap, sink, &settings, &theirs, stopped));
+            let messages = MessageStream::new(&dictionary, Filter::default());
+            runtime.block_on(write(tap, sink, messages, &settings, &theirs, stopped));
         };
         let thread = std::thread::Builder::new().name("jaus-log".to_owned());
         let thread = thread.spawn(write).map_err(JournalError::Thread)?;
@@ -210,12 +222,11 @@ impl Drop for Journal {
 async fn write(
     mut tap: Tap,
     mut sink: Sink,
+    mut messages: MessageStream<'_>,
     settings: &JournalSettings,
     numbers: &Numbers,
     mut stopped: oneshot::Receiver<()>,
 ) {
-    let dictionary = super::Dictionary::new();
-    let mut messages = super::MessageStream::new(&dictionary, Filter::default());
     let mut turns = tokio::time::interval(FLUSH);
     turns.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut trouble = Trouble::default();

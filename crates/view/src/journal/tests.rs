@@ -80,7 +80,7 @@ fn read(octets: &[u8]) -> (Vec<Entry>, Option<CaptureError>) {
 async fn log_messages(settings: &JournalSettings, count: u32) -> JournalCounters {
     let node = Node::start(Config::loopback(101, 1)).unwrap();
     let (from, to) = (node.attach(1).unwrap(), node.attach(2).unwrap());
-    let journal = Journal::start(&node, settings).unwrap();
+    let journal = Journal::start(&node, settings, Dictionary::new()).unwrap();
     for number in 0..count {
         let message = Outgoing::new(from.id(), to.id(), payload(number).into());
         from.send(message).unwrap();
@@ -253,10 +253,12 @@ async fn bounds_and_directories_that_cannot_be_are_refused() {
     let node = Node::start(Config::loopback(101, 1)).unwrap();
     let scratch = Scratch::new("refused");
     let bounds = settings(&scratch, JournalFormat::Packets).limited_to(100_000);
-    let error = Journal::start(&node, &bounds).unwrap_err().to_string();
+    let error = Journal::start(&node, &bounds, Dictionary::new())
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("100000 octets"), "{error}");
     let no_directory = JournalSettings::new("/dev/null/log");
-    let error = Journal::start(&node, &no_directory)
+    let error = Journal::start(&node, &no_directory, Dictionary::new())
         .unwrap_err()
         .to_string();
     assert!(error.contains("/dev/null/log"), "{error}");

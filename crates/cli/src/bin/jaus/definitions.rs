@@ -23,10 +23,18 @@ pub(crate) struct Definitions {
     service: Vec<String>,
 }
 
+/// Every message definition of ours.
+pub(crate) fn built_in() -> Dictionary {
+    Dictionary::new()
+        .with_messages(jaus_vehicle::messages::registry())
+        .with_reference_architecture(jaus_ra::messages::registry(), jaus_ra::messages::decode)
+        .with_catalogue()
+}
+
 impl Definitions {
     /// The built-in definitions and those of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
-        let mut dictionary = Dictionary::complete();
+        let mut dictionary = built_in();
         self.add(&mut dictionary)?;
         for service in &self.service {
             service

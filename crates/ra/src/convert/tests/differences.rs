@@ -3,8 +3,9 @@
 use super::*;
 use crate::RaId;
 use crate::ids::{IdTable, RaComponent, Settings, Side};
+use crate::messages::ra33;
 use jaus::messages::mobility::v1_0;
-use jaus::messages::{core, mobility, ra33};
+use jaus::messages::{core, mobility};
 
 fn refused<T: std::fmt::Debug>(result: Result<T, Refusal>, reason: Reason, about: &str) {
     let refusal = result.expect_err("must be refused");

@@ -5,10 +5,11 @@ use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 
 use super::*;
+use crate::messages as ra;
 use jaus::codec::arbitrary::Unstructured;
 use jaus::codec::view::Value;
 use jaus::codec::{MessageInfo, Registry};
-use jaus::messages::{ra_registry, registry};
+use jaus::messages::registry;
 
 /// Octets that a random message is made from; of few octets, all that follows is zero or absent.
 fn seed() -> impl Strategy<Value = Vec<u8>> {
@@ -98,7 +99,7 @@ fn one_of_ours_comes_back_as_it_was_or_is_refused() {
 
 #[test]
 fn one_of_theirs_comes_back_as_it_was_or_is_refused() {
-    let theirs = |pair: &Pair| layout(ra_registry(), pair.ra, pair.ra_name, pair);
+    let theirs = |pair: &Pair| layout(ra::registry(), pair.ra, pair.ra_name, pair);
     for_every_pair(theirs, |pair, info, message| {
         let mut converted = false;
         for context in contexts() {

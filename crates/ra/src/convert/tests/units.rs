@@ -1,7 +1,8 @@
 //! The same quantity on both sides, by its value in engineering units.
 
 use super::*;
-use jaus::messages::{mobility, ra33};
+use crate::messages::ra33;
+use jaus::messages::mobility;
 
 #[test]
 fn an_effort_is_the_same_percentage_on_both_sides() {

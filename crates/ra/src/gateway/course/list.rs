@@ -13,6 +13,7 @@ use bytes::Bytes;
 
 use super::handover::{Do, Handover};
 use crate::convert::{Places, Refusal, speed_to_ra};
+use crate::messages::ra33::SetTravelSpeed;
 use jaus::codec::Message;
 use jaus::messages::core::reject_element_request::ResponseCode;
 use jaus::messages::core::set_element::ElementRec;
@@ -22,7 +23,6 @@ use jaus::messages::core::{
     report_element_list,
 };
 use jaus::messages::mobility::{ExecuteList, QueryActiveElement, ReportActiveElement};
-use jaus::messages::ra33::SetTravelSpeed;
 use jaus::service::{ElementList, code_of};
 
 /// The list of an RA driver.

@@ -1,8 +1,8 @@
 //! Which JAUS messages are an RA component's business, by their codes; and the codes of those RA
 //! messages that are looked at here.
 
+use crate::messages::ra33;
 use jaus::codec::Message as _;
-use jaus::messages::ra33;
 
 pub(super) const SHUTDOWN: u16 = ra33::Shutdown::CODE;
 pub(super) const STANDBY: u16 = ra33::Standby::CODE;

@@ -15,13 +15,13 @@ use crate::Message;
 use crate::gateway::convert::{self, Words};
 use crate::gateway::counters::{Counter, Tally};
 use crate::gateway::pairs;
-use jaus::codec::Message as _;
-use jaus::messages::ra33::confirm_event_request::ResponseCode;
-use jaus::messages::ra33::create_event::{CreateEventRec, EventType};
-use jaus::messages::ra33::{
+use crate::messages::ra33::confirm_event_request::ResponseCode;
+use crate::messages::ra33::create_event::{CreateEventRec, EventType};
+use crate::messages::ra33::{
     CancelEvent, ConfirmEventRequest, CreateEvent, QueryEvents, RejectEventRequest, ReportEvents,
     UpdateEvent, report_events, update_event,
 };
+use jaus::codec::Message as _;
 use jaus::service::{Stack, SubscriptionId, SubscriptionNews, Topic, When, code_of};
 
 impl RaClient {

@@ -13,12 +13,12 @@ use crate::gateway::convert;
 use crate::gateway::counters::{Counter, Tally};
 use crate::gateway::course::{Course, Refused};
 use crate::gateway::roles::Role;
+use crate::messages::ra33::{Shutdown, Standby};
 use jaus::address::JausId;
 use jaus::codec::{Message as _, ServiceId};
 use jaus::endpoint::Received;
 use jaus::messages::core::list_manager;
 use jaus::messages::mobility::ExecuteList;
-use jaus::messages::ra33::{Shutdown, Standby};
 use jaus::service::{Context, Handled, Service};
 
 /// The list of an RA driver. Cheap to clone; the clones are one.

@@ -26,11 +26,11 @@ use super::ra_event::RaEvent;
 use super::target::{Target, element_query, place_report, places};
 use crate::connection::{ConnectionId, Connections, Request, ResponseCode};
 use crate::convert::Refusal;
+use crate::messages::ra33::CreateServiceConnection;
 use crate::{Message, RaId};
 use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::messages::core::ReleaseControl;
-use jaus::messages::ra33::CreateServiceConnection;
 use jaus::service::{
     ControlId, ControlLost, ControlNews, Inquiry, NoAnswer, Patience, Stack, SubscriptionId,
     SubscriptionNews, Topic, When, code_of,

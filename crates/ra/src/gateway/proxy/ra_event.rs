@@ -3,9 +3,9 @@
 use bytes::Bytes;
 
 use crate::gateway::convert::Words;
+use crate::messages::ra33::Event;
+use crate::messages::ra33::create_event::CreateEventRec;
 use crate::{Message, RaId};
-use jaus::messages::ra33::Event;
-use jaus::messages::ra33::create_event::CreateEventRec;
 use jaus::service::Topic;
 
 /// An event of the RA component.

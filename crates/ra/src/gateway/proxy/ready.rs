@@ -13,8 +13,8 @@ use super::Proxy;
 use super::codes::STATUS;
 use crate::connection::ConnectionId;
 use crate::ids::RaComponent;
+use crate::messages::ra33::ReportComponentControl;
 use crate::{Message, RaId};
-use jaus::messages::ra33::ReportComponentControl;
 
 /// The service connection by which the RA component is told whether the gateway is ready.
 #[derive(Debug, Default)]

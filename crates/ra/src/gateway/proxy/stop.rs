@@ -6,8 +6,8 @@ use bytes::Bytes;
 use super::codes::{SET_GLOBAL_VECTOR, SET_LOCAL_VECTOR};
 use super::lease::Halt;
 use crate::ids::RaComponent;
+use crate::messages::ra33::{SetGlobalVector, SetLocalVector, SetTravelSpeed, SetWrenchEffort};
 use jaus::codec::{Message, OutOfRange};
-use jaus::messages::ra33::{SetGlobalVector, SetLocalVector, SetTravelSpeed, SetWrenchEffort};
 
 /// How a component of this type is stopped; `None` if it drives nothing.
 pub(super) fn halt(part: RaComponent) -> Option<Halt> {

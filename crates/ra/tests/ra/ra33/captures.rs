@@ -6,9 +6,9 @@ use std::path::Path;
 
 use bytes::Bytes;
 use jaus::codec::Message;
-use jaus::messages::{ra, ra33};
 use jaus::wire::ra::{HEADER_LEN, Header};
 use jaus::wire::{Frame, judp};
+use jaus_ra::messages::{forgiving, ra33};
 use jaus_test_kit::evidence;
 use jaus_view::{Capture, Datagram, Network};
 
@@ -52,7 +52,7 @@ fn every_recorded_message_is_read_and_written_again_by_both_codecs() {
             let code = u16::from_le_bytes(*message.first_chunk().unwrap());
             let definition = definitions.of(code).unwrap();
             *counted.entry(definition.generated.name).or_insert(0) += 1;
-            let mended = ra::forgiving(&message, definition.generated.decode).unwrap();
+            let mended = forgiving(&message, definition.generated.decode).unwrap();
             let mended = mended.encode().unwrap();
             let (again, _) = through_both(&definition, &mended);
             assert_eq!(again, mended);

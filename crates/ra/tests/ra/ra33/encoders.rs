@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use jaus::messages;
+use jaus_ra::messages;
 use serde_json::Value;
 
 use super::{Definitions, octets, payload, through_both};
@@ -66,7 +66,7 @@ fn the_values_that_openjaus_was_given_make_the_same_octets() {
 #[test]
 fn every_message_was_compared_but_what_openjaus_cannot_write() {
     let compared: BTreeSet<u16> = vectors().map(|vector| vector.code).collect();
-    let missing = messages::ra_registry().iter().map(|info| info.code);
+    let missing = messages::registry().iter().map(|info| info.code);
     let missing: Vec<_> = missing.filter(|code| !compared.contains(code)).collect();
     assert_eq!(missing, BROKEN);
 }

@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use jaus::codec::MessageInfo;
-use jaus::messages;
+use jaus_ra::messages;
 use jsidl::model::Message;
 use jsidl::{Library, Loader};
 
@@ -38,7 +38,7 @@ impl Definitions {
     fn of(&self, code: u16) -> Option<Definition> {
         let mut messages = self.0.services().flat_map(|service| service.messages());
         Some(Definition {
-            generated: messages::ra_registry().by_code(code).next()?,
+            generated: messages::registry().by_code(code).next()?,
             dynamic: Arc::clone(messages.find(|message| message.code == code)?),
         })
     }

@@ -5,15 +5,22 @@ use std::fs::File;
 
 use bytes::Bytes;
 use jaus::wire::judp;
+use jaus_ra::messages;
 use jaus_test_kit::evidence;
 use jaus_view::{Capture, Dictionary, MessageLog, Network};
 use serde_json::Value;
+
+fn dictionary() -> Dictionary {
+    Dictionary::new()
+        .with_reference_architecture(messages::registry(), messages::decode)
+        .with_catalogue()
+}
 
 /// The lines of a capture as JSON.
 fn lines(file: &str) -> Vec<Value> {
     let path = evidence::captures().join(file);
     let mut capture = Capture::new(File::open(path).unwrap()).unwrap();
-    let dictionary = Dictionary::complete();
+    let dictionary = dictionary();
     let mut network = Network::new([judp::PORT]);
     let mut log = MessageLog::new(&dictionary);
     let mut lines = Vec::new();
@@ -78,7 +85,7 @@ fn datagram(code: u16, data: &[u8]) -> Bytes {
 }
 
 fn shown(datagram: &Bytes) -> Value {
-    let dictionary = Dictionary::complete();
+    let dictionary = dictionary();
     let mut log = MessageLog::new(&dictionary);
     let line = log.read(
         None,

@@ -1,16 +1,16 @@
 //! Objects and conditions between messages and the world.
 
-use crate::world::{Attribute, FeatureClass, Geometry, Object, ObjectId, Place, Region, Selection};
-use jaus::messages::ground::create_vks_objects::{
+use crate::messages::ground::create_vks_objects::{
     Attribute as AttributeRec, ByteRec, ColourRec, FeatureClassRec, FeatureClassSeq, FloatRec,
     IntegerRec, LongFloatRec, LongRec, ObjectRec, ObjectType, Objects, PointRec, ShortRec,
     UnsignedIntegerRec, UnsignedLongRec, UnsignedShortRec,
 };
-use jaus::messages::ground::query_vks_objects::RegionType;
-use jaus::messages::ground::report_vks_objects::{BufferRec, ObjectIdRec, ObjectSeq};
-use jaus::messages::ground::{
+use crate::messages::ground::query_vks_objects::RegionType;
+use crate::messages::ground::report_vks_objects::{BufferRec, ObjectIdRec, ObjectSeq};
+use crate::messages::ground::{
     CreateVksObjects, DeleteVksObjects, QueryVksObjects, QueryVksTraversability,
 };
+use crate::world::{Attribute, FeatureClass, Geometry, Object, ObjectId, Place, Region, Selection};
 
 /// What a client wants to have created.
 pub(super) struct Creation {

@@ -17,19 +17,19 @@ mod transfer;
 use std::sync::Arc;
 use std::time::Instant;
 
+use crate::messages::ground::set_vks_feature_class_metadata::Option_ as HowToSet;
+use crate::messages::ground::{
+    CreateVksObjects, DeleteVksObjects, QueryVksBounds, QueryVksFeatureClassMetadata,
+    QueryVksObjects, QueryVksTraversability, ReportVksBounds, ReportVksDataTransferTermination,
+    ReportVksFeatureClassMetadata, SetVksFeatureClassMetadata, TerminateVksDataTransfer,
+    vector_knowledge_store,
+};
 use crate::world::{
     self, Change, Collection, Describe, FeatureClass, KeepError, Object, ObjectId, Selection,
     Window, World,
 };
 use jaus::codec::{Message, ServiceId, Text};
 use jaus::endpoint::Received;
-use jaus::messages::ground::set_vks_feature_class_metadata::Option_ as HowToSet;
-use jaus::messages::ground::{
-    CreateVksObjects, DeleteVksObjects, QueryVksBounds, QueryVksFeatureClassMetadata,
-    QueryVksObjects, QueryVksTraversability, ReportVksBounds, ReportVksDataTransferTermination,
-    ReportVksFeatureClassMetadata, SetVksFeatureClassMetadata, TerminateVksDataTransfer,
-    vector_knowledge_store,
-};
 use jaus::service::{Context, Handled, Service, code_of, read};
 
 use super::WorldStore;

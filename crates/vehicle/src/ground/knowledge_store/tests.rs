@@ -3,20 +3,20 @@
 use redb::backends::InMemoryBackend;
 
 use super::*;
-use crate::motion::Frame;
-use crate::world::{Picture, Place, Raster};
-use jaus::codec::Message;
-use jaus::messages::ground::create_vks_objects::{
+use crate::messages::ground::create_vks_objects::{
     Attribute, BufferedObjectSeq, BufferedSeq, ByteRec, FeatureClassRec, FeatureClassSeq,
     ObjectRec, ObjectType, Objects as NewObjects, PlainObjectSeq, PlainSeq, PointRec, RequestRec,
 };
-use jaus::messages::ground::query_vks_objects::{
+use crate::messages::ground::query_vks_objects::{
     FeatureClassCountRec, ObjectIdRec, RegionRec, RegionType,
 };
-use jaus::messages::ground::report_vks_objects::{BufferRec, Objects};
-use jaus::messages::ground::{
+use crate::messages::ground::report_vks_objects::{BufferRec, Objects};
+use crate::messages::ground::{
     QueryRasterMaps, ReportVksObjects, ReportVksObjectsCreation, ReportVksTraversability,
 };
+use crate::motion::Frame;
+use crate::world::{Picture, Place, Raster};
+use jaus::codec::Message;
 use jaus::service::rig::{CLIENT, Rig, STRANGER};
 
 fn rig() -> Rig {

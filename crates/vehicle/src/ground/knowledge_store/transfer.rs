@@ -5,14 +5,14 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use crate::messages::ground::report_vks_objects::{
+    CountRec, DataSeq, ObjectSeq, Objects, RequestRec,
+};
+use crate::messages::ground::{ReportVksObjects, ReportVksTraversability};
 use crate::world::{Object, ObjectId};
 use jaus::address::JausId;
 use jaus::codec::Composite;
 use jaus::endpoint::Received;
-use jaus::messages::ground::report_vks_objects::{
-    CountRec, DataSeq, ObjectSeq, Objects, RequestRec,
-};
-use jaus::messages::ground::{ReportVksObjects, ReportVksTraversability};
 use jaus::service::Context;
 
 use super::convert;

@@ -19,6 +19,7 @@ use super::remote_platform::{Order, Plan, RemotePlatform};
 use super::verdict::{DriverStatus, Verdict, judge};
 use super::{FaultMonitor, Watchman};
 use crate::ground::{StageBoard, StageReport, StageState};
+use crate::messages::ground::{QueryStage, ReportStage};
 use crate::mobility::Vehicle;
 use crate::motion::Motion;
 use crate::parts::PartError;
@@ -28,7 +29,6 @@ use jaus::component::{
     Audience, Component, Control, ControlError, ControlRefused, ManageError, QueryError, State,
 };
 use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
-use jaus::messages::ground::{QueryStage, ReportStage};
 
 /// How a driver talks to the next one.
 pub(in crate::parts) trait Language: Send + 'static {

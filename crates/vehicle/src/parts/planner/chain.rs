@@ -9,6 +9,8 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 
 use super::find;
+use crate::messages::ground::report_stage::State;
+use crate::messages::ground::{QueryStage, ReportStage, stage};
 use crate::mission::{Link, LinkState, Point};
 use crate::parts::PartError;
 use crate::parts::drivers::Sense;
@@ -16,8 +18,6 @@ use jaus::address::JausId;
 use jaus::component::{Component, Subscription, Update, When};
 use jaus::messages::core::report_status::Status;
 use jaus::messages::core::{QueryControl, QueryStatus, ReportControl, ReportStatus};
-use jaus::messages::ground::report_stage::State;
-use jaus::messages::ground::{QueryStage, ReportStage, stage};
 use jaus::messages::mobility::{
     ReportLocalPose, local_path_segment_driver, local_vector_driver, primitive_driver,
 };

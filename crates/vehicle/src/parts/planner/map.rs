@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use super::{find_soon, hand_over::in_words};
+use crate::messages::ground::report_raster_maps::MapRec;
+use crate::messages::ground::{
+    QueryRasterCells, QueryRasterMaps, ReportRasterCells, ReportRasterMaps, raster_maps,
+};
 use crate::mission::{Point, Terrain};
 use jaus::address::JausId;
 use jaus::component::Component;
-use jaus::messages::ground::report_raster_maps::MapRec;
-use jaus::messages::ground::{
-    QueryRasterCells, QueryRasterMaps, ReportRasterCells, ReportRasterMaps, raster_maps,
-};
 use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
 
 /// The most cells that are asked for at once.

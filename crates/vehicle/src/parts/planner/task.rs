@@ -16,6 +16,7 @@ use super::chain::{self, News};
 use super::map::{self, Map};
 use super::{Planner, find_soon, hand_over};
 use crate::ground::Missions;
+use crate::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, ReportStage, stage};
 use crate::mission::{
     self, Action, Destination, Link, LinkState, Mission, NotPlanned, Path, Run, Stage,
 };
@@ -26,7 +27,6 @@ use jaus::messages::core::{
     QueryControl, QueryHeartbeatPulse, QueryStatus, ReportControl, ReportHeartbeatPulse,
     ReportStatus,
 };
-use jaus::messages::ground::{QueryMission, QueryPlannedPath, QueryStage, ReportStage, stage};
 
 /// How long the driver may take to stop and to be given back.
 const HALT: Duration = Duration::from_secs(2);

@@ -68,8 +68,11 @@ fn name(code: u16, payload: &Bytes) -> String {
 }
 
 fn plain_name(code: u16) -> String {
-    let known = messages::registry().by_code(code).next();
-    known.map_or_else(|| format!("{code:04X}h"), |info| info.name.to_owned())
+    let ours = crate::messages::registry();
+    let mut known = messages::registry().by_code(code).chain(ours.by_code(code));
+    known
+        .next()
+        .map_or_else(|| format!("{code:04X}h"), |info| info.name.to_owned())
 }
 
 impl Line {

@@ -8,19 +8,19 @@
 use std::time::{Duration, Instant};
 
 use super::steps::{Step, Verdict};
+use crate::messages::ground::report_mission::Stage;
+use crate::messages::ground::set_destination::Approved;
+use crate::messages::ground::{
+    ApproveMission, QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission,
+    ReportPlannedPath, ReportRasterMaps, ReportStage, SetDestination, mission_planner, raster_maps,
+    stage,
+};
 use crate::mission::{Link, Path, Point, Vehicle, plan};
 use crate::parts::planner::{chain, map};
 use jaus::address::JausId;
 use jaus::codec::Message;
 use jaus::component::{Component, Control, Subscription, When};
 use jaus::messages::core::{QueryControl, ReportControl};
-use jaus::messages::ground::report_mission::Stage;
-use jaus::messages::ground::set_destination::Approved;
-use jaus::messages::ground::{
-    ApproveMission, QueryMission, QueryPlannedPath, QueryRasterMaps, QueryStage, ReportMission,
-    ReportPlannedPath, ReportRasterMaps, ReportStage, SetDestination, mission_planner, raster_maps,
-    stage,
-};
 use jaus::messages::mobility::{
     QueryLocalPose, QueryVelocityState, ReportLocalPose, ReportVelocityState, local_pose_sensor,
     velocity_state_sensor,

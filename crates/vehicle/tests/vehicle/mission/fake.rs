@@ -5,16 +5,16 @@ use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Handlers, Kind, Management, Subscription, When};
-use jaus::messages::ground::report_mission::Stage as MissionStage;
-use jaus::messages::ground::report_raster_maps::MapRec;
-use jaus::messages::ground::report_stage::State;
-use jaus::messages::ground::{
-    QueryMission, QueryRasterCells, QueryRasterMaps, QueryStage, ReportMission, ReportRasterCells,
-    ReportRasterMaps, ReportStage, SetDestination, mission_planner, raster_maps, stage,
-};
 use jaus::messages::mobility::{local_vector_driver, primitive_driver};
 use jaus::node::{Config, Node};
 use jaus_test_kit::group::own_group;
+use jaus_vehicle::messages::ground::report_mission::Stage as MissionStage;
+use jaus_vehicle::messages::ground::report_raster_maps::MapRec;
+use jaus_vehicle::messages::ground::report_stage::State;
+use jaus_vehicle::messages::ground::{
+    QueryMission, QueryRasterCells, QueryRasterMaps, QueryStage, ReportMission, ReportRasterCells,
+    ReportRasterMaps, ReportStage, SetDestination, mission_planner, raster_maps, stage,
+};
 use jaus_vehicle::mission::{Settings, Vehicle as Size};
 use jaus_vehicle::mobility::Vehicle;
 use jaus_vehicle::motion::{Frame, Limits, Pilot, SkidSteer, SkidSteerConfig};
@@ -151,7 +151,7 @@ impl World {
         let to = SetDestination {
             x,
             y,
-            approved: jaus::messages::ground::set_destination::Approved(approved.into()),
+            approved: jaus_vehicle::messages::ground::set_destination::Approved(approved.into()),
             speed: Some(3.0),
         };
         self.control.deliver(&to).await.unwrap();

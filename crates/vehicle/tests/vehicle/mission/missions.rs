@@ -1,8 +1,10 @@
 //! Missions that arrive, that are begun again, and that are stopped.
 
-use jaus::messages::ground::report_mission::Stage;
-use jaus::messages::ground::report_stage::State;
-use jaus::messages::ground::{ApproveMission, QueryPlannedPath, ReportPlannedPath, StopMission};
+use jaus_vehicle::messages::ground::report_mission::Stage;
+use jaus_vehicle::messages::ground::report_stage::State;
+use jaus_vehicle::messages::ground::{
+    ApproveMission, QueryPlannedPath, ReportPlannedPath, StopMission,
+};
 
 use super::fake::{World, store};
 

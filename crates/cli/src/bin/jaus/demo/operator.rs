@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use jaus::address::JausId;
 use jaus::component::{Component, Control, Update, When};
-use jaus::messages::ground::report_mission::Stage;
-use jaus::messages::ground::{
+use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
+use jaus_cli::failure::Failure;
+use jaus_vehicle::messages::ground::report_mission::Stage;
+use jaus_vehicle::messages::ground::{
     QueryMission, QueryPlannedPath, ReportMission, ReportPlannedPath, SetDestination,
     mission_planner,
 };
-use jaus::messages::mobility::{QueryLocalPose, ReportLocalPose, local_pose_sensor};
-use jaus_cli::failure::Failure;
 
 use super::story::{Story, Who};
 
@@ -55,7 +55,7 @@ impl<'s> Operator<'s> {
         let destination = SetDestination {
             x,
             y,
-            approved: jaus::messages::ground::set_destination::Approved::YES,
+            approved: jaus_vehicle::messages::ground::set_destination::Approved::YES,
             ..SetDestination::default()
         };
         control.deliver(&destination).await.map_err(Failure::of)?;

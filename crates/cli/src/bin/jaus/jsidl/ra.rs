@@ -2,7 +2,7 @@
 //! habits forgiven, as everywhere else.
 
 use bytes::Bytes;
-use jaus::messages::{ra, ra_registry};
+use jaus_ra::messages;
 use jsidl::dynamic::Raw;
 use jsidl::explain::{Explanation, Kind, Row, ServiceName, Unexplained, explain};
 use jsidl::{Library, Loader};
@@ -39,9 +39,9 @@ impl ReferenceArchitecture {
 /// The octets as they would be without what is forgiven; unchanged if there is more wrong with them.
 fn mended(octets: &Bytes) -> Bytes {
     let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
-    let info = code.and_then(|code| ra_registry().by_code(code).next());
+    let info = code.and_then(|code| messages::registry().by_code(code).next());
     let read = info.map(|info| {
-        ra::forgiving(octets, |tried| {
+        messages::forgiving(octets, |tried| {
             (info.decode)(tried).map(|_message| tried.clone())
         })
     });

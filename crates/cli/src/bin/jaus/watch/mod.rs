@@ -11,8 +11,9 @@ use clap::Args;
 use jaus_cli::failure::{Failure, Outcome};
 use jaus_cli::output::{Output, colours_wanted};
 use jaus_cli::runtime;
-use jaus_view::{Dictionary, Entry, Filter};
+use jaus_view::{Entry, Filter};
 
+use crate::definitions;
 use tally::Tally;
 
 /// Show the messages that pass a node, live or from files, whole and each once
@@ -113,7 +114,7 @@ impl Watch {
         let outcome = if self.files.is_empty() {
             live::watch(&self.at, &filter, self.seconds, &mut printer)?
         } else {
-            let dictionary = Dictionary::complete();
+            let dictionary = definitions::built_in();
             files::watch(&self.files, &filter, &dictionary, &mut printer)?
         };
         if let Form::Tally(tally) = &printer.form {

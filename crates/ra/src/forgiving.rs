@@ -9,8 +9,10 @@ use std::borrow::Cow;
 
 use bytes::{Bytes, BytesMut};
 
-use super::ra33::{CreateVksObjects, RejectEventRequest, ReportIdentification, ReportVksObjects};
-use crate::codec::{DecodeError, DecodeErrorKind, Message};
+use crate::messages::ra33::{
+    CreateVksObjects, RejectEventRequest, ReportIdentification, ReportVksObjects,
+};
+use jaus::codec::{DecodeError, DecodeErrorKind, Message};
 
 /// Presence vectors that one message may have mended: as many as the longest list of events holds.
 const MOST_MENDED: usize = 256;

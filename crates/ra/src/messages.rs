@@ -1,0 +1,36 @@
+//! The messages of the Reference Architecture, generated from their definitions.
+//!
+//! A command code is in the header there; here it stands before the data, as in a
+//! [`Frame`](jaus::wire::Frame). Some codes are those of other layouts in the SAE sets, so these
+//! messages have a registry of their own.
+
+use bytes::Bytes;
+use jaus::codec::{AnyMessage, DecodeError, MessageInfo, Registry, ServiceInfo};
+
+pub use crate::forgiving::forgiving;
+
+/// Version 3.3, which OpenJAUS 3.3 speaks.
+#[allow(missing_docs, reason = "what the definitions do not describe")]
+pub mod ra33 {
+    include!(concat!(env!("OUT_DIR"), "/ra33.rs"));
+}
+
+/// All messages of the Reference Architecture.
+#[must_use]
+pub const fn registry() -> Registry {
+    static MESSAGES: &[&[MessageInfo]] = &[ra33::MESSAGES];
+    Registry::new(MESSAGES)
+}
+
+/// Decodes a message of the type, code and data, with the habits of peers forgiven.
+///
+/// # Errors
+/// What is wrong beyond those habits, and at which octet.
+pub fn decode(info: &MessageInfo, octets: &Bytes) -> Result<Box<dyn AnyMessage>, DecodeError> {
+    forgiving(octets, info.decode)
+}
+
+/// All services of the Reference Architecture.
+pub fn services() -> impl Iterator<Item = &'static ServiceInfo> {
+    ra33::SERVICES.iter()
+}
