@@ -18,11 +18,10 @@ const NUMBERS_PER_MILLISECOND: u128 = 5;
 /// A [`first_sequence`](Config::first_sequence) for a node that starts at the given time since
 /// 1970. The clock must keep running while the node does not.
 ///
-/// Junior takes a message for a duplicate if it has seen its number from that id within 3 s (10 s
+/// Junior treats a message as a duplicate if it has seen its number from that id within 3 s (10 s
 /// without its settings file): it acknowledges the message and drops it. With random first numbers,
-/// a node that restarts soon after a large message repeats recent numbers about once in some
-/// hundred restarts. The numbers given here run ahead of what a node uses up, and repeat only after
-/// 13 s.
+/// a node that restarts soon after a large message repeats recent numbers about once in a hundred
+/// restarts. The numbers given here run ahead of what a node uses up, and repeat only after 13 s.
 ///
 /// ```
 /// use std::time::Duration;
@@ -71,7 +70,7 @@ pub struct Config {
     pub max_reassembly: usize,
     /// How long a part of an unfinished message is kept without progress. It must be longer than
     /// senders pause between retransmissions or keep trying: they do not repeat acknowledged
-    /// fragments, so they would take a message for delivered whose beginning was dropped here.
+    /// fragments, so a message whose beginning was dropped here would look delivered to them.
     pub reassembly_timeout: Duration,
     /// The most entries of each queue (outgoing datagrams, per priority; events). Entries beyond it
     /// are dropped and counted.
@@ -91,8 +90,8 @@ pub struct Config {
     /// How long to expect echoes of our own multicast.
     pub echo_window: Duration,
     /// The most messages remembered for duplicate detection, and likewise echoes. The limit applies
-    /// separately to messages with and without acknowledgement request; strangers get a quarter of
-    /// it each. The oldest are dropped first.
+    /// separately to messages with and without acknowledgement request; in each case, a quarter of
+    /// it applies to strangers' messages. The oldest are dropped first.
     pub max_recent: usize,
     /// How long a destination may be silent before a message that waits for its acknowledgement is
     /// given up, and the shortest time for which one of its packets is retransmitted. The interval
@@ -143,7 +142,7 @@ pub struct Config {
     /// id.
     pub conflict_interval: Duration,
     /// The number before the first sequence number. A node should use [`first_sequence_at`],
-    /// because some peers take a restarted node's messages for duplicates of earlier ones.
+    /// because some peers treat a restarted node's messages as duplicates of earlier ones.
     pub first_sequence: u16,
 }
 

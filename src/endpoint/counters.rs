@@ -18,8 +18,7 @@ counters! {
     MessagesSent = "messages sent",
     /// Acknowledgements sent.
     AcknowledgementsSent = "acknowledgements sent",
-    /// Acknowledgements that no component waits for, including those of the first messages to
-    /// unknown ids, which only teach the address.
+    /// Acknowledgements that no component waits for.
     UnawaitedAcknowledgement = "acknowledgements that nobody waits for",
     /// Packets retransmitted for want of an acknowledgement.
     Retransmissions = "retransmissions",

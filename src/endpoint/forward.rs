@@ -16,7 +16,7 @@ use super::{Counter, Endpoint, Path, To};
 use crate::address::JausId;
 use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};
 
-/// How long after a peer was heard on one path its broadcasts from another path are taken for late
+/// How long after a peer was heard on one path its broadcasts from another path count as late
 /// copies.
 const SETTLED: Duration = Duration::from_secs(1);
 
@@ -27,8 +27,8 @@ impl Endpoint {
         self.config.forwarding && !destination.has_zero() && !self.components.contains(destination)
     }
 
-    /// Whether a broadcast arrived on another path than the one on which its sender was heard a
-    /// moment ago. Such a message is neither forwarded nor learned from.
+    /// Whether a broadcast, or a message to an unknown address, arrived on another path than the
+    /// one on which its sender was heard a moment ago. It is neither forwarded nor learned from.
     pub(super) fn is_astray(&self, now: Instant, from: Path, frame: &Frame) -> bool {
         let for_many = frame.destination.has_wildcard()
             || frame.flags.broadcast() != Some(Broadcast::None)

@@ -1,7 +1,7 @@
-//! The protocol core of a node: peer table, routing, acknowledged delivery and message delivery,
-//! without I/O.
+//! The protocol core of a node, without I/O: peer table, routing, reliable delivery, and dispatch
+//! to local components.
 //!
-//! An [`Endpoint`] does no I/O and reads no clock. Its owner passes in events
+//! An [`Endpoint`] does no I/O and reads no clock. Its owner passes in input
 //! ([`Endpoint::handle_datagram`] or, for links that read frames themselves,
 //! [`Endpoint::handle_frame`]; [`Endpoint::handle_timeout`]), requests ([`Endpoint::attach`],
 //! [`Endpoint::send`]) and a [`Sink`] that takes messages for local components. Then it polls until

@@ -1,6 +1,6 @@
 //! Rate limits per source: token buckets by network address and by id.
 //!
-//! By default only the rate of new ids is limited, because a flood of invented senders needs that
+//! By default only the rate of new ids is limited: a flood of invented senders needs many new ids,
 //! and no real peer does. The message rate is limited only if configured. The bucket tables are
 //! bounded: sources without a place in a full table share a single bucket, so inventing addresses
 //! gains nothing.

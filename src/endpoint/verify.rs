@@ -141,7 +141,7 @@ impl Endpoint {
         }
     }
 
-    /// The local component to challenge a peer as that has written to `destination`.
+    /// The local component that challenges a peer which has written to `destination`.
     fn challenger(&self, destination: JausId) -> Option<JausId> {
         if self.components.contains(destination) {
             return Some(destination);

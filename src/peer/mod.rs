@@ -65,7 +65,7 @@ pub use sign::Sign;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Peer {
-    /// No departure is known: treated as the standard says.
+    /// A peer without known departures, treated as the standard says.
     #[default]
     Standard,
     /// JAUS++ (ACTIVE laboratory).

@@ -3,7 +3,7 @@
 //!
 //! Each acknowledgement names one packet, so only unacknowledged packets are retransmitted. A
 //! packet counts as lost when enough packets sent after it were acknowledged (the threshold adapts
-//! to needless retransmissions), or when nothing was acknowledged for a round trip timeout.
+//! to needless retransmissions), or when nothing was acknowledged for the retransmission timeout.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::time::{Duration, Instant};

@@ -48,8 +48,8 @@ impl Pacing {
         }
     }
 
-    /// Reserves room for one datagram, the last of which may exceed the burst; or returns how long
-    /// to wait for room.
+    /// Reserves room for one datagram, which may overrun the burst; or returns how long to wait for
+    /// room.
     pub(super) fn take(
         self,
         bucket: &mut Bucket,

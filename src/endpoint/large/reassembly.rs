@@ -91,7 +91,7 @@ impl Run {
         sequence.wrapping_sub(first) <= self.last.wrapping_sub(first)
     }
 
-    /// Whether the frame requests an acknowledgement and is the first fragment of this run.
+    /// Whether the frame requests an acknowledgement and repeats the first fragment of this run.
     fn is_begun_by(&self, frame: &Frame) -> bool {
         frame.flags.acknowledgement() == Acknowledgement::Request
             && self.begins
@@ -363,10 +363,10 @@ impl Reassembly {
         continues && run.is_some_and(|run| run.begins && !run.ends && run.last == number)
     }
 
-    /// Returns the large message, with its receiver and priority, that the number of the next whole
-    /// message shows to be complete. JAUS++ does not mark the end of such a message, and reuses the
-    /// number of its last fragment for the next message. See
-    /// [`NoLastFragment`](crate::peer::Departure::NoLastFragment).
+    /// Finishes the large message whose end is shown by `number`, the sequence number of the next
+    /// whole message; returns it with its receiver and priority. JAUS++ does not mark the end of a
+    /// message that fills its fragments, and reuses the number of the last fragment for the next
+    /// message. See [`NoLastFragment`](crate::peer::Departure::NoLastFragment).
     pub(in crate::endpoint) fn finish(
         &mut self,
         source: JausId,

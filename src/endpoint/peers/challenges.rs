@@ -17,8 +17,8 @@ const MOST: usize = 256;
 const MOST_OF_ADDRESS: usize = 32;
 /// The most alternative paths remembered for a peer.
 const MOST_WAYS: usize = 4;
-/// How long a peer is not challenged again after a challenge, except after a verified move or a
-/// lone unanswered path.
+/// The pause before a peer is challenged again, after any challenge but a verified move or an
+/// unanswered one without a rival.
 const SETTLED: Duration = Duration::from_secs(2);
 /// How long a path that did not answer is not challenged again.
 const UNANSWERED: Duration = Duration::from_secs(10);

@@ -27,7 +27,7 @@ pub struct Peer {
     pub path: Path,
     /// How far that path is verified.
     pub route: RouteState,
-    /// The header of its latest message. Messages to it use the same.
+    /// The header of its latest message. Messages to it use the same header.
     pub version: Version,
     /// When its first message arrived.
     pub first_heard: Instant,

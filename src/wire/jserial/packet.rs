@@ -9,7 +9,7 @@ use crate::wire::Version;
 /// Octets of the optional address in the header.
 const ADDRESS_LEN: usize = 2;
 
-/// A packet from after its `DLE SOH`.
+/// A packet in progress, beginning after its `DLE SOH`.
 #[derive(Debug)]
 pub(super) struct Packet {
     /// The most octets of messages to accept.
