@@ -1,17 +1,17 @@
-//! Who is who: [`JausId`], the 32-bit identity of a component that every JAUS message carries
-//! twice.
+//! The address of a JAUS component: [`JausId`], the 32-bit id that every JAUS message carries
+//! twice, as source and as destination.
 //!
-//! An id names subsystem (a vehicle, an operator station), node (a computer) and component (a
-//! program), and is written `101.1.33`. A destination may stand for many: subsystem 65535, node 255
-//! and component 255 each mean "all of them" in their own field. Zero names nobody.
+//! An id consists of subsystem (a vehicle, an operator station), node (a computer) and component (a
+//! program), and is written `101.1.33`. A destination may hold wildcards: subsystem 65535, node 255
+//! and component 255 each mean "all of them" in their own field. Zero is not a valid number.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// The identity of a component, or as a destination a pattern of them.
+/// The id of a component or, as a destination, a pattern of ids.
 ///
 /// Any 32 bits make a `JausId`, because any 32 bits can arrive; [`is_unicast`](Self::is_unicast)
-/// tells whether it names one component. Ordering is by subsystem, then node, then component.
+/// checks that it names one component. Ordering is by subsystem, then node, then component.
 ///
 /// ```
 /// use jaus::address::JausId;
@@ -30,16 +30,16 @@ pub struct JausId {
 }
 
 impl JausId {
-    /// The subsystem number that stands for every subsystem (AS5669A).
+    /// The subsystem number that means every subsystem (AS5669A).
     pub const ANY_SUBSYSTEM: u16 = 0xFFFF;
-    /// The node number that stands for every node (AS5669A).
+    /// The node number that means every node (AS5669A).
     pub const ANY_NODE: u8 = 0xFF;
-    /// The component number that stands for every component (AS5669A).
+    /// The component number that means every component (AS5669A).
     pub const ANY_COMPONENT: u8 = 0xFF;
     /// Every component of every subsystem: `65535.255.255`.
     pub const EVERYONE: Self = Self::new(Self::ANY_SUBSYSTEM, Self::ANY_NODE, Self::ANY_COMPONENT);
 
-    /// An id from its three numbers.
+    /// Creates an id from its three numbers.
     #[must_use]
     pub const fn new(subsystem: u16, node: u8, component: u8) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl JausId {
         (self.subsystem as u32) << 16 | (self.node as u32) << 8 | self.component as u32
     }
 
-    /// The id that [`to_u32`](Self::to_u32) gives.
+    /// The inverse of [`to_u32`](Self::to_u32).
     #[must_use]
     pub const fn from_u32(id: u32) -> Self {
         Self::new((id >> 16) as u16, (id >> 8) as u8, id as u8)
@@ -85,15 +85,15 @@ impl JausId {
         self.to_u32().to_le_bytes()
     }
 
-    /// The id in four octets of a message header.
+    /// Reads an id from four octets of a message header.
     #[must_use]
     pub const fn from_wire(octets: [u8; 4]) -> Self {
         Self::from_u32(u32::from_le_bytes(octets))
     }
 
-    /// Whether a field stands for "all": subsystem 65535, node 255 or component 255.
+    /// Whether a field is a wildcard: subsystem 65535, node 255 or component 255.
     ///
-    /// A single octet FFh within a subsystem number, as in 511, is an ordinary number.
+    /// A single octet FFh within a subsystem number, as in 511, is not a wildcard.
     #[must_use]
     pub const fn has_wildcard(self) -> bool {
         self.subsystem == Self::ANY_SUBSYSTEM
@@ -101,7 +101,7 @@ impl JausId {
             || self.component == Self::ANY_COMPONENT
     }
 
-    /// Whether a field is zero, so that the id names nobody.
+    /// Whether a field is zero, so that the id names no component.
     #[must_use]
     pub const fn has_zero(self) -> bool {
         self.subsystem == 0 || self.node == 0 || self.component == 0
@@ -113,10 +113,10 @@ impl JausId {
         !self.has_wildcard() && !self.has_zero()
     }
 
-    /// Whether this destination reaches `component`: each field is equal or stands for all.
+    /// Whether this destination reaches `component`: each field is equal or a wildcard.
     ///
-    /// A zero stands for nobody on either side. (One peer family reads zero as a wildcard; taking
-    /// that over would make ids with a zero octet reach strangers.)
+    /// A zero matches nothing on either side. (One peer family reads zero as a wildcard; adopting
+    /// that would make ids with a zero octet reach unrelated components.)
     ///
     /// ```
     /// use jaus::address::JausId;
@@ -136,7 +136,7 @@ impl JausId {
             && (self.component == component.component || self.component == Self::ANY_COMPONENT)
     }
 
-    /// The id with each 0 read as the wildcard of its field, as some peers mean it.
+    /// The id with each 0 replaced by the wildcard of its field, which is what some peers mean.
     ///
     /// ```
     /// use jaus::address::JausId;
@@ -195,7 +195,7 @@ pub enum ParseIdError {
     /// Not three parts with dots between them.
     #[error("\"{text}\" is not a JAUS id: write subsystem.node.component, for instance 101.1.33")]
     Shape {
-        /// What was given, cut after some characters.
+        /// The text, truncated.
         text: String,
     },
     /// A part is not a decimal number.
@@ -203,15 +203,15 @@ pub enum ParseIdError {
         "the {field} of \"{text}\" is not a number: write subsystem.node.component, for instance 101.1.33"
     )]
     NotANumber {
-        /// What was given, cut after some characters.
+        /// The text, truncated.
         text: String,
         /// `subsystem`, `node` or `component`.
         field: &'static str,
     },
-    /// A part is above what its field holds.
+    /// A part exceeds the largest number of its field.
     #[error("the {field} of \"{text}\" is above {limit} (which stands for every {field})")]
     TooLarge {
-        /// What was given, cut after some characters.
+        /// The text, truncated.
         text: String,
         /// `subsystem`, `node` or `component`.
         field: &'static str,
@@ -240,7 +240,7 @@ impl FromStr for JausId {
     }
 }
 
-/// One number of an id, at most `limit`.
+/// Parses one number of an id, at most `limit`.
 fn parse_field(
     text: &str,
     field: &'static str,
@@ -263,7 +263,7 @@ fn parse_field(
     }
 }
 
-/// Enough of a text to recognise it in an error.
+/// The beginning of a text, long enough to recognise it in an error.
 fn excerpt(text: &str) -> String {
     const LONGEST: usize = 32;
     match text.char_indices().nth(LONGEST) {
@@ -272,7 +272,7 @@ fn excerpt(text: &str) -> String {
     }
 }
 
-/// As text, `"101.1.33"`.
+/// Serializes as text, `"101.1.33"`.
 #[cfg(feature = "serde")]
 impl serde::Serialize for JausId {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -280,7 +280,7 @@ impl serde::Serialize for JausId {
     }
 }
 
-/// From text, `"101.1.33"`.
+/// Deserializes from text, `"101.1.33"`.
 #[cfg(feature = "serde")]
 impl<'de> serde::Deserialize<'de> for JausId {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

@@ -1,4 +1,4 @@
-//! Serde for types that settings and JSON hold as the text that people write.
+//! Serde support for types that settings files and JSON represent as text.
 
 /// Derives `Serialize` from [`Display`](std::fmt::Display) and `Deserialize` from
 /// [`FromStr`](std::str::FromStr), whose error becomes serde's.

@@ -1,8 +1,8 @@
-//! Counters: how a part of the stack says what it has seen, done and thrown away, one number for
-//! each. Whatever is dropped is counted with its reason, so that a flood is seen and not felt.
+//! Generates the counters with which a part of the stack reports what it received, sent and
+//! dropped. Every drop is counted with its reason, so that a flood shows up in the numbers.
 
-/// Makes `Counter`, what is counted, each with a few words for people, and `Counters`, the numbers,
-/// whose documentation stands first.
+/// Defines the enum `Counter`, with a short description of each counter, and the struct `Counters`
+/// with the values. The documentation of `Counters` comes first.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! counters {
@@ -11,7 +11,7 @@ macro_rules! counters {
         pub struct Counters;
         $($(#[doc = $doc:literal])+ $name:ident = $text:literal,)+
     ) => {
-        /// What is counted.
+        /// The counters.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[non_exhaustive]
         pub enum Counter {
@@ -19,10 +19,10 @@ macro_rules! counters {
         }
 
         impl Counter {
-            /// Every counter, in the order of their listing.
+            /// Every counter, in order of declaration.
             pub const ALL: &[Self] = &[$(Self::$name,)+];
 
-            /// What is counted, in a few words.
+            /// A short description.
             #[must_use]
             pub const fn name(self) -> &'static str {
                 match self {
@@ -39,7 +39,7 @@ macro_rules! counters {
 
         $(#[doc = $numbers])+
         ///
-        /// `Display` lists those that are not zero, one a line.
+        /// `Display` lists the counters that are not zero, one per line.
         #[derive(Clone, Debug, PartialEq, Eq)]
         pub struct Counters {
             values: [u64; Counter::ALL.len()],
@@ -54,13 +54,13 @@ macro_rules! counters {
         }
 
         impl Counters {
-            /// The number of one counter.
+            /// The value of one counter.
             #[must_use]
             pub fn get(&self, counter: Counter) -> u64 {
                 self.values[counter as usize]
             }
 
-            /// All counters with their numbers.
+            /// All counters with their values.
             pub fn iter(&self) -> impl Iterator<Item = (Counter, u64)> + '_ {
                 Counter::ALL.iter().copied().zip(self.values)
             }

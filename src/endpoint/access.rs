@@ -1,8 +1,7 @@
-//! Who may speak to this node: allow and deny lists by subsystem and by network.
+//! Access control for a node: allow and deny lists by subsystem and by network.
 //!
-//! JAUS proves nobody's identity. The lists keep out what does not belong, such as another team's
-//! vehicles on a shared network; they are no protection from somebody who writes a wrong id or
-//! address on purpose.
+//! JAUS does not authenticate senders. The lists keep out unrelated traffic, such as another team's
+//! vehicles on a shared network. They do not protect against a sender that forges an id or address.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr};
@@ -13,20 +12,21 @@ use super::Counter;
 use crate::address::JausId;
 use crate::as_text::serde_as_text;
 
-/// The lists. Who is denied is out; if a list of allowed is not empty, who is not on it is out too.
-/// So deny wins, and empty lists let everybody in.
+/// Allow and deny lists. Deny wins over allow. If an allow list is not empty, everything that is
+/// not on it is denied; empty lists admit everything.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct Access {
-    /// The only subsystems to hear and to forward for, unless empty. The node's own subsystem is
-    /// no exception: its other nodes are heard only if it is listed.
+    /// The only subsystems to receive from and to forward for, unless empty. The node's own
+    /// subsystem is no exception: its other nodes are heard only if it is listed.
     pub allow_subsystems: Vec<Subsystems>,
-    /// Subsystems neither to hear nor to forward for.
+    /// Subsystems to ignore, both as senders and for forwarding.
     pub deny_subsystems: Vec<Subsystems>,
-    /// The only networks to hear, unless empty. Lines without an address are always heard.
+    /// The only networks to receive from, unless empty. Serial lines have no address and are always
+    /// allowed.
     pub allow_networks: Vec<Network>,
-    /// Networks not to hear.
+    /// Networks to ignore.
     pub deny_networks: Vec<Network>,
 }
 
@@ -39,7 +39,7 @@ impl Access {
             && (self.allow_subsystems.is_empty() || is_on(&self.allow_subsystems))
     }
 
-    /// Whether anything may come from this address.
+    /// Whether messages may come from this address.
     #[must_use]
     pub fn allows_address(&self, address: IpAddr) -> bool {
         let is_on = |list: &[Network]| list.iter().any(|network| network.contains(address));
@@ -47,7 +47,7 @@ impl Access {
             && (self.allow_networks.is_empty() || is_on(&self.allow_networks))
     }
 
-    /// Checks who sent a message.
+    /// Checks the sender of a message.
     pub(super) fn check_source(&self, source: JausId) -> Result<(), Counter> {
         if self.allows_subsystem(source.subsystem()) {
             Ok(())
@@ -57,23 +57,23 @@ impl Access {
     }
 }
 
-/// A subsystem or several in a row, as text `101` or `200-299`.
+/// A subsystem or a range of subsystems, as text `101` or `200-299`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Subsystems(RangeInclusive<u16>);
 
 impl Subsystems {
-    /// Whether this subsystem is one of them.
+    /// Whether the range contains this subsystem.
     #[must_use]
     pub fn contains(&self, subsystem: u16) -> bool {
         self.0.contains(&subsystem)
     }
 }
 
-/// Why a text is no entry of a list.
+/// Why a text is not a valid list entry.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AccessError {
-    /// Neither a subsystem number nor a range of them.
+    /// Neither a subsystem number nor a range.
     #[error(
         "`{0}` names no subsystems: write a number from 1 to 65534 such as \"101\", or a range \
          with the smaller first such as \"200-299\""
@@ -85,14 +85,14 @@ pub enum AccessError {
          such as \"10.0.9.0/24\" or \"fd00::/8\", or one address such as \"10.0.9.7\""
     )]
     Network(String),
-    /// Octets of an address behind the bits that count.
+    /// The address has bits set beyond the prefix.
     #[error("`{text}` has bits set behind the first {prefix}: write \"{meant}\"")]
     HostBits {
-        /// What was given.
+        /// The text.
         text: String,
-        /// How many bits count.
+        /// The prefix length in bits.
         prefix: u8,
-        /// The network that the address is in.
+        /// The network that contains the address.
         meant: Network,
     },
 }
@@ -126,7 +126,7 @@ impl fmt::Display for Subsystems {
     }
 }
 
-/// A network of IPv4 or IPv6, as text `10.0.9.0/24`, `fd00::/8`, or one address.
+/// An IPv4 or IPv6 network, as text `10.0.9.0/24`, `fd00::/8`, or a single address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Network {
     address: IpAddr,
@@ -134,8 +134,8 @@ pub struct Network {
 }
 
 impl Network {
-    /// Whether an address is in the network. An IPv4 address written in IPv6's form
-    /// (`::ffff:10.0.9.7`) is the IPv4 address.
+    /// Whether the network contains an address. An IPv4-mapped IPv6 address (`::ffff:10.0.9.7`)
+    /// counts as the IPv4 address.
     #[must_use]
     pub fn contains(self, address: IpAddr) -> bool {
         let address = address.to_canonical();
@@ -148,7 +148,7 @@ impl Network {
     }
 }
 
-/// The first `count` bits of an address, the others 0.
+/// The first `count` bits of an address; the others are 0.
 fn first_bits(address: IpAddr, count: u8) -> u128 {
     let (bits, length) = match address {
         IpAddr::V4(address) => (u128::from(address.to_bits()), Ipv4Addr::BITS),

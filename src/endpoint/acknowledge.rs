@@ -1,4 +1,5 @@
-//! Acknowledging, and the calls of which an acknowledgement tells where their receiver is.
+//! Sends acknowledgements, and remembers broadcasts whose acknowledgement teaches the receiver's
+//! address.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -7,13 +8,13 @@ use super::{Counter, Endpoint, Path};
 use crate::address::JausId;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Kind, Version, ra};
 
-/// The most calls that are remembered.
+/// The most calls remembered.
 const MOST_CALLS: usize = 256;
-/// For how long.
+/// How long a call is remembered.
 const CALL_LIFE: Duration = Duration::from_secs(5);
 
-/// Messages without delivery that went to everybody because their receiver's address was not known.
-/// An acknowledgement of one teaches the address.
+/// Unreliable messages that were broadcast because the receiver's address was unknown. An
+/// acknowledgement of one teaches the address.
 #[derive(Debug, Default)]
 pub(super) struct Calls(VecDeque<(Instant, JausId, JausId, u16)>);
 
@@ -26,7 +27,8 @@ impl Calls {
         self.0.push_back((now, peer, local, call.sequence));
     }
 
-    /// Whether a component of ours has called a peer with that number lately, and was not answered.
+    /// Whether a local component called the peer with this number recently, without an answer so
+    /// far.
     pub(super) fn take(&mut self, now: Instant, peer: JausId, local: JausId, number: u16) -> bool {
         let is_over = |at: Instant| now.saturating_duration_since(at) >= CALL_LIFE;
         while self.0.front().is_some_and(|&(at, ..)| is_over(at)) {
@@ -41,15 +43,15 @@ impl Calls {
 }
 
 impl Endpoint {
-    /// Answers a message that wants an acknowledgement, and does so for each copy: the peer repeats
-    /// it because an answer got lost. A broadcast to many is not acknowledged, or all would answer
-    /// at once.
+    /// Acknowledges a message that requests it, and each duplicate of it: the peer retransmits
+    /// because an acknowledgement got lost. A broadcast to many is not acknowledged, or all
+    /// receivers would answer at once.
     pub(super) fn acknowledge(&mut self, now: Instant, from: Path, request: &Frame) {
         if !request.destination.is_unicast() {
             return;
         }
         self.reassembly.hear(now, from.into());
-        // The older headers' answers repeat the message code.
+        // In the older headers, acknowledgements repeat the message code.
         let code_len = match request.version {
             Version::As5669a => 0,
             Version::As5669 | Version::Ra => ra::CODE_LEN,

@@ -1,4 +1,5 @@
-//! The settings of an endpoint: bounds and times, with defaults that suit a node on a small board.
+//! The settings of an endpoint: limits and timeouts, with defaults that suit a node on a small
+//! board.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -7,20 +8,20 @@ use super::{Access, Pacing, Packing, Path, Rate, Rates};
 use crate::address::JausId;
 use crate::peer::Assignment;
 
-/// The payloads that packets may be limited to, in octets.
+/// The valid range of [`Config::payload_limit`], in octets.
 pub const PAYLOAD_LIMITS: RangeInclusive<usize> = 64..=4079;
 
-/// Sequence numbers that a node may use in a millisecond of its life and still be told, when it is
-/// started again, from the one before.
+/// How many sequence numbers per millisecond of uptime a node may use and still not repeat any
+/// after a restart.
 const NUMBERS_PER_MILLISECOND: u128 = 5;
 
-/// A [`first_sequence`](Config::first_sequence) for a node that is started at a time, given as the
-/// time since 1970, by a clock that goes on while the node does not run.
+/// A [`first_sequence`](Config::first_sequence) for a node that starts at the given time since
+/// 1970. The clock must keep running while the node does not.
 ///
-/// Junior takes a message for a duplicate if it has heard that number from that id within 3 s (10 s
-/// without its settings file), acknowledges it, and drops it. With numbers by chance, a node that
-/// is started again soon after a large message comes upon numbers of before once in some hundred
-/// times. These run ahead of what a node uses up, and come again after 13 s only.
+/// Junior treats a message as a duplicate if it has seen its number from that id within 3 s (10 s
+/// without its settings file): it acknowledges the message and drops it. With random first numbers,
+/// a node that restarts soon after a large message repeats recent numbers about once in a hundred
+/// restarts. The numbers given here run ahead of what a node uses up, and repeat only after 13 s.
 ///
 /// ```
 /// use std::time::Duration;
@@ -38,107 +39,110 @@ pub const fn first_sequence_at(since_1970: Duration) -> u16 {
 
 /// The settings of an [`Endpoint`](super::Endpoint).
 ///
-/// Every table and queue is bounded by one of them, so that no peer can make the endpoint grow.
+/// Every table and queue has a limit here, so that no peer can make the endpoint grow without
+/// bound.
 #[derive(Clone, Debug)]
 pub struct Config {
     /// The most components that can be attached.
     pub max_components: usize,
-    /// The most peers whose address is remembered. When there is one more, a peer of the network
-    /// address that holds most is forgotten, else somebody whom we have not spoken to, else whoever
-    /// was heard longest ago; messages to it go to the group again until it is heard. Addresses of static peers do not count and are never
-    /// forgotten.
+    /// The most peers whose address is remembered. At the limit, a new peer evicts a peer of the
+    /// network address that holds most of them, else a peer that we have not spoken to, else the
+    /// peer heard longest ago. Messages to an evicted peer go to the group until it is heard again.
+    /// Addresses of static peers do not count and are never evicted.
     pub max_peers: usize,
-    /// Peers whose address is known beforehand and not learned. Messages with their ids from another
+    /// Peers with a configured address, which is not learned. Messages with their ids from another
     /// network address are refused.
     pub static_peers: Vec<StaticPeer>,
-    /// The longest payload, in octets, that is sent in one packet: 64 to 4079, which is Junior's
-    /// most; what is outside is taken for the nearest of these. The default fits one Ethernet
-    /// frame, and is the most that JAUS++ does not expect to be fragmented in a way of its own.
+    /// The longest payload of one packet, in octets: 64 to 4079, which is Junior's maximum. Other
+    /// values are clamped. The default fits one Ethernet frame, and is the longest that JAUS++ does
+    /// not expect to be fragmented in its own way.
     pub payload_limit: usize,
-    /// The longest message, in octets, that is sent or received. Above
-    /// [`payload_limit`](Self::payload_limit) it travels in fragments.
+    /// The longest message, in octets, that is sent or received. Messages above
+    /// [`payload_limit`](Self::payload_limit) travel in fragments.
     pub max_message: usize,
-    /// What peers are, if that is known beforehand; of those that fit an id the first counts. The
-    /// others are [recognised](crate::peer::Recogniser) by what they send.
+    /// Profiles of peers, where known in advance; the first entry that matches an id applies. Other
+    /// peers are [recognised](crate::peer::Recogniser) by their messages.
     pub profiles: Vec<Assignment>,
-    /// The most octets that are kept of unfinished messages of one sender, with 64 more for each
-    /// fragment and 256 for each gap. The oldest are forgotten first.
+    /// The most octets buffered for unfinished messages of one sender, plus 64 for each fragment
+    /// and 256 for each gap. The oldest are dropped first.
     pub max_reassembly_per_sender: usize,
-    /// The same for all senders.
+    /// The same limit for all senders together.
     pub max_reassembly: usize,
-    /// How long a part of an unfinished message is kept that does not grow. Longer than senders
-    /// pause between two tries or try in vain: they do not send again what was acknowledged, and
-    /// would take a message for delivered of which the beginning was forgotten.
+    /// How long a part of an unfinished message is kept without progress. It must be longer than
+    /// senders pause between retransmissions or keep trying: they do not repeat acknowledged
+    /// fragments, so a message whose beginning was dropped here would look delivered to them.
     pub reassembly_timeout: Duration,
-    /// The most entries of each queue (datagrams to send, per priority; news). What comes when a
-    /// queue is full is dropped and counted.
+    /// The most entries of each queue (outgoing datagrams, per priority; events). Entries beyond it
+    /// are dropped and counted.
     pub queue_limit: usize,
-    /// How long the same message (source, destination, sequence number and content) is taken for a
-    /// duplicate made by the network. Short, because a restarted peer may well begin with the same
-    /// message.
+    /// How long a repeated message (same source, destination, sequence number and content) is taken
+    /// for a duplicate made by the network. It is short because a restarted peer may well begin
+    /// with the same message.
     pub duplicate_window: Duration,
-    /// The same for messages that want an acknowledgement, which a peer repeats when ours got lost:
-    /// Junior for 0.42 s, an endpoint every 2 s at the latest. Each repetition begins it anew, so it
-    /// does not depend on how long the sender goes on.
+    /// The same for messages that want an acknowledgement. A peer retransmits them when our
+    /// acknowledgement got lost: Junior for 0.42 s, an endpoint at least every 2 s. Each repetition
+    /// restarts the window, so its length does not depend on how long the sender keeps trying.
     pub retransmission_window: Duration,
-    /// The same for those that went to everybody because our address was not known: shorter,
-    /// because a peer that was restarted begins like that, with the numbers that it began with
-    /// before. Endpoints repeat them every 0.4 s.
+    /// The same for messages that were broadcast because our address was unknown. It is shorter,
+    /// because a restarted peer begins with such messages, and with the same numbers as before.
+    /// Endpoints repeat them every 0.4 s.
     pub first_contact_window: Duration,
-    /// How long our own multicast is expected to come back to us.
+    /// How long to expect echoes of our own multicast.
     pub echo_window: Duration,
-    /// The most messages remembered to tell duplicates, and likewise echoes: as many of those that
-    /// want an acknowledgement and as many others, and a quarter each of strangers' messages. The
-    /// oldest is forgotten first.
+    /// The most messages remembered for duplicate detection, and likewise echoes. The limit applies
+    /// separately to messages with and without acknowledgement request; in each case, a quarter of
+    /// it applies to strangers' messages. The oldest are dropped first.
     pub max_recent: usize,
     /// How long a destination may be silent before a message that waits for its acknowledgement is
-    /// given up, and for how long one packet of it is sent again and again at the least. How long
-    /// to wait before sending again follows the measured round trip.
+    /// given up, and the shortest time for which one of its packets is retransmitted. The interval
+    /// between retransmissions follows the measured round trip.
     pub acknowledge_patience: Duration,
-    /// How often one packet is sent at the least before its message is given up while the
-    /// destination acknowledges others.
+    /// The fewest attempts for one packet before its message is given up while the destination
+    /// acknowledges others.
     pub acknowledge_tries: u32,
-    /// The most messages that can wait for their acknowledgement, or for their result to be polled.
+    /// The most messages that wait for their acknowledgement, or for their result to be polled.
     pub max_unacknowledged: usize,
-    /// The most octets of messages that can wait for their acknowledgement. A single longer message
-    /// is taken when no other waits.
+    /// The most octets of messages that wait for their acknowledgement. A single longer message is
+    /// accepted if no other waits.
     pub max_unacknowledged_octets: usize,
-    /// The most destinations of which round trip and window are remembered. The one idle for
-    /// longest is forgotten for a new one.
+    /// The most destinations whose round trip and window are remembered. A new destination replaces
+    /// the one idle for longest.
     pub max_flows: usize,
-    /// How many packets may be on their way to one destination at first.
+    /// The initial window: how many packets to one destination may be unacknowledged.
     pub initial_window: usize,
-    /// How many packets may ever be on their way to one destination.
+    /// The largest window.
     pub max_window: usize,
-    /// How fast large messages without acknowledgement leave; `None` for as fast as the link takes
-    /// them.
+    /// The rate at which large messages without acknowledgement leave; `None` sends as fast as the
+    /// link accepts them.
     pub pacing: Option<Pacing>,
     /// The most octets of large messages without acknowledgement that wait to be sent. A single
-    /// longer message is taken when no other waits.
+    /// longer message is accepted if no other waits.
     pub max_paced: usize,
     /// Whether small messages share datagrams.
     pub packing: Packing,
-    /// Whether messages for others are passed on between the links. Off by default: whoever has two
-    /// links is not asked to join two networks by that.
+    /// Whether to forward messages for other nodes between links. Off by default: a node with two
+    /// links does not join two networks unless configured to.
     pub forwarding: bool,
-    /// How many broadcasts, and messages for ids that are not known, are passed on in all.
+    /// The rate limit on forwarded broadcasts and messages for unknown ids, for all senders
+    /// together.
     pub forwarded_broadcasts: Rate,
-    /// Who may speak to us.
+    /// Which senders are allowed.
     pub access: Access,
-    /// How much is taken from one source.
+    /// Rate limits per source.
     pub rates: Rates,
-    /// How many octets of datagrams may go to one network address while nobody there has acknowledged
-    /// anything or is configured.
+    /// How many octets may go to one network address as long as no peer there is configured or has
+    /// acknowledged anything.
     pub unverified_address: Rate,
-    /// The same for all such addresses together.
+    /// The same limit for all unverified addresses together.
     pub unverified_total: Rate,
-    /// Something that nobody can guess, such as a random number: numbers of challenges come from it.
+    /// A secret, such as a random number, from which the sequence numbers of challenges are
+    /// derived.
     pub challenge_key: u64,
-    /// The shortest time between two [`Event::IdConflict`](super::Event::IdConflict) about one id.
+    /// The shortest interval between two [`Event::IdConflict`](super::Event::IdConflict) about one
+    /// id.
     pub conflict_interval: Duration,
-    /// The number before the first sequence number. A node should take
-    /// [`first_sequence_at`], because some peers take a restarted node's messages for duplicates of
-    /// earlier ones.
+    /// The number before the first sequence number. A node should use [`first_sequence_at`],
+    /// because some peers treat a restarted node's messages as duplicates of earlier ones.
     pub first_sequence: u16,
 }
 
@@ -186,11 +190,11 @@ impl Default for Config {
 /// A peer whose address is configured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StaticPeer {
-    /// Its id. With wildcards: everyone who matches and has no address of their own lives behind
-    /// this address.
+    /// The id. With wildcards, it covers every matching id without an address of its own.
     pub id: JausId,
-    /// Its address. What is heard from elsewhere does not change it, and is dropped.
+    /// The address. Messages from elsewhere do not change it, and are dropped.
     pub path: Path,
-    /// Whether multicast does not reach it, so that it gets a copy of every matching broadcast.
+    /// Whether multicast does not reach the peer, so that it gets a unicast copy of every matching
+    /// broadcast.
     pub gets_broadcasts: bool,
 }

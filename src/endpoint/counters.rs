@@ -1,91 +1,89 @@
-//! What an endpoint has seen, done and thrown away: one number for each, for people and for tests.
+//! The counters of an endpoint: what it received, sent and dropped, and why.
 
 use crate::counters::counters;
 
 counters! {
-    /// The numbers of an endpoint. They only grow.
+    /// The counters of an endpoint. They only grow.
     pub struct Counters;
 
-    /// Datagrams handed in.
+    /// Datagrams received from links.
     DatagramsReceived = "datagrams received",
-    /// Datagrams handed out.
+    /// Datagrams handed out to links.
     DatagramsSent = "datagrams sent",
     /// Messages found in datagrams.
     MessagesReceived = "messages received",
-    /// Messages delivered; one for several local components counts for each.
+    /// Messages delivered; one for several local components counts once for each.
     MessagesDelivered = "messages delivered",
     /// Messages accepted for sending; one in several fragments or on several links counts once.
     MessagesSent = "messages sent",
     /// Acknowledgements sent.
     AcknowledgementsSent = "acknowledgements sent",
-    /// Acknowledgements received that no component waits for, among them those to the first
-    /// messages for unknown ids, which only teach the address.
+    /// Acknowledgements that no component waits for.
     UnawaitedAcknowledgement = "acknowledgements that nobody waits for",
-    /// Packets sent again for want of an acknowledgement.
+    /// Packets retransmitted for want of an acknowledgement.
     Retransmissions = "retransmissions",
-    /// Messages that wanted an acknowledgement and were given up.
+    /// Messages given up because no acknowledgement arrived.
     MessagesGivenUp = "messages given up, not acknowledged",
-    /// Peers forgotten because more were heard than the table holds.
+    /// Peers forgotten because the table was full.
     PeersEvicted = "peers forgotten, table full",
-    /// Octets behind the last message of a datagram, left by a peer that does not shorten its
+    /// Octets after the last message of a datagram, left by a peer that does not truncate its
     /// buffer.
     StaleOctets = "stale octets behind messages",
-    /// Messages of others that were sent on.
+    /// Messages forwarded for other nodes.
     MessagesForwarded = "messages forwarded",
     /// Dropped: a datagram from a link that the endpoint does not have.
     UnknownLink = "dropped: unknown link",
-    /// Dropped: a datagram that no JAUS transport wrote.
+    /// Dropped: a datagram of no known JAUS transport.
     NotJaus = "dropped: not JAUS",
-    /// Dropped: a datagram whose first message does not fit its own sizes.
+    /// Dropped: a datagram whose first message contradicts its own size fields.
     Malformed = "dropped: malformed",
     /// Dropped: an AS5669A message of a reserved type.
     ReservedType = "dropped: reserved message type",
-    /// Dropped: a compressed header, which nobody negotiated with us.
+    /// Dropped: a compressed header, which was never negotiated.
     CompressedHeader = "dropped: compressed header",
-    /// Dropped: a message with all flags set, which Junior makes of priority 0 and which could be any
-    /// part of one.
+    /// Dropped: a message with all flags set, which Junior writes for priority 0 and which could be
+    /// any part of a message.
     PriorityFault = "dropped: all flags set, as Junior does for priority 0",
     /// Dropped: the reserved value of the broadcast field.
     ReservedBroadcast = "dropped: reserved broadcast value",
     /// Dropped: a source id with a wildcard or a zero.
     InvalidSource = "dropped: source is not one component",
-    /// Dropped: our own multicast, come back.
+    /// Dropped: our own multicast, received back.
     OwnEcho = "dropped: own multicast",
-    /// Dropped: somebody else sends with the id of a component of ours.
+    /// Dropped: another sender uses the id of a local component.
     IdConflict = "dropped: id conflict",
-    /// Dropped: for nobody here.
+    /// Dropped: no local receiver.
     NotForUs = "dropped: not for us",
     /// Dropped: a local broadcast from another subsystem.
     OutOfScope = "dropped: local broadcast of another subsystem",
     /// Dropped: an acknowledgement with a message in it.
     AcknowledgementWithPayload = "dropped: acknowledgement with payload",
-    /// Dropped: the same message within a short time.
+    /// Dropped: a repetition of a recent message.
     Duplicate = "dropped: duplicate",
-    /// Dropped: from a network that is denied or not among the allowed.
+    /// Dropped: from a network that is denied or not on the allow list.
     NetworkDenied = "dropped: network not allowed",
-    /// Dropped: from or for a subsystem that is denied or not among the allowed.
+    /// Dropped: from or for a subsystem that is denied or not on the allow list.
     SubsystemDenied = "dropped: subsystem not allowed",
-    /// Dropped: more messages from one address or id than configured.
+    /// Dropped: more messages from one address or id than the configured rate.
     MessageRate = "dropped: too many messages from one source",
-    /// Dropped: a message from an id that was not known, of which too many come from one address.
+    /// Dropped: a message from an unknown id, because its address has introduced too many.
     NewIdRate = "dropped: too many new ids from one address",
-    /// Dropped: a message from an id that was not known, while the table is full of peers in
-    /// conversation with us.
+    /// Dropped: a message from an unknown id, because the table is full of peers that we talk to.
     PeersFull = "dropped: no room for another peer",
-    /// Dropped, and not acknowledged: a message for a component that has no room for it, which its
-    /// sender will repeat.
+    /// Dropped and not acknowledged: a message for a component without room; its sender will repeat
+    /// it.
     ReceiverBusy = "dropped: receiver busy, not acknowledged",
-    /// Challenges sent to paths that are to be proven.
+    /// Challenges sent to verify paths.
     ChallengesSent = "challenges sent",
-    /// Challenges that have shown an id on two paths to be where it was.
+    /// Challenges that confirmed the known path of an id heard on two paths.
     PeerConflicts = "ids heard at two addresses",
-    /// Not sent: a datagram to an address that is not proven and had its share.
+    /// Not sent: a datagram to an unverified address that has used up its budget.
     UnverifiedBudget = "not sent: too much for an unproven address",
-    /// Dropped: a message with the id of a configured peer from another network address.
+    /// Dropped: a message with the id of a static peer from another network address.
     PinnedElsewhere = "dropped: id configured to be elsewhere",
-    /// Not forwarded: a broadcast that did not come by the way that leads to its sender.
+    /// Not forwarded: a broadcast that did not arrive on the route to its sender.
     NotTheWayBack = "not forwarded: did not come from where its sender is",
-    /// Not forwarded: more broadcasts than are allowed to go on.
+    /// Not forwarded: broadcasts above the configured rate.
     ForwardRate = "not forwarded: too many broadcasts",
     /// Not forwarded: a message that the next header or framing cannot carry.
     CannotForward = "not forwarded: next header cannot carry it",
@@ -93,11 +91,10 @@ counters! {
     NoMessageCode = "dropped: no message code",
     /// Dropped: a large message that is longer than the limit.
     MessageTooLong = "dropped: large message above the limit",
-    /// Dropped: a part of a large message of which the rest did not come in time, or for which
-    /// there is no room.
+    /// Dropped: a fragment of a large message that was not completed in time, or for which there is
+    /// no room.
     FragmentsForgotten = "dropped: unfinished large message",
-    /// Dropped, and not acknowledged: a part of a large message from elsewhere than where its sender has
-    /// proven to be.
+    /// Dropped and not acknowledged: a fragment whose sender is verified at another address.
     PartFromElsewhere = "dropped: part of a message from elsewhere",
     /// Not sent: a fragment that its header cannot carry.
     CannotSend = "not sent: its header cannot carry it",

@@ -1,4 +1,5 @@
-//! Whether a message is new, repeated by its sender, or a copy that the network has made.
+//! Duplicate detection: a message is new, retransmitted by its sender, or a copy made by the
+//! network.
 
 use std::time::Duration;
 
@@ -10,17 +11,17 @@ use crate::address::JausId;
 use crate::peer;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Version};
 
-/// The same message again within this time is a copy made on the way: nobody repeats so fast.
+/// A repetition within this time is a copy made on the way: no sender retransmits that fast.
 const REPEAT_INTERVAL: Duration = Duration::from_millis(1);
 
 /// Result of the duplicate check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Novelty {
-    /// Not heard lately.
+    /// Not seen recently.
     New,
-    /// Its sender has sent it again; how often so far.
+    /// Retransmitted by its sender; how often so far.
     Repeated(u8),
-    /// The network has made a copy, or brought it in a circle.
+    /// A copy made by the network, or sent round a loop.
     Copy,
 }
 
@@ -34,10 +35,10 @@ impl Novelty {
 }
 
 impl Endpoint {
-    /// How a message stands to what was heard lately.
+    /// Runs the duplicate check and records the message.
     ///
-    /// The older headers' peers leave the sequence number at 0, so there only a message that wants
-    /// an acknowledgement, and hence may be repeated, can be told from another.
+    /// Peers with the older headers leave the sequence number at 0. Their messages can be told
+    /// apart only if they request an acknowledgement, and so may be retransmitted.
     pub(super) fn recall(&mut self, arrival: Arrival, frame: &Frame, seen: Fingerprint) -> Novelty {
         let now = arrival.now;
         let forwarding = self.config.forwarding;
@@ -77,8 +78,8 @@ impl Endpoint {
         novelty
     }
 
-    /// Has the first fragment of a message that is whole now remembered from now on: it may have come
-    /// long before `last`, and must not begin the message again when it is repeated.
+    /// Refreshes the record of the first fragment of a message that is now complete. It may have
+    /// arrived long before `last`, and a retransmission of it must not begin the message again.
     pub(super) fn recall_beginning(&mut self, arrival: Arrival, last: &Frame, whole: &Whole) {
         let first = Frame {
             sequence: whole.first.0,
@@ -104,7 +105,7 @@ impl Endpoint {
         }
     }
 
-    /// For how long the same message is taken for a duplicate.
+    /// How long a repetition of the message counts as a duplicate.
     fn duplicate_window(&self, arrival: Arrival, frame: &Frame) -> Duration {
         if frame.flags.acknowledgement() == Acknowledgement::None {
             return self.config.duplicate_window;

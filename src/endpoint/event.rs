@@ -1,5 +1,5 @@
-//! What goes in and out of an endpoint beside datagrams: messages to send, messages received, and
-//! news.
+//! Input and output of an endpoint besides datagrams: outgoing messages, received messages and
+//! events.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use super::Path;
 use crate::address::JausId;
 use crate::wire::{Broadcast, Priority, Version};
 
-/// Names a sent message in the events about it.
+/// Identifies a sent message in the events about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MessageHandle(pub(crate) u64);
 
@@ -18,13 +18,13 @@ pub struct MessageHandle(pub(crate) u64);
 pub struct Outgoing {
     /// The sender, an attached component.
     pub source: JausId,
-    /// For whom; may hold wildcards.
+    /// The destination; may hold wildcards.
     pub destination: JausId,
-    /// How urgent it is.
+    /// The priority.
     pub priority: Priority,
-    /// How far it goes. With `None`, a destination with wildcards makes it global.
+    /// The broadcast scope. `None` becomes global for a destination with wildcards.
     pub broadcast: Broadcast,
-    /// Whether the receiver is to acknowledge it; then an event tells the result.
+    /// Whether to request an acknowledgement; an event then reports the result.
     pub acknowledge: bool,
     /// The message, beginning with its two code octets.
     pub payload: Bytes,
@@ -48,84 +48,85 @@ impl Outgoing {
 /// A message for a local component.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Received {
-    /// Who sent it.
+    /// The sender.
     pub source: JausId,
-    /// For whom, as the sender wrote it.
+    /// The destination as the sender wrote it.
     pub destination: JausId,
-    /// How urgent it is.
+    /// The priority.
     pub priority: Priority,
-    /// How far it was meant to go.
+    /// The broadcast scope.
     pub broadcast: Broadcast,
     /// The message, beginning with its two code octets.
     pub payload: Bytes,
-    /// How it came; `None` from a component of this node.
+    /// The path it arrived on; `None` from a component of this node.
     pub path: Option<Path>,
-    /// The local component that it is for.
+    /// The local component that receives it.
     pub to: JausId,
 }
 
-/// Something that the owner of an endpoint is told.
+/// An event that an endpoint reports to its owner.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Event {
-    /// A peer was heard for the first time (or again, after it had been forgotten).
+    /// A peer was heard for the first time, or again after it had been forgotten.
     PeerLearned {
-        /// Who.
+        /// The peer.
         id: JausId,
-        /// Where.
+        /// Its address.
         path: Path,
-        /// The header that it writes.
+        /// The header that it uses.
         version: Version,
     },
-    /// A peer is at another address than before; messages to it go there from now on.
+    /// A peer has a new address; messages to it now go there.
     PeerMoved {
-        /// Who.
+        /// The peer.
         id: JausId,
-        /// Where it was.
+        /// Its old address.
         from: Path,
-        /// Where it is.
+        /// Its new address.
         to: Path,
     },
-    /// An id was heard at two addresses, and a challenge has shown which of them stays its peer's.
+    /// An id was heard at two addresses, and a challenge has shown which of them the peer keeps.
     PeerConflict {
-        /// The id that both have.
+        /// The shared id.
         id: JausId,
         /// Where messages to it go.
         path: Path,
-        /// Where the other is.
+        /// The other address.
         other: Path,
     },
-    /// A peer was forgotten because more were heard than
+    /// A peer was forgotten because the table is full:
     /// [`Config::max_peers`](super::Config::max_peers).
     PeerForgotten {
-        /// Who.
+        /// The peer.
         id: JausId,
     },
-    /// Somebody else sends with the id of a local component: one of the two must change.
+    /// Another sender uses the id of a local component: one of the two must change.
     IdConflict {
-        /// The id that both have.
+        /// The shared id.
         id: JausId,
-        /// Where the other is.
+        /// The address of the other sender.
         path: Path,
     },
-    /// A message that wanted it was acknowledged.
+    /// A message was acknowledged as requested.
     Acknowledged {
         /// The message.
         message: MessageHandle,
-        /// By whom.
+        /// The receiver that acknowledged it.
         by: JausId,
     },
-    /// A message that wanted it was not acknowledged, and will not be sent again.
+    /// A requested acknowledgement did not arrive, and the message will not be sent again.
     NotAcknowledged {
         /// The message.
         message: MessageHandle,
-        /// For whom it was.
+        /// Its destination.
         destination: JausId,
-        /// Why.
+        /// The reason.
         reason: Unacknowledged,
-        /// How many octets of it were acknowledged, of a large message some of its fragments.
+        /// How many of its octets were acknowledged: of a large message, the fragments that got
+        /// through.
         acknowledged: usize,
-        /// How many octets it has.
+        /// Its length in octets.
         length: usize,
     },
 }
@@ -136,10 +137,10 @@ pub enum Event {
 pub enum Unacknowledged {
     /// The receiver refused it (NAK).
     Refused,
-    /// It was sent, more than once, and not or not wholly acknowledged in time. The receiver may
-    /// have it all the same.
+    /// It was retransmitted, but not acknowledged, or not in full, in time. The receiver may have
+    /// it all the same.
     TimedOut,
-    /// It never was sent, because its destination did not acknowledge what was to go before it.
+    /// It was never sent, because its destination did not acknowledge the messages before it.
     NotSent,
 }
 

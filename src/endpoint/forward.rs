@@ -1,10 +1,10 @@
-//! Passing on what is for others, between the links. The rule, with pictures, is in
-//! `docs/routing.md`.
+//! Forwards messages for other nodes between links. `docs/routing.md` explains the rules, with
+//! pictures.
 //!
-//! AS5669A has neither hop count nor routes. So a router learns who is where from all that it hears,
-//! remembers what it has heard by which way, and passes nothing on twice but what its sender has
-//! sent again. Flags, ids and sequence number stay as they are: acknowledgements are between the
-//! ends.
+//! AS5669A has neither a hop count nor routes. A router therefore learns addresses from all
+//! traffic, remembers on which path it saw each message, and forwards a message twice only if its
+//! sender retransmitted it. Flags, ids and sequence number stay unchanged: acknowledgements are end
+//! to end.
 
 use std::time::{Duration, Instant};
 
@@ -16,19 +16,19 @@ use super::{Counter, Endpoint, Path, To};
 use crate::address::JausId;
 use crate::wire::{Broadcast, DataControl, Frame, Framing, Version, ra};
 
-/// For how long after a peer was heard from one side a broadcast of it from another side is taken
-/// for a late copy.
+/// How long after a peer was heard on one path its broadcasts from another path count as late
+/// copies.
 const SETTLED: Duration = Duration::from_secs(1);
 
 impl Endpoint {
-    /// Whether a message is for others too, and we are asked to pass such on.
+    /// Whether a message is also for other nodes, and forwarding is on.
     pub(super) fn is_passed_on(&self, frame: &Frame) -> bool {
         let destination = frame.destination;
         self.config.forwarding && !destination.has_zero() && !self.components.contains(destination)
     }
 
-    /// Whether a message for many has not come by the way that leads to its sender, who was heard
-    /// from there a moment ago. It is neither passed on nor learned from.
+    /// Whether a broadcast, or a message to an unknown address, arrived on another path than the
+    /// one on which its sender was heard a moment ago. It is neither forwarded nor learned from.
     pub(super) fn is_astray(&self, now: Instant, from: Path, frame: &Frame) -> bool {
         let for_many = frame.destination.has_wildcard()
             || frame.flags.broadcast() != Some(Broadcast::None)
@@ -41,7 +41,7 @@ impl Endpoint {
                 .is_some_and(|(path, at)| path != from && lately(at))
     }
 
-    /// Sends a message on to where its receivers are, if that is somewhere else.
+    /// Forwards a message towards its receivers, unless they are where it came from.
     pub(super) fn pass_on(&mut self, now: Instant, from: Path, frame: &Frame) {
         let (source, destination) = (frame.source, frame.destination);
         let passed = self
@@ -56,7 +56,7 @@ impl Endpoint {
         self.counters.add(outcome);
     }
 
-    /// Where a message goes on to, and with which header.
+    /// The next hops of a message, and the header to use.
     fn next_hops(
         &mut self,
         now: Instant,
@@ -67,7 +67,7 @@ impl Endpoint {
         if destination.is_unicast() {
             self.config.access.check_source(destination)?;
             if let Some((path, version)) = self.route(destination) {
-                // A multicast reaches every node on its network.
+                // Multicast has already reached every node on that network.
                 let shared = from.link == path.link
                     && self.framing(from.link) == Framing::Judp
                     && frame.flags.broadcast() != Some(Broadcast::None);
@@ -77,7 +77,8 @@ impl Endpoint {
                     Ok((vec![path.into()], version))
                 };
             }
-            // Whoever asked for an acknowledgement has been heard: nobody is to be found.
+            // The destination of an acknowledgement has been heard before, so there is no need to
+            // search for it.
             if frame.flags.acknowledgement().is_answer() {
                 return Err(Counter::NotForUs);
             }
@@ -92,8 +93,8 @@ impl Endpoint {
         Ok((hops, Version::As5669a))
     }
 
-    /// Everybody who has not heard a message: the other links' groups, those at the other ends of a
-    /// link that has no group, and configured peers that groups do not reach.
+    /// Every hop that has not seen a message: the groups of other links, the remote ends of a link
+    /// without a group, and static peers that groups do not reach.
     fn hops_everywhere_but(&self, from: Path, destination: JausId) -> Vec<Hop> {
         let mut singly = self.peers.broadcast_copies(destination);
         if self.framing(from.link) == Framing::Jtcp {
@@ -109,9 +110,9 @@ impl Endpoint {
     }
 }
 
-/// The frame with another header. The older headers name the message code in every fragment and in
-/// acknowledgements, today's only where the message begins; so the code of a later fragment cannot
-/// be told, and there is no older header for it.
+/// Translates a frame to another header. The older headers carry the message code in every fragment
+/// and acknowledgement; AS5669A carries it only at the beginning of the message. A later fragment
+/// from AS5669A lacks the code, so it cannot be translated to an older header.
 fn with_header(frame: &Frame, version: Version) -> Option<Frame> {
     let names_code = |version| version != Version::As5669a;
     let answer = frame.flags.acknowledgement().is_answer();

@@ -1,5 +1,4 @@
-//! Links as the endpoint sees them: numbered, with the octets that they want, and with somebody at
-//! the other end.
+//! Links as the endpoint sees them: an id, a framing, and the remote ends.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -9,22 +8,22 @@ use bytes::Bytes;
 
 use crate::wire::{Framing, Priority};
 
-/// A link of the node, numbered by its owner.
+/// Identifies a link of the node. The owner assigns the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LinkId(pub u16);
 
 /// What the endpoint needs to know about a link.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LinkProfile {
-    /// How its octets are framed.
+    /// The framing of its octets.
     pub framing: Framing,
-    /// The addresses that it sends from, as peers see them. A message from one of our ids that
-    /// comes from elsewhere is an id conflict and not an echo of our own multicast; without
-    /// addresses only the content tells.
+    /// The addresses that it sends from, as peers see them. A message with one of our ids from
+    /// another address is an id conflict, not an echo of our own multicast. Without addresses, only
+    /// the content shows an echo.
     pub own: BTreeSet<SocketAddr>,
-    /// The most datagrams that it takes in one [`Transmit`]; 0 and 1 mean one.
+    /// The most datagrams that it takes in one [`Transmit`]; 0 and 1 both mean one.
     pub max_segments: usize,
-    /// Whether the other end reads only the first message of a datagram.
+    /// Whether the remote end reads only the first message of a datagram.
     pub reads_one: bool,
 }
 
@@ -46,12 +45,12 @@ impl LinkProfile {
     }
 }
 
-/// The other end, as a link names it.
+/// The remote end of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Remote {
-    /// An address: of a UDP socket, or of the far side of one TCP connection.
+    /// The address of a UDP socket, or of the remote end of one TCP connection.
     Socket(SocketAddr),
-    /// Whoever is at the other end of a serial line.
+    /// The remote end of a serial line.
     Line,
 }
 
@@ -87,17 +86,17 @@ impl fmt::Display for Remote {
     }
 }
 
-/// Where a message came from, and where answers go: the other end as seen through a link.
+/// Where a message came from and where answers go: a remote end, seen through a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Path {
     /// The link.
     pub link: LinkId,
-    /// The other end.
+    /// The remote end.
     pub peer: Remote,
 }
 
 impl Path {
-    /// Whether both lead to the same host, as far as the network tells.
+    /// Whether both lead to the same host, as far as the network shows.
     pub(super) fn is_near(self, other: Self) -> bool {
         match (self.peer.socket(), other.peer.socket()) {
             (Some(one), Some(two)) => one.ip().to_canonical() == two.ip().to_canonical(),
@@ -107,27 +106,27 @@ impl Path {
     }
 }
 
-/// Whereto on a link.
+/// The destination of a datagram on a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum To {
-    /// One other end.
+    /// One remote end.
     Peer(Remote),
-    /// The link's multicast group or what it has instead, such as all its connections.
+    /// The link's multicast group or its equivalent, such as all its connections.
     Group,
 }
 
-/// What the owner is to send.
+/// A datagram, or a batch of datagrams, for the owner to send.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Transmit {
-    /// Through this link.
+    /// The link to send on.
     pub link: LinkId,
-    /// Whereto.
+    /// The destination on that link.
     pub to: To,
-    /// How urgent it is, should the link be slower than the endpoint.
+    /// The priority, for links that are slower than the endpoint.
     pub priority: Priority,
-    /// The octets, framed as the link wants them.
+    /// The octets, in the link's framing.
     pub payload: Bytes,
-    /// If set, the payload is several datagrams of so many octets each, of which the last may be
-    /// shorter. Only on links that take more than one; see [`LinkProfile::max_segments`].
+    /// If set, the payload is a batch of datagrams of this many octets each; the last may be
+    /// shorter. Only on links that take batches; see [`LinkProfile::max_segments`].
     pub segment: Option<usize>,
 }

@@ -9,21 +9,21 @@ use crate::wire::Broadcast;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AttachError {
-    /// The id has a zero or a wildcard.
+    /// The id contains a zero or a wildcard.
     #[error(
         "{0} does not name one component: the subsystem must be 1 to 65534, node and component 1 to 254 each"
     )]
     NotOneComponent(JausId),
-    /// The id is taken here.
+    /// The id is attached already.
     #[error("{0} is attached already: give each component an id of its own")]
     AlreadyAttached(JausId),
-    /// There is no room.
+    /// The table is full.
     #[error("{limit} components are attached already, and more are not allowed")]
     TooMany {
         /// [`Config::max_components`](super::Config::max_components).
         limit: usize,
     },
-    /// A link cannot serve the id, and says why.
+    /// A link cannot serve the id; the text says why.
     #[error("{0}")]
     Link(String),
 }
@@ -69,8 +69,8 @@ impl Components {
         self.ids.iter().copied()
     }
 
-    /// Those that a message to `destination` reaches: of the sender's subsystem alone if it is a
-    /// local broadcast.
+    /// The components that a message to `destination` reaches. A local broadcast reaches only those
+    /// of the sender's subsystem.
     pub(super) fn receivers(
         &self,
         source: JausId,

@@ -1,14 +1,16 @@
-//! The protocol core of a node: who is here, who is where, what to send and what to deliver.
+//! The protocol core of a node, without I/O: peer table, routing, reliable delivery, and dispatch
+//! to local components.
 //!
-//! An [`Endpoint`] does no I/O and reads no clock. Its owner says what happened
-//! ([`Endpoint::handle_datagram`] or, where a link has read the frames itself,
-//! [`Endpoint::handle_frame`]; [`Endpoint::handle_timeout`]), what is wanted ([`Endpoint::attach`],
-//! [`Endpoint::send`]), and who takes messages for local components (a [`Sink`]). Then it polls
-//! until there is no more: [`Endpoint::poll_transmit`] for datagrams to send,
-//! [`Endpoint::poll_event`] for news, [`Endpoint::poll_timeout`] for when to call `handle_timeout`.
+//! An [`Endpoint`] does no I/O and reads no clock. Its owner passes in input
+//! ([`Endpoint::handle_datagram`] or, for links that read frames themselves,
+//! [`Endpoint::handle_frame`]; [`Endpoint::handle_timeout`]), requests ([`Endpoint::attach`],
+//! [`Endpoint::send`]) and a [`Sink`] that takes messages for local components. Then it polls until
+//! there is no more output: [`Endpoint::poll_transmit`] for datagrams to send,
+//! [`Endpoint::poll_event`] for events, [`Endpoint::poll_timeout`] for when to call
+//! `handle_timeout`.
 //!
-//! Received rubbish is never an error here: it is counted ([`Counters`]), traced and forgotten.
-//! Every table and queue has a bound in [`Config`]; what is dropped for a bound is counted too.
+//! Malformed input is never an error here: it is counted ([`Counters`]), traced and dropped. Every
+//! table and queue has a bound in [`Config`]; what a bound drops is counted too.
 //!
 //! ```
 //! use std::time::Instant;
@@ -96,12 +98,12 @@ pub struct Endpoint {
     peers: Peers,
     numbers: Numbers,
     gate: Gate,
-    /// What may be sent to whom nobody vouches for.
+    /// Limits traffic to unverified addresses.
     budget: Budget,
     warnings: Warnings,
-    /// Challenges that were made so far.
+    /// Challenges created so far.
     probes: u64,
-    /// For what is passed on to many.
+    /// Limits forwarded broadcasts.
     broadcasts: Bucket,
     heard: Recent,
     calls: Calls,
@@ -114,7 +116,7 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
-    /// An endpoint without components and links.
+    /// Creates an endpoint without components and links.
     #[must_use]
     pub fn new(mut config: Config) -> Self {
         config.payload_limit = config
@@ -143,10 +145,10 @@ impl Endpoint {
         }
     }
 
-    /// Takes in a local component: messages to `id` are delivered from now on, and it may send.
+    /// Attaches a local component: from now on it receives messages to `id` and may send.
     ///
     /// # Errors
-    /// An id that does not name one component or is here already, or more than
+    /// The id does not name one component, is attached already, or would exceed
     /// [`Config::max_components`].
     pub fn attach(&mut self, id: JausId) -> Result<(), AttachError> {
         self.components.attach(id)?;
@@ -154,7 +156,7 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Lets a local component go. Its messages that wait for acknowledgements are given up.
+    /// Detaches a local component and gives up its unacknowledged messages.
     pub fn detach(&mut self, id: JausId) {
         self.components.detach(id);
         let given_up = self.deliveries.forget_source(id);
@@ -162,17 +164,17 @@ impl Endpoint {
         self.conflicts.remove(&id);
     }
 
-    /// The attached components, in order of their ids.
+    /// The attached components, sorted by id.
     pub fn components(&self) -> impl Iterator<Item = JausId> + '_ {
         self.components.iter()
     }
 
-    /// Takes in a link, or tells that something about it has changed.
+    /// Adds a link or updates its profile.
     pub fn add_link(&mut self, link: LinkId, profile: LinkProfile) {
         self.egress.add_link(link, profile);
     }
 
-    /// Removes a link, with what was learned through it and what waits to be sent on it, which is
+    /// Removes a link, the routes learned through it and the datagrams queued on it, which are
     /// counted.
     pub fn remove_link(&mut self, link: LinkId) {
         self.peers.forget_link(link);
@@ -180,17 +182,17 @@ impl Endpoint {
         self.counters.add_many(Counter::LinkGone, lost);
     }
 
-    /// Tells that a connection has closed: what was learned through it is forgotten.
+    /// Reports that a connection has closed: the routes learned through it are forgotten.
     pub fn forget_path(&mut self, path: Path) {
         self.peers.forget_path(path);
     }
 
-    /// Changes the peers whose address is configured, for instance because links have come or gone.
+    /// Replaces the static peers, for instance because links were added or removed.
     pub fn set_static_peers(&mut self, peers: Vec<StaticPeer>) {
         self.peers.configure(peers);
     }
 
-    /// The peers whose addresses are known, in order of their ids.
+    /// The peers whose addresses are known, sorted by id.
     pub fn peers(&self) -> impl Iterator<Item = Peer> + '_ {
         self.peers.iter().map(|peer| Peer {
             round_trip: self.flow(peer.id).and_then(|flow| flow.round_trip),
@@ -198,15 +200,15 @@ impl Endpoint {
         })
     }
 
-    /// The octets that are kept of unfinished large messages, with what keeping them costs: at most
+    /// The octets buffered for unfinished large messages, bookkeeping included: at most
     /// [`Config::max_reassembly`].
     #[must_use]
     pub fn unfinished(&self) -> usize {
         self.reassembly.cost()
     }
 
-    /// Tells that time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached;
-    /// early calls are harmless.
+    /// Handles timeouts. Call it when [`poll_timeout`](Self::poll_timeout) is reached; early calls
+    /// are harmless.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.retry_unacknowledged(now);
         self.handle_challenges(now);
@@ -214,9 +216,9 @@ impl Endpoint {
         self.reassembly.expire(now, &mut self.counters);
     }
 
-    /// The next datagram to send, or several for links that take them so; the most urgent first.
-    /// At each priority, whole messages go before those that wait for acknowledgements, and these
-    /// before the fragments of others.
+    /// The next datagram to send, or a batch of several for links that support it; the most urgent
+    /// first. Within a priority, whole messages go first, then messages that want an
+    /// acknowledgement, then fragments of other large messages.
     pub fn poll_transmit(&mut self, now: Instant) -> Option<Transmit> {
         let mut most_urgent_first = Priority::ALL.into_iter().rev();
         let next = most_urgent_first.find_map(|priority| {
@@ -227,7 +229,7 @@ impl Endpoint {
                 }
             }
         });
-        // What may not leave before its address is proven has queued a challenge instead.
+        // A datagram held back for want of a verified address has queued a challenge instead.
         next.or_else(|| self.dequeue(now, Level::whole(CHALLENGE_FLAGS.priority())))
     }
 
@@ -235,12 +237,12 @@ impl Endpoint {
         self.egress.dequeue(now, level, &mut self.counters)
     }
 
-    /// The next of the news.
+    /// The next event.
     pub fn poll_event(&mut self) -> Option<Event> {
         self.news.pop()
     }
 
-    /// When to call [`handle_timeout`](Self::handle_timeout), if ever.
+    /// When to call [`handle_timeout`](Self::handle_timeout); `None` if no timer runs.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         [
@@ -254,13 +256,13 @@ impl Endpoint {
         .min()
     }
 
-    /// What was received, sent and dropped, and why.
+    /// Counts of what was received, sent and dropped, and why.
     #[must_use]
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Queues news; a full queue is counted.
+    /// Queues an event; an overflow is counted.
     fn announce(&mut self, event: Event) {
         if !self.news.push(event) {
             self.counters.add(Counter::NewsQueueFull);

@@ -1,14 +1,14 @@
-//! News that wait to be polled.
+//! The event queue that [`Endpoint::poll_event`](super::Endpoint::poll_event) reads.
 
 use std::collections::VecDeque;
 
 use super::Event;
 
-/// A bounded queue of news.
+/// A bounded event queue.
 #[derive(Debug)]
 pub(super) struct News {
     events: VecDeque<Event>,
-    /// How many of them are results of messages, for which there is always room.
+    /// How many events are delivery results. There is always room for those.
     results: usize,
     limit: usize,
 }
@@ -22,7 +22,7 @@ impl News {
         }
     }
 
-    /// Queues an event; false if too many wait.
+    /// Queues an event; returns false if the queue is full.
     #[must_use]
     pub(super) fn push(&mut self, event: Event) -> bool {
         let has_room = self.events.len() - self.results < self.limit;
@@ -32,19 +32,19 @@ impl News {
         has_room
     }
 
-    /// Queues what became of a message. There is room: a message whose result was not polled counts
-    /// as one that waits for its acknowledgement.
+    /// Queues a delivery result. There is always room: an unpolled result counts as a message that
+    /// waits for its acknowledgement.
     pub(super) fn push_result(&mut self, event: Event) {
         self.results += 1;
         self.events.push_back(event);
     }
 
-    /// How many results were not polled.
+    /// How many results have not been polled.
     pub(super) const fn results(&self) -> usize {
         self.results
     }
 
-    /// The oldest.
+    /// Takes the oldest event.
     pub(super) fn pop(&mut self) -> Option<Event> {
         let event = self.events.pop_front()?;
         if let Event::Acknowledged { .. } | Event::NotAcknowledged { .. } = event {

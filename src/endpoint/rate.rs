@@ -1,9 +1,9 @@
-//! How much is taken from one source: token buckets by network address and by id.
+//! Rate limits per source: token buckets by network address and by id.
 //!
-//! By default only the learning of new ids is limited, because that is what a flood of invented
-//! senders needs and no peer does; how many messages somebody sends is limited only if configured.
-//! The tables of buckets are bounded: who finds no place in a full one shares a single bucket with
-//! all others without a place, so that inventing addresses gains nothing.
+//! By default only the rate of new ids is limited: a flood of invented senders needs many new ids,
+//! and no real peer does. The message rate is limited only if configured. The bucket tables are
+//! bounded: sources without a place in a full table share a single bucket, so inventing addresses
+//! gains nothing.
 
 use std::collections::HashMap;
 use std::hash::Hash;
@@ -13,42 +13,42 @@ use std::time::{Duration, Instant};
 use super::{Counter, LinkId, Path};
 use crate::address::JausId;
 
-/// Nanoseconds of a second.
+/// Nanoseconds per second.
 const NANOS: u64 = 1_000_000_000;
 
-/// So many in a second in the long run, and so many at once.
+/// A token bucket rate: a sustained rate and a burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Rate {
-    /// In the long run, each second; 0 is taken for 1.
+    /// Tokens per second, sustained; 0 counts as 1.
     pub per_second: u32,
-    /// At once, after a pause; 0 is taken for 1.
+    /// Tokens available at once after a pause; 0 counts as 1.
     pub burst: u32,
 }
 
 impl Rate {
-    /// A rate.
+    /// Creates a rate.
     #[must_use]
     pub const fn new(per_second: u32, burst: u32) -> Self {
         Self { per_second, burst }
     }
 
-    /// How long it takes until so many more are allowed.
+    /// How long it takes to gain this many tokens.
     fn time_for(self, tokens: u32) -> Duration {
         Duration::from_nanos(u64::from(tokens) * NANOS / u64::from(self.per_second.max(1)))
     }
 }
 
-/// What is limited, for each source.
+/// The rate limits per source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rates {
-    /// New ids heard from one network address. By default 1024 at once and 64 a second: all
+    /// New ids from one network address. The default is a burst of 1024 and 64 per second: all
     /// components of four full nodes, or of a router's whole network.
     pub new_ids: Rate,
-    /// Messages from one network address. By default not limited.
+    /// Messages from one network address. Unlimited by default.
     pub messages_per_address: Option<Rate>,
-    /// Messages from one id. By default not limited.
+    /// Messages from one id. Unlimited by default.
     pub messages_per_id: Option<Rate>,
 }
 
@@ -62,19 +62,19 @@ impl Default for Rates {
     }
 }
 
-/// A token bucket. It holds when it will be full again, which says how many tokens it has.
+/// A token bucket. It stores when it will be full again, which determines how many tokens it holds.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bucket {
     full: Option<Instant>,
 }
 
 impl Bucket {
-    /// Takes a token, if there is one.
+    /// Takes a token, if available.
     pub(super) fn take(&mut self, now: Instant, rate: Rate) -> bool {
         self.take_many(now, rate, 1)
     }
 
-    /// Takes so many tokens, if they are there.
+    /// Takes this many tokens, if available.
     pub(super) fn take_many(&mut self, now: Instant, rate: Rate, tokens: u32) -> bool {
         let cost = rate.time_for(tokens);
         let is_there = self.debt(now) + cost <= rate.time_for(rate.burst.max(1));
@@ -84,13 +84,13 @@ impl Bucket {
         is_there
     }
 
-    /// How long it takes until it is full.
+    /// How long until the bucket is full.
     pub(super) fn debt(self, now: Instant) -> Duration {
         let debt = self.full.map(|full| full.saturating_duration_since(now));
         debt.unwrap_or_default()
     }
 
-    /// It takes so much longer until it is full.
+    /// Postpones the time at which the bucket is full.
     pub(super) fn spend(&mut self, now: Instant, time: Duration) {
         self.full = Some(self.full.map_or(now, |full| full.max(now)) + time);
     }
@@ -107,7 +107,7 @@ impl Bucket {
     }
 }
 
-/// A bucket for each source, as far as there is room.
+/// A bucket per source, as far as there is room.
 #[derive(Debug)]
 pub struct Buckets<K> {
     rate: Rate,
@@ -118,10 +118,10 @@ pub struct Buckets<K> {
 }
 
 impl<K: Eq + Hash> Buckets<K> {
-    /// The shortest time between two looks for buckets that can be given up.
+    /// The shortest interval between two sweeps for full buckets.
     const SWEEP: Duration = Duration::from_secs(1);
 
-    /// Buckets of that rate for at most `limit` sources.
+    /// Creates buckets of this rate for at most `limit` sources.
     #[must_use]
     pub fn new(rate: Rate, limit: usize) -> Self {
         Self {
@@ -133,23 +133,23 @@ impl<K: Eq + Hash> Buckets<K> {
         }
     }
 
-    /// Takes a token of a source, if there is one.
+    /// Takes a token of a source, if available.
     pub fn take(&mut self, now: Instant, source: K) -> bool {
         self.take_many(now, source, 1)
     }
 
-    /// How much each source may take.
+    /// The rate per source.
     pub(super) const fn rate(&self) -> Rate {
         self.rate
     }
 
-    /// How many tokens a source has taken that have not come back yet.
+    /// How many tokens a source has spent that have not been refilled yet.
     pub(super) fn owed(&self, now: Instant, source: &K) -> u32 {
         let bucket = self.own.get(source).copied();
         bucket.unwrap_or(self.shared).owed(now, self.rate)
     }
 
-    /// Takes so many tokens of a source, if they are there.
+    /// Takes this many tokens of a source, if available.
     pub(super) fn take_many(&mut self, now: Instant, source: K, tokens: u32) -> bool {
         if self.own.len() >= self.limit && !self.own.contains_key(&source) {
             self.sweep(now);
@@ -161,7 +161,7 @@ impl<K: Eq + Hash> Buckets<K> {
         own.take_many(now, self.rate, tokens)
     }
 
-    /// Gives up full buckets: an absent one is as good.
+    /// Drops full buckets: a missing bucket is equivalent.
     fn sweep(&mut self, now: Instant) {
         let recent = |at: Instant| now.saturating_duration_since(at) < Self::SWEEP;
         if !self.swept.is_some_and(recent) {
@@ -171,9 +171,9 @@ impl<K: Eq + Hash> Buckets<K> {
     }
 }
 
-/// What shares one quota: an IPv4 address, or the 64 bits of an IPv6 network, in which one host may
-/// take any number of addresses. Hosts on one cable share the network of link-local addresses, so
-/// there it is the address.
+/// The quota that an address belongs to: for IPv4 the address itself, for IPv6 the 64-bit network,
+/// within which one host may use any number of addresses. All hosts on a link share the network of
+/// link-local addresses, so there the address counts.
 pub(crate) fn quota_address(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(v6) if !v6.is_unicast_link_local() => {
@@ -183,7 +183,7 @@ pub(crate) fn quota_address(address: IpAddr) -> IpAddr {
     }
 }
 
-/// Where something comes from, as far as the network tells: what shares one quota.
+/// The origin of traffic as far as the network shows: the unit that shares one quota.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Origin {
     Address(IpAddr),
@@ -199,7 +199,7 @@ impl From<Path> for Origin {
     }
 }
 
-/// The buckets of an endpoint.
+/// The rate limits of an endpoint.
 #[derive(Debug)]
 pub(super) struct Gate {
     new_ids: Buckets<Origin>,
@@ -208,7 +208,7 @@ pub(super) struct Gate {
 }
 
 impl Gate {
-    /// Buckets for at most `limit` sources in each table.
+    /// Creates buckets for at most `limit` sources in each table.
     pub(super) fn new(rates: &Rates, limit: usize) -> Self {
         Self {
             new_ids: Buckets::new(rates.new_ids, limit),
@@ -228,7 +228,7 @@ impl Gate {
             + by_id.map_or(0, |buckets| buckets.own.len())
     }
 
-    /// Whether one more message may come from there.
+    /// Applies the message rate limits.
     pub(super) fn admit_message(
         &mut self,
         now: Instant,
@@ -245,7 +245,7 @@ impl Gate {
         in_rate(by_id.map(|buckets| buckets.take(now, source)))
     }
 
-    /// Whether an id that was not known may come from there.
+    /// Applies the rate limit on new ids.
     pub(super) fn admit_new_id(&mut self, now: Instant, from: Path) -> Result<(), Counter> {
         let admitted = self.new_ids.take(now, from.into());
         admitted.then_some(()).ok_or(Counter::NewIdRate)

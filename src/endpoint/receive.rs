@@ -1,5 +1,5 @@
-//! From a datagram to deliveries: each message is judged, learned from, acknowledged, filtered and
-//! handed out.
+//! The receive path, from a datagram to deliveries: each message is checked, acknowledged,
+//! deduplicated, learned from and delivered.
 
 use std::time::Instant;
 
@@ -15,26 +15,27 @@ use crate::address::JausId;
 use crate::peer;
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Framing, judp};
 
-/// How a message came.
+/// How a message arrived.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arrival {
     pub(super) now: Instant,
     pub(super) path: Path,
-    /// Whether it went to everybody.
+    /// Whether it was sent to the link's group.
     pub(super) to_all: bool,
-    /// Octets of memory that its payload holds on to.
+    /// Octets of memory that its payload keeps alive.
     pub(super) held: usize,
 }
 
-/// A repeated message is passed on this often. No sender repeats more often before it gives up; a
-/// frame that circulates between routers, corrupted or forged as if one of them had sent it, does.
+/// A repeated message is forwarded at most this often. No sender retransmits more often before it
+/// gives up. A frame that circulates between routers, because it was corrupted or forged as if one
+/// of them had sent it, does.
 const MOST_REPETITIONS: u8 = 32;
 
 impl Endpoint {
-    /// Takes a datagram, and hands the messages in it for local components to `sink`.
+    /// Processes one datagram and delivers its messages for local components to `sink`.
     ///
-    /// Nothing in it is an error: what cannot be used is counted and traced. Answers and news come
-    /// out of [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event).
+    /// Malformed input is not an error: it is counted and traced. Responses and events are
+    /// available from [`poll_transmit`](Self::poll_transmit) and [`poll_event`](Self::poll_event).
     pub fn handle_datagram(
         &mut self,
         now: Instant,
@@ -84,8 +85,8 @@ impl Endpoint {
         }
     }
 
-    /// Takes a frame that came from `from`, from a link that reads frames itself. Nothing in it is
-    /// an error, as with [`handle_datagram`](Self::handle_datagram).
+    /// Processes one frame received on path `from`, for links that read frames themselves. As in
+    /// [`handle_datagram`](Self::handle_datagram), malformed input is not an error.
     pub fn handle_frame(&mut self, now: Instant, from: Path, frame: &Frame, sink: &mut dyn Sink) {
         if let Err(reason) = self.check_path(from) {
             self.counters.add(Counter::MessagesReceived);
@@ -100,8 +101,8 @@ impl Endpoint {
         self.receive(arrival, frame, sink);
     }
 
-    /// Takes note that a version octet stands before the next frame of `source` in the middle of a
-    /// TCP stream, which tells something of who it is and where it is to be answered.
+    /// Reports that a version octet precedes the next frame of `source` in the middle of a TCP
+    /// stream, which helps to recognise the peer and to choose the path for answers.
     pub fn handle_repeated_version(&mut self, source: JausId) {
         if let Some((path, _)) = self.peers.last_heard(source) {
             self.peers
@@ -109,7 +110,7 @@ impl Endpoint {
         }
     }
 
-    /// Whether anything may come by a path.
+    /// Whether messages from a path are accepted.
     fn check_path(&self, from: Path) -> Result<(), Counter> {
         if !self.egress.has_link(from.link) {
             return Err(Counter::UnknownLink);
@@ -134,7 +135,8 @@ impl Endpoint {
         }
     }
 
-    /// The message as somebody means it who writes 0 for "all"; `None` if it stays as it is.
+    /// Replaces zeros in the destination by wildcards if the sender's profile writes 0 for "all";
+    /// `None` if nothing changes.
     fn with_wildcards_for_zeros(&self, frame: &Frame) -> Option<Frame> {
         let means_all = frame.destination.has_zero()
             && self.peers.profile(frame.source).reads_zero_as_wildcard();
@@ -144,7 +146,7 @@ impl Endpoint {
         })
     }
 
-    /// Does all that a message causes, or tells why it is dropped.
+    /// Processes a message, or returns why it is dropped.
     fn accept(
         &mut self,
         arrival: Arrival,
@@ -167,7 +169,7 @@ impl Endpoint {
             checked => checked.map(|()| true)?,
         };
         self.admit(now, path, frame.source)?;
-        // Before acknowledging: what is dropped must not be taken for delivered.
+        // Check before acknowledging: a dropped message must not look delivered.
         if !self.peers.has_room_for(now, frame.source, path) {
             if self.warnings.is_due(now, Warning::TableFull) {
                 warn!(
@@ -193,7 +195,7 @@ impl Endpoint {
                 Acknowledgement::None => {}
             }
         }
-        // Before learning: a copy that came another way must not move the peer there and back.
+        // Check before learning: a copy that arrived on another path must not move the peer.
         let novelty = match self.recall(arrival, frame, seen) {
             Novelty::Repeated(_) if self.reassembly.awaits(frame) => Novelty::New,
             novelty => novelty,
@@ -224,8 +226,9 @@ impl Endpoint {
         self.put_together(arrival, frame, broadcast, sink)
     }
 
-    /// Takes an acknowledgement. One that nobody waits for teaches nothing and moves nobody, and
-    /// numbers can be guessed: so one from elsewhere than where the peer has proven to be is none.
+    /// Processes an acknowledgement. An unawaited one neither teaches nor moves a route. Sequence
+    /// numbers can be guessed, so an acknowledgement from elsewhere than the peer's verified
+    /// address is ignored.
     fn receive_acknowledgement(
         &mut self,
         now: Instant,
@@ -249,8 +252,7 @@ impl Endpoint {
         Err(Counter::UnawaitedAcknowledgement)
     }
 
-    /// Refuses what may not come from there: from an id that is denied or configured to be
-    /// elsewhere.
+    /// Refuses senders that are denied by id or configured to be at another address.
     fn refuse_misplaced(&mut self, now: Instant, from: Path, id: JausId) -> Result<(), Counter> {
         self.config.access.check_source(id)?;
         if !self.peers.is_pinned_elsewhere(id, from) {
@@ -262,9 +264,9 @@ impl Endpoint {
         Err(Counter::PinnedElsewhere)
     }
 
-    /// Refuses a part of a message from where its sender is not proven to be, if it is proven to be
-    /// elsewhere, and does not acknowledge it: it may be forged. If it is not, a challenge shows that,
-    /// and the part comes again. A copy of what has come from there needs no challenge.
+    /// Refuses a fragment whose sender is verified at another address, without acknowledging it: it
+    /// may be forged. If the sender has in fact moved, a challenge shows it, and the fragment is
+    /// retransmitted. A duplicate of a known fragment needs no challenge.
     fn check_part(
         &mut self,
         now: Instant,
@@ -288,7 +290,7 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Delivers a message to components of ours when it is whole.
+    /// Delivers a message to local components once it is complete.
     fn put_together(
         &mut self,
         arrival: Arrival,
@@ -318,7 +320,7 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Delivers a large message whose end only the next message of its sender shows.
+    /// Delivers a large message whose end is shown only by its sender's next message.
     fn finish_large(&mut self, from: Path, next: &Frame, sink: &mut dyn Sink) {
         let finished = self.reassembly.finish(next.source, next.sequence);
         let Some((destination, priority, whole)) = finished else {
@@ -333,7 +335,7 @@ impl Endpoint {
         self.deliver(from, &large, Broadcast::None, &whole.payload, sink);
     }
 
-    /// Whether one more message may come from there, and from somebody who was not known.
+    /// Applies the rate limits for messages and for new ids.
     fn admit(&mut self, now: Instant, from: Path, source: JausId) -> Result<(), Counter> {
         self.gate.admit_message(now, from, source)?;
         if self.peers.knows(source) {
@@ -359,10 +361,11 @@ impl Endpoint {
         }
     }
 
-    /// Drops what is said in our own name.
+    /// Drops messages with a local source id.
     ///
-    /// Our own multicast comes back from our own address, and is known by what it says when the
-    /// component that said it has gone. Whatever else is said in our name is an id conflict.
+    /// Our own multicast comes back from our own address; it is recognised by its content even if
+    /// the component that sent it is detached by now. Any other message with a local source id is
+    /// an id conflict.
     fn refuse_own(
         &mut self,
         now: Instant,
@@ -380,14 +383,14 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Whether something may have been sent by ourselves, as far as the address tells.
+    /// Whether a message may be our own, judging by its source address.
     fn may_be_ours(&self, from: Path) -> bool {
         let links = self.egress.links();
         let mut own = links.flat_map(|(_, link)| &link.own).peekable();
         own.peek().is_none() || own.any(|&own| from.peer == own)
     }
 
-    /// Tells that somebody else has taken an id of ours, not for each of its messages.
+    /// Announces that another sender uses a local id, at most once per interval.
     fn announce_conflict(&mut self, now: Instant, from: Path, id: JausId) {
         let announced = self.conflicts.get(&id);
         if announced
@@ -402,8 +405,8 @@ impl Endpoint {
         }
     }
 
-    /// Where a sender is to be answered: where it was heard, unless it does not read there. Then
-    /// where it was heard before by datagram, if it was.
+    /// The path for answers to a sender: where it was heard, unless it does not read there. In that
+    /// case the datagram path on which it was heard before, if any.
     pub(super) fn where_it_reads(&self, id: JausId, from: Path) -> Path {
         let is_datagram = |path: &Path| self.framing(path.link) == Framing::Judp;
         if is_datagram(&from) || !self.peers.is_deaf_on_its_connections(id) {
@@ -413,7 +416,7 @@ impl Endpoint {
         before.filter(is_datagram).unwrap_or(from)
     }
 
-    /// Hands a whole message to its receivers.
+    /// Delivers a complete message to its receivers.
     fn deliver(
         &mut self,
         from: Path,
@@ -434,7 +437,7 @@ impl Endpoint {
         self.deliver_to_all(&whole, None, sink);
     }
 
-    /// Hands a message to each component that it reaches, but for one.
+    /// Delivers a message to every matching component except `but`.
     pub(super) fn deliver_to_all(
         &mut self,
         message: &Received,
@@ -460,7 +463,7 @@ impl Endpoint {
     }
 }
 
-/// Checks what does not depend on who we are; gives the broadcast scope.
+/// Runs the checks that do not depend on local state; returns the broadcast scope.
 fn check_header(frame: &Frame) -> Result<Broadcast, Counter> {
     if frame.kind.message_type() != 0 {
         return Err(Counter::ReservedType);

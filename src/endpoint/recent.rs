@@ -1,8 +1,8 @@
-//! A bounded memory of messages seen lately, to tell duplicates, loops and our own echoes.
+//! A bounded memory of recent messages, to detect duplicates, loops and our own echoes.
 //!
-//! What is remembered belongs to a [class](Class), and each class has a bound of its own. So what
-//! strangers send cannot push out what is known of peers we are in conversation with, and a stream
-//! of messages that nobody repeats cannot push out those that will be.
+//! Each entry belongs to a [class](Class) with a bound of its own. Messages of strangers therefore
+//! cannot push out those of peers that we talk to, and a stream of unrepeated messages cannot push
+//! out those that will be retransmitted.
 
 use std::collections::{HashMap, VecDeque};
 use std::hash::{BuildHasher, BuildHasherDefault, Hasher, RandomState};
@@ -11,30 +11,30 @@ use std::time::{Duration, Instant};
 use super::Path;
 use crate::wire::Frame;
 
-/// What makes two frames the same: addresses, number and content, as one keyed hash, so that nobody
-/// can make two messages look alike. Of 64 bits, so that two among the thousands in memory are
-/// mistaken for each other once in many years.
+/// Identifies a frame: addresses, sequence number and content in one keyed hash, so that no sender
+/// can make two messages collide. At 64 bits, two of the thousands in memory collide by chance once
+/// in many years.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Fingerprint(u64);
 
 impl Fingerprint {
-    /// The same in the given round of the sender's sequence numbers: a fast sender comes back to a
-    /// number within seconds, with the same content perhaps.
+    /// The fingerprint within the given round of the sender's sequence numbers: a fast sender
+    /// reuses a number within seconds, possibly with the same content.
     pub(super) fn in_round(self, round: u16) -> Self {
         Self(self.0 ^ u64::from(round).wrapping_mul(0x9E37_79B9_7F4A_7C15))
     }
 }
 
-/// The way by which something came, as a keyed hash.
+/// The path on which a message arrived, as a keyed hash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PathHash(u64);
 
-/// Whose message, and whether it is one that its sender may repeat.
+/// Whether a message is a stranger's, and whether its sender may retransmit it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Class {
-    /// Whether its sender is a stranger; see [`Peers`](super::peers::Peers).
+    /// Whether the sender is a stranger; see [`Peers`](super::peers::Peers).
     pub(super) stranger: bool,
-    /// Whether it wants an acknowledgement, and hence may be repeated for some time.
+    /// Whether it requests an acknowledgement, and so may be retransmitted for some time.
     pub(super) repeats: bool,
 }
 
@@ -46,7 +46,7 @@ impl Class {
     }
 }
 
-/// When a frame was put in, by which way it had come at first, and how often it was repeated since.
+/// When a frame was recorded, on which path it first arrived, and how often it was repeated since.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sighting {
     pub(super) time: Instant,
@@ -54,7 +54,7 @@ pub(super) struct Sighting {
     pub(super) repetitions: u8,
 }
 
-/// A hasher for what is a hash already.
+/// A hasher for keys that are hashes already.
 #[derive(Clone, Copy, Debug, Default)]
 struct AlreadyHashed(u64);
 
@@ -74,7 +74,7 @@ impl Hasher for AlreadyHashed {
     }
 }
 
-/// Sightings of frames.
+/// The recent frames.
 #[derive(Debug)]
 pub(super) struct Recent {
     sightings: HashMap<Fingerprint, Sighting, BuildHasherDefault<AlreadyHashed>>,
@@ -85,8 +85,8 @@ pub(super) struct Recent {
 }
 
 impl Recent {
-    /// A memory for at most `longest` of at most `limit` frames of each class, a quarter of that for
-    /// strangers. Memories with the same `keys` have the same fingerprints.
+    /// Remembers frames for at most `longest`: at most `limit` of each class, a quarter of that for
+    /// strangers. Memories with the same `keys` produce the same fingerprints.
     pub(super) fn new(limit: usize, longest: Duration, keys: RandomState) -> Self {
         Self {
             sightings: HashMap::default(),
@@ -97,7 +97,7 @@ impl Recent {
         }
     }
 
-    /// What tells `frame` from others.
+    /// The fingerprint of `frame`.
     pub(super) fn fingerprint(&self, frame: &Frame) -> Fingerprint {
         let answer = frame.flags.acknowledgement().is_answer();
         let head = u128::from(frame.source.to_u32())
@@ -111,24 +111,24 @@ impl Recent {
         Fingerprint(hasher.finish())
     }
 
-    /// What tells a way from others; `None` if ways do not matter.
+    /// The hash of a path; `None` if paths do not matter.
     pub(super) fn way(&self, path: Option<Path>) -> PathHash {
         PathHash(path.map_or(0, |path| self.keys.hash_one(path)))
     }
 
-    /// When it was put in last, if that is remembered.
+    /// The last sighting of a frame, if remembered.
     pub(super) fn sighting(&self, seen: Fingerprint) -> Option<Sighting> {
         self.sightings.get(&seen).copied()
     }
 
-    /// Whether it was put in less than `window` ago.
+    /// Whether the frame was recorded less than `window` ago.
     pub(super) fn contains(&self, now: Instant, seen: &Fingerprint, window: Duration) -> bool {
         self.sightings
             .get(seen)
             .is_some_and(|sighting| now.saturating_duration_since(sighting.time) < window)
     }
 
-    /// Remembers, from now on, something of ours.
+    /// Records a frame of our own.
     pub(super) fn insert(&mut self, now: Instant, seen: Fingerprint) {
         let class = Class {
             stranger: false,
@@ -142,7 +142,7 @@ impl Recent {
         self.insert_as(seen, sighting, class);
     }
 
-    /// Remembers when and by which way it came.
+    /// Records a frame with its time and path.
     pub(super) fn insert_as(&mut self, seen: Fingerprint, sighting: Sighting, class: Class) {
         let now = sighting.time;
         let limit = if class.stranger {
@@ -164,7 +164,7 @@ impl Recent {
     }
 
     fn forget_oldest(&mut self, class: usize) {
-        // The same frame may have been put in again since: then the younger entry keeps it.
+        // If the frame was recorded again since, a younger entry keeps it.
         if let Some((time, seen)) = self.order[class].pop_front()
             && self
                 .sightings

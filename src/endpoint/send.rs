@@ -1,4 +1,5 @@
-//! From a message to datagrams: local delivery, unicast to a known address, or the group.
+//! The send path, from a message to datagrams: local delivery, unicast to a known address, or the
+//! group.
 
 use std::time::Instant;
 
@@ -12,14 +13,14 @@ use crate::wire::{
     Acknowledgement, Broadcast, EncodeError, Flags, Frame, Framing, Priority, Version, as5669a,
 };
 
-/// Why a message cannot be sent. Nothing of it was.
+/// Why a message cannot be sent. No part of it was sent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SendError {
     /// The source is not attached.
     #[error("{0} is not attached here, so it cannot send")]
     UnknownSource(JausId),
-    /// The destination holds a zero.
+    /// The destination contains a zero.
     #[error("{0} names nobody: a subsystem, node or component of 0 does not exist")]
     Nobody(JausId),
     /// The payload does not begin with a message code.
@@ -28,7 +29,7 @@ pub enum SendError {
         /// Octets of the payload.
         length: usize,
     },
-    /// The payload is longer than a message may be.
+    /// The payload exceeds the longest message.
     #[error("the message has {length} octets, and at most {limit} can be sent to this receiver")]
     TooLong {
         /// Octets of the payload.
@@ -37,7 +38,7 @@ pub enum SendError {
         /// [`Config::payload_limit`](super::Config::payload_limit).
         limit: usize,
     },
-    /// Many receivers, and an acknowledgement from each.
+    /// An acknowledgement was requested from many receivers.
     #[error(
         "a message to {0} goes to many, and only a message to one component can be acknowledged"
     )]
@@ -51,7 +52,7 @@ pub enum SendError {
         /// [`Config::max_unacknowledged`](super::Config::max_unacknowledged).
         limit: usize,
     },
-    /// Too much waits for acknowledgements.
+    /// Too many octets wait for acknowledgements.
     #[error("messages of {limit} octets wait for acknowledgements already")]
     TooMuchUnacknowledged {
         /// [`Config::max_unacknowledged_octets`](super::Config::max_unacknowledged_octets).
@@ -63,14 +64,14 @@ pub enum SendError {
         /// [`Config::max_flows`](super::Config::max_flows).
         limit: usize,
     },
-    /// Too much of large messages waits to be sent.
+    /// Too many octets of large messages wait to be sent.
     #[error("large messages of {limit} octets wait to be sent already")]
     TooMuchQueued {
         /// [`Config::max_paced`](super::Config::max_paced).
         limit: usize,
     },
-    /// The receiver is a component of this node that does not read what waits for it, and what was
-    /// acknowledged shall not be dropped.
+    /// The receiver is a component of this node whose mailbox is full, and an acknowledged message
+    /// must not be dropped.
     #[error("{0} does not read fast enough: its mailbox is full")]
     ReceiverFull(JausId),
     /// Too many datagrams wait to be sent.
@@ -79,7 +80,7 @@ pub enum SendError {
         /// [`Config::queue_limit`](super::Config::queue_limit).
         limit: usize,
     },
-    /// The destination is elsewhere, and there is no link.
+    /// The destination is on another node, and there is no link.
     #[error("{0} is not here, and there is no link to another node")]
     NoLink(JausId),
     /// The receiver's older header cannot carry it.
@@ -88,17 +89,17 @@ pub enum SendError {
 }
 
 impl Endpoint {
-    /// Sends a message from a local component: to siblings through `sink` at once, to others through
-    /// the links.
+    /// Sends a message from a local component: to local components at once through `sink`, to other
+    /// nodes through the links.
     ///
-    /// A message to one component goes to its address if that is known; else to the group of every
-    /// link, as a global broadcast that wants an acknowledgement, because the answer teaches the
-    /// address. A destination with wildcards goes to the group, and to matching siblings (not to
-    /// the sender itself).
+    /// A message to one component goes to its address if that is known. Otherwise it goes to the
+    /// group of every link, as a global broadcast that requests an acknowledgement, because the
+    /// answer teaches the address. A destination with wildcards goes to the group and to matching
+    /// local components, except the sender itself.
     ///
     /// # Errors
-    /// A [`SendError`] tells what is wrong; then nothing was sent. That a message was sent does not
-    /// mean that it arrives; ask for an acknowledgement to be told.
+    /// On a [`SendError`] nothing was sent. Success does not mean that the message arrives; request
+    /// an acknowledgement to learn that.
     pub fn send(
         &mut self,
         now: Instant,
@@ -121,7 +122,7 @@ impl Endpoint {
         Ok(handle)
     }
 
-    /// Checks a message, and gives the broadcast scope that it is sent with.
+    /// Validates a message and returns its broadcast scope.
     fn check(&self, message: &Outgoing) -> Result<Broadcast, SendError> {
         let (source, destination, length) =
             (message.source, message.destination, message.payload.len());
@@ -190,8 +191,8 @@ impl Endpoint {
         let length = message.payload.len();
         self.check_length(length, destination, version)?;
         let cut = self.cutting(destination, version).cut(length);
-        // What is large goes to everybody only until the address is known, and nowhere else than to
-        // whoever acknowledges the beginning.
+        // A large message to an unknown address is broadcast only until its first packet is
+        // acknowledged. The rest goes only to that address.
         let seeks = is_to_one && self.seeks_proof(destination, length);
         if message.acknowledge || cut.count() > 1 && seeks {
             return self.deliver_reliably(now, handle, message, scope);
@@ -218,8 +219,8 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Whether the address of a destination is unknown, or not proven and the message too long to
-    /// go there unasked.
+    /// Whether the destination's address is unknown, or unverified and the message too long to send
+    /// there without a proof.
     fn seeks_proof(&self, destination: JausId, length: usize) -> bool {
         let much = length > self.config.unverified_address.burst as usize / 2;
         self.route(destination).is_none_or(|(path, _)| {
@@ -228,8 +229,8 @@ impl Endpoint {
         })
     }
 
-    /// Takes in a large message that wants no acknowledgement: a frame without data control that
-    /// holds all of it, and leaves in fragments.
+    /// Queues a large message without acknowledgement request. The frame holds the whole message,
+    /// without data control, and leaves in fragments.
     fn send_fragmented(
         &mut self,
         now: Instant,
@@ -262,7 +263,7 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Checks whether so many more datagrams can wait to be sent.
+    /// Checks that `count` more datagrams fit the queue.
     fn check_egress(&mut self, priority: Priority, count: usize) -> Result<(), SendError> {
         if self.egress.has_room(priority, count) {
             return Ok(());
@@ -272,8 +273,8 @@ impl Endpoint {
         Err(SendError::QueueFull { limit })
     }
 
-    /// Sends a frame along a path, with its own header, if that address may get so much and there is
-    /// room; whether it does. What is not sent is counted.
+    /// Sends a frame along a path, with its own header. Returns false if the address has no budget
+    /// left or the queue is full. Frames not sent are counted.
     pub(super) fn send_along(
         &mut self,
         now: Instant,
@@ -288,8 +289,8 @@ impl Endpoint {
         Ok(queued.map_err(|reason| self.counters.add(reason)).is_ok())
     }
 
-    /// Sends a frame of ours to everybody. One for a component whose address is unknown asks it for
-    /// an answer.
+    /// Sends a local component's frame to every link's group. A frame for one component requests an
+    /// acknowledgement, which teaches its address.
     pub(super) fn send_to_all(&mut self, now: Instant, mut frame: Frame) -> Result<(), SendError> {
         let hops = self.hops_to_all(frame.destination);
         self.check_egress(frame.flags.priority(), hops.len())?;
@@ -306,7 +307,7 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Sends a frame to several places. What is not sent is counted.
+    /// Sends a frame to several hops. Failures are counted.
     pub(super) fn send_to_hops(
         &mut self,
         now: Instant,
@@ -317,7 +318,7 @@ impl Endpoint {
             .push_to_many(now, hops, frame, &mut self.counters)
     }
 
-    /// How messages to `destination` are cut.
+    /// How to cut messages to `destination`.
     pub(super) fn cutting(&self, destination: JausId, version: Version) -> Cutting {
         let profile = self.peers.profile(destination);
         let (longest, limit) = (profile.payload_limit(), self.config.payload_limit);
@@ -329,7 +330,7 @@ impl Endpoint {
         }
     }
 
-    /// How fast the fragments of a large message may leave for `destination`.
+    /// The rate for fragments of a large message to `destination`.
     fn pacing(&self, destination: JausId) -> Option<Pacing> {
         let usual = self.config.pacing?;
         let intake = self.peers.presumed(destination).intake();
@@ -350,7 +351,7 @@ impl Endpoint {
         Ok(())
     }
 
-    /// Where and with which header to reach `destination`, if that is known and there is a link.
+    /// The path and header for `destination`, if its address is known and the link exists.
     pub(super) fn route(&self, destination: JausId) -> Option<(Path, Version)> {
         self.peers
             .route(destination)
@@ -364,7 +365,7 @@ impl Endpoint {
         groups.chain(copies.into_iter().map(Hop::from)).collect()
     }
 
-    /// How a link frames messages.
+    /// The framing of a link.
     pub(super) fn framing(&self, link: LinkId) -> Framing {
         self.egress.framing(link)
     }

@@ -1,25 +1,25 @@
-//! How messages leave an endpoint for the components of its owner.
+//! The sink: how an endpoint delivers messages to local components.
 
 use super::{Path, Received};
 use crate::address::JausId;
 use crate::wire::Priority;
 
-/// Takes the messages for local components.
+/// Receives the messages for local components.
 ///
-/// An endpoint asks for room before it acknowledges a message, and hands it over in the same call.
-/// So nothing is acknowledged that its receiver does not get, if the sink keeps its word.
+/// An endpoint asks for room before it acknowledges a message, and delivers it in the same call. So
+/// every acknowledged message reaches its receiver, provided that the sink keeps its promise.
 pub trait Sink {
-    /// Whether a message of that priority, once handed over, stays until its component reads it.
-    /// Messages that want no acknowledgement are handed over without asking, so a sink needs room
-    /// in reserve for them. Without room, a message that wants an acknowledgement is not even
-    /// acknowledged, so that its sender tries again.
+    /// Whether a message of that priority, once delivered, is kept until its component reads it.
+    /// Messages without acknowledgement request are delivered without asking, so a sink needs spare
+    /// room for them. Without room, a message that requests an acknowledgement is not acknowledged,
+    /// so that its sender retries.
     fn has_room(&self, to: JausId, priority: Priority) -> bool;
 
-    /// Takes a message for the component [`Received::to`].
+    /// Delivers a message to the component [`Received::to`].
     fn deliver(&mut self, message: Received);
 }
 
-/// Takes all that comes.
+/// Accepts every message.
 impl Sink for Vec<Received> {
     fn has_room(&self, _: JausId, _: Priority) -> bool {
         true
@@ -30,17 +30,17 @@ impl Sink for Vec<Received> {
     }
 }
 
-/// By which way a datagram came.
+/// How a datagram arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ingress {
-    /// The link, and who sent it there.
+    /// The link, and the sender's address on it.
     pub path: Path,
-    /// Whether it went to everybody: to the link's group, or to what it has instead.
+    /// Whether it was sent to all: to the link's group or its equivalent.
     pub to_all: bool,
 }
 
 impl From<Path> for Ingress {
-    /// A datagram to this node alone.
+    /// A datagram sent to this node alone.
     fn from(path: Path) -> Self {
         Self {
             path,

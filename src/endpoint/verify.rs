@@ -1,10 +1,11 @@
-//! Proving where peers are, and what is sent to addresses that are not proven.
+//! Address verification: challenges that prove a peer's address, and a budget for unverified
+//! addresses.
 //!
-//! A query with a forged sender makes us send to somebody who has asked nothing. So all that goes
-//! to unproven addresses is limited, for each network address and in all; long before the limit is
-//! reached a [challenge](super::peers) asks for a proof, which costs an honest peer nothing.
-//! Connections and lines are proven by themselves; what is passed on for others is not limited,
-//! as it is no more than what came.
+//! A query with a forged source makes the endpoint send to a host that has asked for nothing. So
+//! all traffic to unverified addresses is limited, per network address and in total. Long before
+//! the limit is reached, a [challenge](super::peers) asks for a proof, which costs an honest peer
+//! nothing. Connections and serial lines count as verified. Forwarded traffic is not limited, as it
+//! does not exceed the incoming traffic.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::{Duration, Instant};
@@ -20,14 +21,14 @@ use super::{Config, Counter, Endpoint, Event, Path, Rate};
 use crate::address::JausId;
 use crate::wire::{Frame, Framing};
 
-/// A challenge has a number that was used before, at least so many and at most twice as many
-/// numbers ago: none that a message waits for, and none that a peer's memory of numbers would
-/// confuse with those of messages to come.
+/// A challenge reuses an old sequence number, at least this many and at most twice as many numbers
+/// ago. No message awaits such a number, and a peer's duplicate detection does not confuse it with
+/// those of coming messages.
 const NUMBERS_AGO: u16 = 1 << 14;
-/// The shortest time between two warnings of a kind.
+/// The shortest interval between two warnings of a kind.
 const WARNING_INTERVAL: Duration = Duration::from_secs(10);
 
-/// What may be sent to addresses that are not proven.
+/// The budget for traffic to unverified addresses.
 #[derive(Debug)]
 pub(super) struct Budget {
     by_address: Buckets<Origin>,
@@ -56,7 +57,7 @@ impl Budget {
     }
 }
 
-/// What the operator is told at most once in a while.
+/// Rate-limited warnings to the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Warning {
     PeerMoved,
@@ -67,12 +68,12 @@ pub(super) enum Warning {
     Unverified,
 }
 
-/// When each of the warnings was given last.
+/// When each warning was last logged.
 #[derive(Debug, Default)]
 pub(super) struct Warnings([Option<Instant>; 6]);
 
 impl Warnings {
-    /// Whether a warning is due again.
+    /// Whether a warning may be logged again.
     pub(super) fn is_due(&mut self, now: Instant, warning: Warning) -> bool {
         let last = &mut self.0[warning as usize];
         let due = last.is_none_or(|at| now.saturating_duration_since(at) >= WARNING_INTERVAL);
@@ -84,7 +85,7 @@ impl Warnings {
 }
 
 impl Endpoint {
-    /// Learns where a sender is, if there is room for it.
+    /// Learns a sender's route, if there is room for it.
     pub(super) fn learn(&mut self, now: Instant, from: Path, frame: &Frame) -> Result<(), Counter> {
         let (id, version) = (frame.source, frame.version);
         let path = self.where_it_reads(id, from);
@@ -140,7 +141,7 @@ impl Endpoint {
         }
     }
 
-    /// The component in whose name a peer is challenged that has written to `destination`.
+    /// The local component that challenges a peer which has written to `destination`.
     fn challenger(&self, destination: JausId) -> Option<JausId> {
         if self.components.contains(destination) {
             return Some(destination);
@@ -148,7 +149,7 @@ impl Endpoint {
         self.components.iter().next()
     }
 
-    /// Asks on both paths on which an id is heard where its peer is.
+    /// Challenges both paths on which an id is heard.
     fn contest(
         &mut self,
         now: Instant,
@@ -173,7 +174,7 @@ impl Endpoint {
         }
     }
 
-    /// Asks where a peer is that is not proven to be anywhere, if it may be asked.
+    /// Challenges an unverified peer, unless it may not be challenged now.
     pub(super) fn challenge(&mut self, now: Instant, id: JausId) {
         if let Some(local) = self.challenger(id)
             && let Some((incumbent, _)) = self.route(id)
@@ -197,7 +198,7 @@ impl Endpoint {
         self.send_probes(now, id, doubt.local, [Some(incumbent), rival]);
     }
 
-    /// A number that nobody can foresee, and that no message to the peer waits for.
+    /// A probe with an unpredictable sequence number that no message to the peer awaits.
     fn probe(&mut self, id: JausId, local: JausId, path: Path) -> Probe {
         let latest = self.numbers.peek(1) as u16;
         let number = loop {
@@ -228,7 +229,7 @@ impl Endpoint {
         }
     }
 
-    /// Takes an acknowledgement that no message waits for; whether a challenge does.
+    /// Processes an acknowledgement that no message awaits. Returns whether a challenge does.
     pub(super) fn receive_challenge_answer(
         &mut self,
         now: Instant,
@@ -244,7 +245,7 @@ impl Endpoint {
         true
     }
 
-    /// Sends again, or decides, the challenges that are due.
+    /// Retransmits or decides the challenges that are due.
     pub(super) fn handle_challenges(&mut self, now: Instant) {
         while let Some((id, challenge, finding)) = self.peers.next_due(now) {
             match finding {
@@ -292,8 +293,8 @@ impl Endpoint {
         }
     }
 
-    /// Whether a datagram may go to where a peer is; what may not is counted. Asks for a proof in
-    /// good time.
+    /// Whether a datagram may be sent to a peer's address; refusals are counted. Starts a challenge
+    /// well before the budget runs out.
     pub(super) fn may_send(&mut self, now: Instant, id: JausId, to: Path, octets: usize) -> bool {
         if self.is_free(to) {
             return true;
@@ -304,7 +305,7 @@ impl Endpoint {
         }
         if !may {
             self.counters.add(Counter::UnverifiedBudget);
-            // A busy peer may answer the challenge yet.
+            // A busy peer may still answer the challenge.
             let is_asked = self.peers.is_challenged(id);
             if !is_asked && self.warnings.is_due(now, Warning::Unverified) {
                 warn!(
@@ -316,7 +317,7 @@ impl Endpoint {
         may
     }
 
-    /// Whether what goes to a path is not limited.
+    /// Whether traffic to a path is unlimited.
     pub(super) fn is_free(&self, to: Path) -> bool {
         self.framing(to.link) != Framing::Judp || self.peers.is_proven(to)
     }

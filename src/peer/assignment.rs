@@ -1,9 +1,9 @@
-//! Who is said to be what: profiles by id, for peers that cannot be recognised.
+//! Configured profiles by id, for peers that cannot be recognised.
 
 use super::Peer;
 use crate::address::JausId;
 
-/// That whoever has such an id is such a peer, whatever is seen of it.
+/// Assigns a profile to an id, whatever is observed of the peer.
 ///
 /// ```toml
 /// [[profile]]
@@ -16,12 +16,12 @@ use crate::address::JausId;
 pub struct Assignment {
     /// The id, which may hold the wildcards 65535 and 255.
     pub id: JausId,
-    /// What it is. [`Peer::Standard`] keeps it from being taken for anything else.
+    /// The profile. [`Peer::Standard`] prevents the peer from being recognised as anything else.
     pub profile: Peer,
 }
 
 impl Assignment {
-    /// The profile of an id: of all that fit it the first counts.
+    /// The profile of an id: the first entry that matches.
     #[must_use]
     pub fn find(all: &[Self], id: JausId) -> Option<Peer> {
         let fits = |assignment: &&Self| assignment.id.matches(id);

@@ -1,15 +1,15 @@
-//! What is said of each departure, and the table of all of them.
+//! The description of each departure, and the table of all of them.
 
 use std::fmt;
 
 use super::{Departure, Peer, Sign};
 
-/// Where a departure is known from.
+/// How a departure is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Source {
-    /// It was seen on the wire between running peers.
+    /// It was recorded on the wire between running peers.
     Recorded,
-    /// A running peer was made to do it.
+    /// It was provoked in a running peer.
     Provoked,
     /// It was read in the peer's code.
     Read,
@@ -25,14 +25,14 @@ impl fmt::Display for Source {
     }
 }
 
-/// How it is known that a peer departs in this way.
+/// How a peer with this departure is recognised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recognition {
-    /// By any of these.
+    /// By any of these signs.
     By(&'static [Sign]),
-    /// It need not be known: what we do suits everybody.
+    /// It need not be recognised: the same handling suits every peer.
     NeedNotBe,
-    /// It cannot be seen: an [`Assignment`](super::Assignment) says so.
+    /// It cannot be observed, and needs an [`Assignment`](super::Assignment).
     Configured,
 }
 
@@ -52,25 +52,25 @@ impl fmt::Display for Recognition {
     }
 }
 
-/// What there is to know of a departure.
+/// The description of a departure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Entry {
-    /// Its name, in a few words.
+    /// A short name.
     pub name: &'static str,
-    /// Whose it is.
+    /// The peers that it applies to.
     pub peers: &'static [Peer],
-    /// What they do.
+    /// What these peers do.
     pub does: &'static str,
-    /// Where we know it from.
+    /// How it is known.
     pub source: Source,
     /// How it is recognised.
     pub told: Recognition,
-    /// What we do.
+    /// How this implementation handles it.
     pub ours: &'static str,
-    /// The file that does it, from the root of the repository.
+    /// The file that handles it, relative to the root of the repository.
     pub place: &'static str,
-    /// The test that fails if it is not done.
+    /// The test that covers it.
     pub test: &'static str,
 }
 

@@ -1,11 +1,11 @@
-//! The departures, one by one.
+//! The departures of known peers, with their descriptions.
 
 use super::Peer::{Fkie, Iop, JausPlusPlus, Jts, Junior, OpenJausSdk};
 use super::{Entry, Recognition, Sign, Source};
 
 macro_rules! departures {
     ($($(#[doc = $doc:literal])+ $variant:ident = $entry:expr;)+) => {
-        /// A way in which some peer departs from the standard, or from what others do.
+        /// A way in which a peer departs from the standard, or from what other peers do.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         #[non_exhaustive]
         pub enum Departure {
@@ -16,7 +16,7 @@ macro_rules! departures {
             /// All of them, in the order of the table.
             pub const ALL: &[Self] = &[$(Self::$variant,)+];
 
-            /// What there is to know of it.
+            /// Its description.
             #[must_use]
             pub const fn entry(self) -> &'static Entry {
                 match self {
@@ -28,7 +28,7 @@ macro_rules! departures {
 }
 
 departures! {
-    /// The end of an older datagram behind a message.
+    /// The end of an older datagram after a message.
     StaleOctets = Entry {
         name: "stale octets",
         peers: &[JausPlusPlus],
@@ -53,7 +53,7 @@ departures! {
         place: "src/endpoint/large/style.rs",
         test: "the_code_that_jauspp_repeats_is_left_out_and_repeated_to_it_from_then_on",
     };
-    /// No last fragment where a message fills its fragments.
+    /// No last fragment if a message fills its fragments exactly.
     NoLastFragment = Entry {
         name: "no last fragment",
         peers: &[JausPlusPlus],
@@ -65,7 +65,7 @@ departures! {
         place: "src/endpoint/large/reassembly.rs",
         test: "a_message_of_jauspp_that_fills_its_fragments_is_whole_with_the_next_message",
     };
-    /// What JAUS++ can receive of large messages.
+    /// The limits of JAUS++ on large messages that it receives.
     NarrowReassembly = Entry {
         name: "narrow reassembly",
         peers: &[JausPlusPlus],
@@ -78,7 +78,7 @@ departures! {
         place: "src/endpoint/large/split.rs",
         test: "to_jauspp_no_packet_is_longer_than_it_takes_and_numbers_do_not_go_round",
     };
-    /// One datagram in a millisecond.
+    /// One datagram per millisecond.
     SlowReader = Entry {
         name: "slow reader",
         peers: &[JausPlusPlus],
@@ -92,7 +92,7 @@ departures! {
         place: "src/endpoint/send.rs",
         test: "to_jauspp_large_messages_leave_no_faster_than_it_reads_datagrams",
     };
-    /// Event numbers that are given twice.
+    /// Event numbers assigned twice.
     SharedEventNumbers = Entry {
         name: "event numbers given twice",
         peers: &[JausPlusPlus],
@@ -105,7 +105,7 @@ departures! {
         place: "src/service/client/subscriptions.rs",
         test: "a_cancellation_that_may_have_hit_another_event_has_that_one_renewed",
     };
-    /// Update Event ends the program.
+    /// Update Event crashes the program.
     UpdateEventCrash = Entry {
         name: "Update Event ends it",
         peers: &[JausPlusPlus],
@@ -128,7 +128,7 @@ departures! {
         place: "src/service/client/subscription.rs",
         test: "a_first_report_that_comes_four_times_loses_nothing_and_cancels_nothing",
     };
-    /// A query after each event every five seconds.
+    /// A query for each event every five seconds.
     LateQueryEvents = Entry {
         name: "looks after each event",
         peers: &[JausPlusPlus],
@@ -140,7 +140,7 @@ departures! {
         place: "src/service/events/mod.rs",
         test: "a_client_is_told_of_its_own_events_by_each_question",
     };
-    /// The same Create Event again.
+    /// Repeated Create Event for the same event.
     RepeatedCreation = Entry {
         name: "creates events again",
         peers: &[JausPlusPlus],
@@ -237,7 +237,7 @@ departures! {
         place: "src/wire/jtcp/decoder.rs",
         test: "a_version_octet_before_each_message_is_read",
     };
-    /// TCP connections of one direction.
+    /// TCP connections used in one direction only.
     OneWayConnections = Entry {
         name: "one-way connections",
         peers: &[JausPlusPlus],
@@ -255,7 +255,7 @@ departures! {
         place: "src/endpoint/receive.rs",
         test: "jauspp_that_connects_is_answered_where_it_reads",
     };
-    /// A unicast message as a broadcast.
+    /// A unicast message sent as a broadcast.
     CallsUnknownIds = Entry {
         name: "calls unknown ids",
         peers: &[Junior, Jts, Fkie],
@@ -267,7 +267,7 @@ departures! {
         place: "src/endpoint/receive.rs",
         test: "a_call_of_junior_is_acknowledged_by_the_one_alone_from_its_own_address",
     };
-    /// Calls that do not say what they are.
+    /// Calls without the broadcast flag.
     UnmarkedCalls = Entry {
         name: "calls without the flag",
         peers: &[Fkie],
@@ -292,7 +292,7 @@ departures! {
         place: "src/endpoint/receive.rs",
         test: "juniors_priority_zero_fault_is_dropped_and_counted_by_its_name",
     };
-    /// Numbers that begin with 1 again.
+    /// Sequence numbers that begin with 1 again.
     BeginsWithOne = Entry {
         name: "begins with 1 again",
         peers: &[Junior, Jts, Fkie],
@@ -305,7 +305,7 @@ departures! {
         place: "src/endpoint/receive.rs",
         test: "a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_come_again",
     };
-    /// Duplicates are known by their numbers alone.
+    /// Duplicates detected by sequence number alone.
     RemembersNumbers = Entry {
         name: "remembers numbers",
         peers: &[Junior, Jts],
@@ -318,7 +318,7 @@ departures! {
         place: "src/endpoint/config.rs",
         test: "a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers",
     };
-    /// One id for each TCP connection.
+    /// One id per TCP connection.
     OneIdPerConnection = Entry {
         name: "one id for each connection",
         peers: &[Junior, Jts, Fkie],
@@ -332,7 +332,7 @@ departures! {
         place: "src/link/tcp/mod.rs",
         test: "each_id_is_answered_on_the_connection_on_which_it_was_heard_last",
     };
-    /// Hanging up ends its engine.
+    /// A closed connection can terminate its engine.
     EndsWithConnections = Entry {
         name: "ends with a connection",
         peers: &[Junior, Jts, Fkie],
@@ -346,7 +346,7 @@ departures! {
         place: "src/link/tcp/mod.rs",
         test: "a_peer_that_still_writes_when_the_link_hangs_up_is_not_cut_off",
     };
-    /// Header compression flags from the wrong end.
+    /// Header compression flags read from the wrong end.
     CompressionBits = Entry {
         name: "compression flags from the wrong end",
         peers: &[Junior, Jts, Fkie],
@@ -358,7 +358,7 @@ departures! {
         place: "src/wire/as5669a.rs",
         test: "the_first_octet_of_all_that_is_sent_is_zero",
     };
-    /// Few fragments are kept.
+    /// Only few fragments are kept.
     ForgetsFragments = Entry {
         name: "forgets fragments",
         peers: &[Junior, Jts, Fkie],
@@ -378,7 +378,7 @@ departures! {
         place: "src/endpoint/send.rs",
         test: "to_junior_large_messages_have_no_more_fragments_than_it_keeps",
     };
-    /// Zero octets that stand for all.
+    /// Zero octets that match any octet.
     AliasedIds = Entry {
         name: "aliased ids",
         peers: &[Jts],
@@ -403,7 +403,7 @@ departures! {
         place: "src/endpoint/receive.rs",
         test: "a_zero_stands_for_all_from_those_who_mean_it_so_and_from_nobody_else",
     };
-    /// A counter of sequence numbers for each destination.
+    /// A separate counter of sequence numbers per destination.
     NumbersByDestination = Entry {
         name: "numbers for each destination",
         peers: &[OpenJausSdk],
@@ -414,7 +414,7 @@ departures! {
         place: "src/endpoint/recent.rs",
         test: "numbers_that_count_for_each_destination_are_no_duplicates",
     };
-    /// Questions to whole nodes.
+    /// Queries to whole nodes.
     AsksWholeNodes = Entry {
         name: "asks whole nodes",
         peers: &[OpenJausSdk],

@@ -1,31 +1,30 @@
-//! What is done otherwise for a peer that is known.
+//! The behaviour that depends on a known peer: limits, rates and wire variants.
 
 use super::Peer;
 use crate::address::JausId;
 
-/// How large messages are cut for AS5669A, by the sender's habit.
+/// How a sender cuts large messages for AS5669A.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum LargeStyle {
-    /// The message is cut as it is; only the first fragment begins with its code. So do the
-    /// standard and Junior.
+    /// The message is cut as it is; only the first fragment begins with its code. The standard and
+    /// Junior do this.
     #[default]
     Standard,
-    /// Each fragment begins with the message code. So does JAUS++, and it understands nothing else.
+    /// Each fragment begins with the message code. JAUS++ does this, and accepts nothing else.
     RepeatedCode,
 }
 
-/// How fast a receiver empties its receive buffer, in octets of what datagrams occupy there.
+/// How fast a receiver empties its receive buffer, in octets that datagrams occupy there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Intake {
-    /// What it may be given at once, in octets.
+    /// The most octets to send at once.
     pub burst: usize,
-    /// What it empties, in octets each second.
+    /// The octets that it empties per second.
     pub rate: u64,
 }
 
 impl Peer {
-    /// How it cuts large messages and wants them cut; `None` for somebody of whom that is not
-    /// known.
+    /// How it cuts large messages and expects them to be cut; `None` if unknown.
     #[must_use]
     pub const fn large_style(self) -> Option<LargeStyle> {
         match self {
@@ -37,12 +36,12 @@ impl Peer {
         }
     }
 
-    /// The longest payload, in octets, that it takes in one packet, if that is less than the
-    /// transport allows.
+    /// The longest payload, in octets, that it accepts in one packet, if less than the transport
+    /// allows.
     #[must_use]
     pub const fn payload_limit(self) -> Option<usize> {
         match self {
-            // What is longer it expects in fragments.
+            // It expects longer messages in fragments.
             Self::JausPlusPlus => Some(JAUSPP_PAYLOAD),
             // Its largest MTU_Size.
             Self::Junior | Self::Jts | Self::Fkie => Some(JUNIOR_PAYLOAD),
@@ -50,9 +49,9 @@ impl Peer {
         }
     }
 
-    /// The most fragments that it keeps, of all messages that are not whole together, if that is
-    /// less than those of a large message can be. It forgets the oldest for a new one, and
-    /// acknowledges each.
+    /// The most fragments that it keeps, over all unfinished messages together, if a large message
+    /// can have more. Beyond that it drops the oldest fragment for each new one, yet acknowledges
+    /// all.
     #[must_use]
     pub const fn fragments_kept(self) -> Option<usize> {
         match self {
@@ -61,8 +60,8 @@ impl Peer {
         }
     }
 
-    /// What it takes of a large message at once and in time, as it is shipped, if that is less than
-    /// others take.
+    /// How fast it takes in large messages, in its default configuration, if slower than other
+    /// peers.
     #[must_use]
     pub const fn intake(self) -> Option<Intake> {
         match self {
@@ -72,27 +71,27 @@ impl Peer {
         }
     }
 
-    /// Whether it sends again within half a second what was not acknowledged, or never. What comes
-    /// again later is of a process that was started again, and begins with the same numbers.
+    /// Whether it retransmits within half a second or not at all. A later repetition comes from a
+    /// restarted process, which begins with the same numbers.
     #[must_use]
     pub const fn repeats_soon(self) -> bool {
         matches!(self, Self::Junior | Self::Jts | Self::Fkie)
     }
 
-    /// Whether a 0 in its destinations stands for "all of them", as 65535 and 255 do with others.
+    /// Whether a 0 in its destinations is a wildcard, as 65535 and 255 are for other peers.
     #[must_use]
     pub const fn reads_zero_as_wildcard(self) -> bool {
         matches!(self, Self::Iop | Self::Jts)
     }
 
-    /// Whether answers on the TCP connections that it opened are lost, so that it is to be answered by
+    /// Whether answers on the TCP connections that it opened are lost, so that answers must go by
     /// UDP.
     #[must_use]
     pub const fn is_deaf_on_its_connections(self) -> bool {
         matches!(self, Self::JausPlusPlus)
     }
 
-    /// Whether it cannot keep two components apart, and delivers to one what is for the other.
+    /// Whether it confuses these two components, and delivers messages for one to the other.
     ///
     /// ```
     /// use jaus::address::JausId;
@@ -107,7 +106,7 @@ impl Peer {
     }
 }
 
-/// Whether two ids are the same octet by octet, with 0 and 255 standing for any.
+/// Whether two ids are equal octet by octet, with 0 and 255 matching any octet.
 fn same_octets(one: JausId, other: JausId) -> bool {
     let octets = one.to_wire().into_iter().zip(other.to_wire());
     octets
@@ -115,23 +114,23 @@ fn same_octets(one: JausId, other: JausId) -> bool {
         .all(|(a, b)| a == b || [a, b].iter().any(|it| [0, 0xFF].contains(it)))
 }
 
-/// The payload of JAUS++'s fragments but for the last, in octets: the code and 1571 more.
+/// The payload of each JAUS++ fragment except the last, in octets: the code and 1571 more.
 pub(crate) const JAUSPP_FRAGMENT: usize = 1573;
-/// The longest payload that JAUS++ sends whole, in octets.
+/// The longest payload that JAUS++ sends unfragmented, in octets.
 const JAUSPP_PAYLOAD: usize = 1425;
-/// JAUS++ reads one datagram and sleeps for a millisecond, then for another one before its component
-/// gets it: at most some 900 datagrams in a second, each of 2304 octets for one of its fragments.
-/// Two thirds of that leave it time for others.
+/// JAUS++ reads one datagram and sleeps for a millisecond, then for another before its component
+/// gets it: at most some 900 datagrams per second, each occupying 2304 octets for one of its
+/// fragments. Two thirds of that leave it time for other senders.
 const JAUSPP_INTAKE: Intake = Intake {
     burst: 64_000,
     rate: 1_400_000,
 };
-/// The payload of Junior's fragments but for the last, in octets, unless `MTU_Size` is set lower.
+/// The payload of each Junior fragment except the last, in octets, unless `MTU_Size` is set lower.
 pub(crate) const JUNIOR_PAYLOAD: usize = 4079;
-/// The fragments that Junior keeps with the `MaxMsgHistory` that it is shipped with.
+/// The fragments that Junior keeps with its default `MaxMsgHistory`.
 const JUNIOR_FRAGMENTS: usize = 50;
-/// Measured with Junior: its 140000 octets must hold what comes while its run-time engine sleeps,
-/// and that hands over to an application ten datagrams in a turn.
+/// Measured with Junior: its 140000 octets must hold everything that arrives while its run-time
+/// engine sleeps, and that engine passes ten datagrams per turn to an application.
 const JUNIOR_INTAKE: Intake = Intake {
     burst: 64_000,
     rate: 10_000_000,

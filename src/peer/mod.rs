@@ -1,19 +1,20 @@
-//! Known peers: where each departs from the standard, how that is seen on the wire, and what this
-//! implementation does about it.
+//! Profiles of known peers: where each departs from the standard, how that is recognised, and what
+//! this implementation does about it.
 //!
-//! Every departure that anything here cares about has one name, a [`Departure`]. Its
-//! [entry](Departure::entry) tells whose it is, where we know it from, how it is recognised or that
-//! it must be [configured](Assignment), what we do, where in the code, and which test holds it.
-//! The table of all of them is [below](#the-table), and as text from [`table`].
+//! Every departure that this implementation handles has a name, a [`Departure`]. Its
+//! [entry](Departure::entry) says which peers it applies to, how it is known, how it is recognised
+//! or that it must be [configured](Assignment), how it is handled, where in the code, and which
+//! test covers it. The table of all departures is [below](#the-table), and available as text from
+//! [`table`].
 //!
-//! Most of what we do suits everybody and is done for everybody: what strict peers get is never
-//! less for a peer that is not strict. What would not suit everybody hangs on the [`Peer`] that
-//! somebody is known to be, and is a method of it: [`Peer::large_style`],
+//! Most handling suits every peer and applies to all: tolerance for lenient peers never degrades
+//! what strict peers get. Handling that would not suit every peer depends on the [`Peer`] that was
+//! recognised or configured, and is one of its methods: [`Peer::large_style`],
 //! [`Peer::payload_limit`], [`Peer::intake`], [`Peer::reads_zero_as_wildcard`],
 //! [`Peer::is_deaf_on_its_connections`].
 //!
-//! A [`Recogniser`] is fed with what one peer sends and says who that is, how sure that is, and
-//! why. It does no I/O and keeps a few octets.
+//! A [`Recogniser`] receives everything that one peer sends, and reports which peer it is, with
+//! what certainty, and why. It does no I/O and keeps a few octets of state.
 //!
 //! ```
 //! use bytes::Bytes;
@@ -64,14 +65,14 @@ pub use sign::Sign;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Peer {
-    /// Somebody of whom nothing else is known: taken at the standard's word.
+    /// A peer without known departures, treated as the standard says.
     #[default]
     Standard,
     /// JAUS++ (ACTIVE laboratory).
     JausPlusPlus,
     /// Junior, the middleware of its own repository ("JR").
     Junior,
-    /// Junior as copied into the JAUS Tool Set, and what is generated with it.
+    /// Junior as copied into the JAUS Tool Set, and the code generated with it.
     Jts,
     /// Junior as copied into fkie's IOP packages for ROS.
     Fkie,
@@ -83,7 +84,7 @@ pub enum Peer {
 }
 
 impl Peer {
-    /// All of them.
+    /// All peers.
     pub const ALL: [Self; 7] = [
         Self::Standard,
         Self::JausPlusPlus,
@@ -108,7 +109,7 @@ impl Peer {
         }
     }
 
-    /// Its name for people.
+    /// Its display name.
     #[must_use]
     pub const fn title(self) -> &'static str {
         match self {
@@ -122,7 +123,7 @@ impl Peer {
         }
     }
 
-    /// Whose fork it is, if it is one: what gives that away is seen of it too.
+    /// The implementation that it is a fork of, whose signs it also shows.
     pub(crate) const fn fork_of(self) -> Option<Self> {
         match self {
             Self::Jts | Self::Fkie => Some(Self::Junior),
@@ -130,7 +131,7 @@ impl Peer {
         }
     }
 
-    /// Where it departs from the standard.
+    /// Its departures from the standard.
     pub fn departures(self) -> impl Iterator<Item = Departure> {
         let all = Departure::ALL.iter().copied();
         all.filter(move |departure| departure.entry().peers.contains(&self))
@@ -143,7 +144,7 @@ impl fmt::Display for Peer {
     }
 }
 
-/// A name that is no peer's.
+/// The text is not the name of a peer.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "there is no profile `{0}`: choose \"standard\", \"jaus++\", \"junior\", \"jts\", \"fkie\", \

@@ -1,11 +1,12 @@
-//! How a peer counts: once over all destinations, as most do, or for each by itself.
+//! Detects whether a peer numbers its messages over all destinations, as most do, or per
+//! destination.
 
 use crate::address::JausId;
 
-/// The latest number to each of a few destinations.
+/// The latest number sent to each of a few destinations.
 ///
-/// Whoever counts once cannot send number n to one destination, anything to another, and then n + 1
-/// to the first. Once could be chance or a copy that came late; it must happen again.
+/// A peer with a single counter cannot send number n to one destination, a message to another, and
+/// then n + 1 to the first. A single case could be chance or a late copy, so it must happen again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Numbers {
     latest: [Option<(JausId, u16)>; Self::DESTINATIONS],
@@ -14,12 +15,12 @@ pub(super) struct Numbers {
 }
 
 impl Numbers {
-    /// Destinations that are told apart; a further one takes the place of the one before it.
+    /// How many destinations are tracked; a further one replaces the latest added.
     const DESTINATIONS: usize = 4;
-    /// How often a count must have gone on where it was left.
+    /// How often a per-destination count must have continued.
     const ENOUGH: u8 = 2;
 
-    /// Takes note of a number; says whether the peer is known to count by destination.
+    /// Records a number; returns whether the peer is known to count per destination.
     pub(super) fn handle(&mut self, destination: JausId, number: u16) -> bool {
         let known = self.latest.iter_mut().flatten();
         let known = known.into_iter().find(|(id, _)| *id == destination);

@@ -1,4 +1,4 @@
-//! Tells who a peer is by what it sends.
+//! Recognises which implementation a peer runs by the messages that it sends.
 
 use std::fmt;
 
@@ -11,24 +11,24 @@ use crate::codec::Message;
 use crate::messages::core::{QueryIdentification, RegisterServices};
 use crate::wire::{Acknowledgement, Broadcast, DataControl, Flags, Frame, Version};
 
-/// The services that only JAUS++ has.
+/// The prefix of services that only JAUS++ offers.
 const JAUSPP_SERVICES: &str = "urn:jaus:jss:jpp:extras:";
-/// The services of the interoperability profiles.
+/// The prefix of services of the interoperability profiles.
 const IOP_SERVICES: &str = "urn:jaus:jss:iop:";
-/// The services of the core set.
+/// The prefix of services of the core set.
 const CORE_SERVICES: &str = "urn:jaus:jss:core:";
 
-/// How sure it is who somebody is.
+/// How certain a recognition is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Certainty {
-    /// Nothing speaks for anybody.
+    /// There is no evidence.
     #[default]
     Unknown,
-    /// Something speaks for it that others do too.
+    /// The evidence also fits other implementations.
     Guess,
-    /// Nobody else is known to do that.
+    /// No other implementation is known to do this.
     Likely,
-    /// Nobody does that by chance, or several things agree.
+    /// It cannot be chance, or several signs agree.
     Certain,
 }
 
@@ -43,46 +43,46 @@ impl fmt::Display for Certainty {
     }
 }
 
-/// Why a peer is taken for somebody.
+/// A reason for a recognition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Reason {
-    /// What was seen.
+    /// The observed sign.
     pub sign: Sign,
 }
 
-/// What was seen, and what follows, in words.
+/// The sign and the peer that it points to, in words.
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}, as {} does", self.sign, self.sign.peer().title())
     }
 }
 
-/// Who a peer is, as far as can be told.
+/// The result of a recognition.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Verdict {
-    /// Who; [`Peer::Standard`] if nothing speaks for anybody.
+    /// The most likely peer; [`Peer::Standard`] without evidence.
     pub peer: Peer,
-    /// How sure that is. Only what is certain changes how a peer is treated.
+    /// How certain that is. Only certain results change how a peer is treated.
     pub certainty: Certainty,
-    /// All that was seen, also what speaks for somebody else.
+    /// All observed signs, including those that point to other peers.
     pub reasons: Vec<Reason>,
 }
 
-/// Tells who one peer is, by what it sends.
+/// Recognises one peer by the messages that it sends.
 ///
-/// One for each JAUS id. It must be given what that id sends in the order in which it came.
+/// Use one per JAUS id, and pass it everything from that id in order of arrival.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Recogniser {
     signs: Signs,
-    /// Who it is for sure.
+    /// The peer recognised with certainty.
     certain: Peer,
     begun: bool,
     numbers: Numbers,
     large: Option<Large>,
 }
 
-/// A large message of which all fragments so far repeat its code.
+/// A large message whose fragments have all repeated its code so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Large {
     code: u16,
@@ -90,16 +90,16 @@ struct Large {
 }
 
 impl Recogniser {
-    /// One that has seen nothing.
+    /// Creates a recogniser without evidence.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes a frame, and how many octets of its datagram lie behind the last message; 0 for a
-    /// frame of another kind of link.
+    /// Processes a frame. `trailing` is the number of octets after the last message of its
+    /// datagram; 0 for frames from other kinds of link.
     ///
-    /// Frames that nobody should accept are welcome: they tell a lot.
+    /// Pass invalid frames too: they are good evidence.
     pub fn handle_frame(&mut self, frame: &Frame, trailing: usize) {
         if trailing > 0 {
             self.handle_stale_octets();
@@ -122,20 +122,20 @@ impl Recogniser {
         }
     }
 
-    /// Takes note that octets were left behind the last message of a datagram.
+    /// Records stale octets after the last message of a datagram.
     pub fn handle_stale_octets(&mut self) {
         self.note(Sign::StaleOctets);
     }
 
-    /// Takes a frame of it that went to everybody, besides [`handle_frame`](Self::handle_frame).
+    /// Processes a frame that was sent to all, in addition to [`handle_frame`](Self::handle_frame).
     pub fn handle_frame_to_all(&mut self, frame: &Frame) {
         if Self::is_unmarked_call(frame) {
             self.note(Sign::CallsUnknownIds);
         }
     }
 
-    /// Whether a frame that went to everybody is for one component, wants an acknowledgement, and
-    /// does not say that it went to everybody: a call as fkie's node manager in Python has it.
+    /// Whether a frame that was sent to all is for one component, requests an acknowledgement, and
+    /// does not carry the broadcast flag: the call of fkie's node manager in Python.
     #[must_use]
     pub fn is_unmarked_call(frame: &Frame) -> bool {
         frame.destination.is_unicast()
@@ -143,14 +143,14 @@ impl Recogniser {
             && frame.flags.broadcast() == Some(Broadcast::None)
     }
 
-    /// Takes the style of a large message that was put together.
+    /// Records the style of a reassembled large message.
     pub fn handle_large(&mut self, style: LargeStyle) {
         if style == LargeStyle::RepeatedCode {
             self.note(Sign::RepeatedCode);
         }
     }
 
-    /// Takes the services that the peer has told of itself: name, major and minor version.
+    /// Processes the services that the peer reports: name, major and minor version.
     pub fn handle_services<'a>(&mut self, services: impl IntoIterator<Item = (&'a str, u8, u8)>) {
         let (mut core, mut newer) = (0, 0);
         for (urn, major, minor) in services {
@@ -168,28 +168,28 @@ impl Recogniser {
         }
     }
 
-    /// Takes note that a version octet stood before a message in the middle of a TCP stream.
+    /// Records a repeated version octet before a message in the middle of a TCP stream.
     pub fn handle_repeated_version(&mut self) {
         self.note(Sign::RepeatedVersion);
     }
 
-    /// Takes note that of the reserved message types some were acknowledged, and not those that have
-    /// one of the two lowest bits.
+    /// Records that the peer acknowledged reserved message types, except those with either of the
+    /// two lowest bits set.
     pub fn handle_misread_type(&mut self) {
         self.note(Sign::MisreadType);
     }
 
-    /// Takes note that something was acknowledged that was for an id with a 0.
+    /// Records that the peer acknowledged a message for an id with a 0.
     pub fn handle_answer_for_zero(&mut self) {
         self.note(Sign::AnswersForZero);
     }
 
-    /// Whether version octets stood before its messages in the middle of a TCP stream.
+    /// Whether it repeats version octets in the middle of a TCP stream.
     pub(crate) const fn repeats_version(&self) -> bool {
         self.signs.has(Sign::RepeatedVersion)
     }
 
-    /// Who it is, as far as can be told.
+    /// The current verdict.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         let (peer, certainty) = self.best();
@@ -201,15 +201,16 @@ impl Recogniser {
         }
     }
 
-    /// Who it is for sure; else [`Peer::Standard`].
+    /// The peer recognised with certainty; otherwise [`Peer::Standard`].
     #[must_use]
     pub const fn certain(&self) -> Peer {
         self.certain
     }
 
-    /// Who it is for sure, or else whom it may be taken for where it does little harm if it is
-    /// somebody else: Junior is who begins with number 1, and then calls an id that it does not know
-    /// or sends fragments of its length. A node of ours may do either, but does not begin with 1.
+    /// The peer recognised with certainty; otherwise a presumption, for uses where a wrong guess
+    /// does little harm. A peer is presumed to be Junior if it begins with number 1, and then calls
+    /// an unknown id or sends fragments of Junior's length. A node of ours may do either of the
+    /// latter, but does not begin with 1.
     #[must_use]
     pub fn presumed(&self) -> Peer {
         let has = |sign| self.signs.has(sign);
@@ -222,7 +223,7 @@ impl Recogniser {
         }
     }
 
-    /// For whom most speaks, and how much; of equals the first.
+    /// The peer with the most evidence, and its certainty; the first if several are equal.
     fn best(&self) -> (Peer, Certainty) {
         let mut best = (Peer::Standard, 0);
         for peer in Peer::ALL {
@@ -272,7 +273,7 @@ impl Recogniser {
         let one_node = destination == destination.whole_node()
             && destination.subsystem() != JausId::ANY_SUBSYSTEM
             && destination.node() != JausId::ANY_NODE;
-        // Whoever looks for others may well call one node alone.
+        // A discovery query may well address a single node.
         if one_node && frame.code() != Some(QueryIdentification::CODE) {
             self.note(Sign::AsksWholeNodes);
         }
@@ -301,8 +302,8 @@ impl Recogniser {
         self.handle_services(services.map(|(urn, major, minor)| (urn.as_str(), *major, *minor)));
     }
 
-    /// JAUS++ is known by the length of its fragments but for the last, and by the code in all of
-    /// them. One that comes out of order is no evidence.
+    /// JAUS++ is recognised by the length of its fragments except the last, and by the code in all
+    /// of them. A fragment out of order is not evidence.
     fn handle_fragment(&mut self, frame: &Frame) {
         let (data, length) = (frame.flags.data(), frame.payload.len());
         if length == JUNIOR_PAYLOAD && data != DataControl::Last {
@@ -327,9 +328,8 @@ impl Recogniser {
     }
 }
 
-/// Whether this is what Junior makes of a message with priority 0: the flags octet, computed as
-/// -1, has all bits set. What it said of broadcast, acknowledgement and fragments is lost with
-/// that.
+/// Whether this is Junior's faulty encoding of a message with priority 0: the flags octet, computed
+/// as -1, has all bits set. Its broadcast, acknowledgement and fragment fields are lost.
 #[must_use]
 pub(crate) fn is_priority_fault(frame: &Frame) -> bool {
     frame.version == Version::As5669a && frame.flags == Flags(0xFF) && !frame.payload.is_empty()

@@ -1,52 +1,52 @@
-//! What gives a peer away.
+//! The signs by which a peer is recognised, and their weights.
 
 use std::fmt;
 
 use super::Peer;
 
-/// Something that was seen of a peer and tells who it is.
+/// An observed behaviour that points to a peer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Sign {
-    /// A fragment that begins with the code of its message, and has JAUS++'s length.
+    /// A fragment of JAUS++'s length that begins with the code of its message.
     RepeatedCode,
-    /// Octets behind the messages of a datagram.
+    /// Stale octets after the messages of a datagram.
     StaleOctets,
     /// Register Services sent to another subsystem.
     RegistersAcrossSubsystems,
     /// A private service of JAUS++.
     JausPlusPlusService,
-    /// All services of the core set are of version 1.0.
+    /// All services of the core set have version 1.0.
     OnlyFirstVersions,
     /// The version octet before each message of a TCP stream.
     RepeatedVersion,
-    /// A sequence number 0, which those do not have that begin with 1.
+    /// Sequence number 0, which peers that begin with 1 skip.
     NumberZero,
-    /// All flags set, on a message that is no acknowledgement.
+    /// All flags set on a message other than an acknowledgement.
     PriorityFault,
-    /// A fragment of the length that Junior makes them.
+    /// A fragment of Junior's length.
     LongFragments,
-    /// A message for one component that went to everybody and wants an acknowledgement.
+    /// A message for one component that was broadcast and requests an acknowledgement.
     CallsUnknownIds,
-    /// The first message that was heard has the number 1.
+    /// The first message heard has the number 1.
     BeginsWithOne,
-    /// Reserved message types that are acknowledged, but for those that read as header compression
-    /// from the wrong end. It has to be provoked.
+    /// Acknowledgements of reserved message types, except those that look like header compression
+    /// if the bits are read from the wrong end. It must be provoked.
     MisreadType,
-    /// An acknowledgement of what was for an id with a 0. It has to be provoked.
+    /// An acknowledgement of a message for an id with a 0. It must be provoked.
     AnswersForZero,
-    /// Sequence numbers that count on for each destination by itself.
+    /// Sequence numbers counted per destination.
     NumbersByDestination,
-    /// Questions to all components of one node, as global broadcasts.
+    /// Queries to all components of one node, as global broadcasts.
     AsksWholeNodes,
-    /// A destination with a 0.
+    /// A destination that contains a 0.
     ZeroInDestination,
     /// A service of the interoperability profiles.
     IopService,
 }
 
 impl Sign {
-    /// All of them.
+    /// All signs.
     pub const ALL: [Self; 17] = [
         Self::RepeatedCode,
         Self::StaleOctets,
@@ -67,7 +67,7 @@ impl Sign {
         Self::IopService,
     ];
 
-    /// Whom it speaks for.
+    /// The peer that it points to.
     #[must_use]
     pub const fn peer(self) -> Peer {
         match self {
@@ -89,7 +89,7 @@ impl Sign {
         }
     }
 
-    /// How much it says: 4 is enough by itself, of 2 two are needed, and 1 alone is a guess.
+    /// The weight: 4 is sufficient alone, 2 needs another 2, and 1 alone is a guess.
     pub(super) const fn weight(self) -> u8 {
         match self {
             Self::RepeatedCode
@@ -153,7 +153,7 @@ impl fmt::Display for Sign {
 pub(super) struct Signs(u32);
 
 impl Signs {
-    /// Says whether it is new.
+    /// Adds a sign; returns whether it is new.
     pub(super) fn insert(&mut self, sign: Sign) -> bool {
         let new = self.0 & sign.bit() == 0;
         self.0 |= sign.bit();
@@ -168,8 +168,8 @@ impl Signs {
         Sign::ALL.into_iter().filter(move |sign| self.has(*sign))
     }
 
-    /// How much they say for a peer. What speaks for Junior speaks for a fork of it as well, if
-    /// anything speaks for that one alone.
+    /// The total weight for a peer. Signs of Junior also count for a fork of it, if at least one
+    /// sign points to that fork alone.
     pub(super) fn weight(self, peer: Peer) -> u8 {
         let of_it = self.iter().filter(|sign| sign.peer() == peer);
         let alone = of_it.map(Sign::weight).sum();

@@ -1,4 +1,4 @@
-//! Who is recognised by what, and that the table tells the truth.
+//! Tests of the recognition of peers, and of the table of departures.
 
 mod recognising;
 mod table;

@@ -1,5 +1,5 @@
-//! The AS5669A message: header, payload, sequence number. The same in datagrams, TCP streams and on
-//! serial lines.
+//! The AS5669A message: header, payload, sequence number. It is the same in datagrams, TCP streams
+//! and serial packets.
 //!
 //! Layout, little-endian (offsets without / with the header compression fields):
 //!
@@ -22,7 +22,7 @@ use crate::address::JausId;
 
 /// Octets of a header without compression fields.
 pub const HEADER_LEN: usize = 12;
-/// Octets of the sequence number behind the payload.
+/// Octets of the sequence number after the payload.
 pub const TRAILER_LEN: usize = 2;
 /// Octets of the smallest message, an acknowledgement.
 pub const MIN_LEN: usize = HEADER_LEN + TRAILER_LEN;
@@ -34,10 +34,10 @@ pub const MAX_PAYLOAD: usize = u16::MAX as usize - MIN_LEN;
 pub struct Header {
     /// Message type and header compression flags.
     pub kind: Kind,
-    /// Octets from the first of this header to the end of the sequence number.
+    /// Octets from the start of the header to the end of the sequence number.
     #[deku(endian = "little")]
     pub size: u16,
-    /// There exactly if the compression flags are not zero.
+    /// Present if and only if the compression flags are not zero.
     #[deku(cond = "kind.has_compression_fields()")]
     pub compression: Option<Compression>,
     /// Priority, broadcast, acknowledgement, data control.
@@ -48,17 +48,17 @@ pub struct Header {
     source: u32,
 }
 
-/// The two octets that a peer adds which would like to compress headers. They are read past.
+/// The two octets added by a peer that offers header compression. They are skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, DekuRead, DekuWrite)]
 pub struct Compression {
-    /// Which compressed header this is about.
+    /// The compressed header that this refers to.
     pub number: u8,
-    /// How many octets of the header are, or could be, left out.
+    /// How many octets of the header are, or could be, omitted.
     pub length: u8,
 }
 
 impl Header {
-    /// A header without compression for a message of type 0.
+    /// Creates an uncompressed header for a message of type 0.
     #[must_use]
     pub const fn new(flags: Flags, destination: JausId, source: JausId, size: u16) -> Self {
         Self {
@@ -71,19 +71,19 @@ impl Header {
         }
     }
 
-    /// For whom.
+    /// The destination.
     #[must_use]
     pub const fn destination(&self) -> JausId {
         JausId::from_u32(self.destination)
     }
 
-    /// From whom.
+    /// The source.
     #[must_use]
     pub const fn source(&self) -> JausId {
         JausId::from_u32(self.source)
     }
 
-    /// Octets of this header on the wire.
+    /// The length of this header on the wire, in octets.
     #[must_use]
     pub const fn wire_len(&self) -> usize {
         HEADER_LEN + if self.compression.is_some() { 2 } else { 0 }
@@ -92,8 +92,7 @@ impl Header {
     /// Reads a header from the beginning of `octets`.
     ///
     /// # Errors
-    /// [`Problem::Truncated`] if there are fewer octets than the header has. The size is not
-    /// checked.
+    /// [`Problem::Truncated`] if there are too few octets for a header. The size is not checked.
     #[inline]
     pub fn decode(octets: &[u8]) -> Result<Self, Problem> {
         let truncated = || Problem::Truncated {
@@ -104,7 +103,7 @@ impl Header {
         Ok(header)
     }
 
-    /// Writes the header behind what `out` holds.
+    /// Appends the header to `out`.
     ///
     /// # Errors
     /// [`EncodeError::NotPlain`] if it has a type or compression: those are never sent.
@@ -121,16 +120,16 @@ impl Header {
     }
 }
 
-/// Octets of a message with a payload of `payload` octets.
+/// The length of a message with a payload of `payload` octets.
 #[must_use]
 pub const fn message_len(payload: usize) -> usize {
     HEADER_LEN + payload + TRAILER_LEN
 }
 
-/// Reads the message that begins at `offset`, and tells where the next one would begin.
+/// Reads the message at `offset`; returns it with the offset of the next one.
 ///
 /// # Errors
-/// A header or size that does not fit what is there.
+/// The header is incomplete, or its size does not fit the available octets.
 pub fn parse(datagram: &Bytes, offset: usize) -> Result<(Frame, usize), Error> {
     let at = |problem| Error { offset, problem };
     let octets = datagram.get(offset..).unwrap_or_default();
@@ -161,10 +160,11 @@ pub fn parse(datagram: &Bytes, offset: usize) -> Result<(Frame, usize), Error> {
     Ok((frame, offset + size))
 }
 
-/// Writes a message behind what `out` holds; on an error nothing is written.
+/// Appends a message to `out`; on an error nothing is written.
 ///
 /// # Errors
-/// A payload above [`MAX_PAYLOAD`], or a frame of a type or with compression, which are never sent.
+/// The payload exceeds [`MAX_PAYLOAD`], or the frame has a type or compression, which are never
+/// sent.
 pub fn emit(frame: &Frame, out: &mut BytesMut) -> Result<(), EncodeError> {
     let length = frame.payload.len();
     if frame.kind != Kind::default() {

@@ -1,58 +1,58 @@
-//! What can be wrong with received octets, and with a frame that is to be sent.
+//! Errors in received octets, and in frames to send.
 
-/// Why octets are not a frame, and where.
+/// Why octets are not a frame, and where the fault is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("octet {offset}: {problem}")]
 pub struct Error {
-    /// Offset of the header at fault, from the beginning of the datagram or stream.
+    /// Offset of the faulty header, from the beginning of the datagram or stream.
     pub offset: usize,
-    /// What is wrong there.
+    /// The fault.
     pub problem: Problem,
 }
 
-/// What is wrong with received octets.
+/// A fault in received octets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
-    /// A datagram without an octet.
+    /// The datagram is empty.
     #[error("the datagram is empty")]
     Empty,
-    /// The first octets belong to no JAUS transport.
+    /// The first octet belongs to no JAUS transport.
     #[error("no JAUS transport begins with {0:02X}h (AS5669A: 02h, AS5669: 01h, RA: \"JAUS01.0\")")]
     UnknownVersion(u8),
-    /// Fewer octets than a header has.
+    /// There are fewer octets than a header needs.
     #[error("a header takes {needed} octets, only {available} are left")]
     Truncated {
-        /// What the header takes.
+        /// The length of the header.
         needed: usize,
-        /// What is there.
+        /// The octets available.
         available: usize,
     },
-    /// The size field does not even cover the header.
+    /// The size field does not cover the header.
     #[error("the data size {size} is less than the {least} octets of a message without payload")]
     SizeTooSmall {
         /// The size field.
         size: usize,
-        /// The least that it can be.
+        /// The smallest valid size.
         least: usize,
     },
-    /// The size field goes beyond the end.
+    /// The size field exceeds the available octets.
     #[error("the data size {size} is more than the {available} octets that are left")]
     SizeTooLarge {
         /// The size field.
         size: usize,
-        /// What is there.
+        /// The octets available.
         available: usize,
     },
-    /// The size in front of an AS5669 header and the one in it do not agree.
+    /// The size before an AS5669 header and the size in it differ.
     #[error("the size field says {stated} octets, the header behind it {by_header}")]
     SizesDiffer {
-        /// Octets of header and data by the size field.
+        /// Octets of header and data according to the size field.
         stated: usize,
-        /// The same by the header's data size.
+        /// Octets of header and data according to the header.
         by_header: usize,
     },
-    /// An older header's data control has a value that is not defined.
+    /// The data control of an older header has an undefined value.
     #[error("the data control {0} is not defined (0 single, 1 first, 2 or 4 middle, 8 last)")]
     UnknownDataControl(u8),
     /// An AS5669 message with a compressed header.
@@ -60,7 +60,7 @@ pub enum Problem {
     Compressed,
 }
 
-/// Why a frame cannot be written.
+/// Why a frame cannot be encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EncodeError {
@@ -69,10 +69,10 @@ pub enum EncodeError {
     PayloadTooLong {
         /// Octets of the payload.
         length: usize,
-        /// The most that fits.
+        /// The longest payload that fits.
         limit: usize,
     },
-    /// The older headers carry the message code, so there must be one.
+    /// The payload lacks the message code, which the older headers carry.
     #[error(
         "the payload has {length} octets, but this header needs the two octets of a message code"
     )]
@@ -80,10 +80,10 @@ pub enum EncodeError {
         /// Octets of the payload.
         length: usize,
     },
-    /// The Reference Architecture's header travels in UDP datagrams only.
+    /// The Reference Architecture's header is only used in UDP datagrams.
     #[error("a message with the Reference Architecture's header travels in UDP datagrams only")]
     DatagramsOnly,
-    /// A message type other than 0 or a compressed header.
+    /// The message type is not 0, or the header is compressed.
     #[error("only uncompressed messages of type 0 are sent")]
     NotPlain,
 }

@@ -1,19 +1,19 @@
-//! The fields below an octet: message type and header compression in one, priority, broadcast,
-//! acknowledgement and data control in another (AS5669A; the older headers are translated to
-//! these).
+//! The bit fields of the AS5669A header: message type and header compression in one octet;
+//! priority, broadcast, acknowledgement and data control in another. The older headers are
+//! translated to these.
 
 use std::fmt;
 
 use deku::prelude::*;
 
-/// How urgent a message is. Orders what waits to be sent and to be delivered.
+/// The priority of a message, which orders the queues for sending and delivery.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Priority {
-    /// 0: may wait.
+    /// 0: can be delayed.
     Low,
-    /// 1: what nearly all messages have.
+    /// 1: nearly all messages.
     #[default]
     Standard,
     /// 2: before ordinary traffic.
@@ -23,7 +23,7 @@ pub enum Priority {
 }
 
 impl Priority {
-    /// From low to safety critical.
+    /// All priorities, from low to safety critical.
     pub const ALL: [Self; 4] = [Self::Low, Self::Standard, Self::High, Self::SafetyCritical];
 
     /// The number in an AS5669A header, 0..=3.
@@ -44,12 +44,12 @@ impl Priority {
     }
 }
 
-/// How far a message is meant to go.
+/// The broadcast scope of a message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Broadcast {
-    /// 0: to the destination.
+    /// 0: unicast or multicast to the destination only.
     #[default]
     None,
     /// 1: to matching components of the sender's subsystem.
@@ -70,22 +70,22 @@ impl Broadcast {
     }
 }
 
-/// Whether a message wants to be acknowledged, or acknowledges.
+/// Whether a message requests an acknowledgement, or is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Acknowledgement {
-    /// 0: nothing of that.
+    /// 0: neither.
     #[default]
     None,
-    /// 1: the sender wants an acknowledgement.
+    /// 1: requests an acknowledgement.
     Request,
-    /// 2: the message with this sequence number was not taken.
+    /// 2: the message with this sequence number was refused.
     Negative,
     /// 3: the message with this sequence number has arrived.
     Positive,
 }
 
 impl Acknowledgement {
-    /// Whether this answers an earlier message.
+    /// Whether this is an answer to an earlier message.
     #[must_use]
     pub const fn is_answer(self) -> bool {
         matches!(self, Self::Negative | Self::Positive)
@@ -103,17 +103,17 @@ impl Acknowledgement {
     }
 }
 
-/// Which part of a large message a frame holds.
+/// The part of a large message that a frame holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum DataControl {
     /// 0: the whole message.
     #[default]
     Single,
-    /// 1: its beginning.
+    /// 1: the first fragment.
     First,
-    /// 2: a part between.
+    /// 2: a fragment in between.
     Middle,
-    /// 3: its end.
+    /// 3: the last fragment.
     Last,
 }
 
@@ -147,19 +147,19 @@ display_by_name!(Priority, Broadcast, Acknowledgement, DataControl);
 pub struct Flags(pub u8);
 
 impl Flags {
-    /// Flags with the given priority and all else "none" and "single".
+    /// Flags with the given priority, and otherwise "none" and "single".
     #[must_use]
     pub const fn new(priority: Priority) -> Self {
         Self(priority.bits())
     }
 
-    /// How urgent the message is.
+    /// The priority.
     #[must_use]
     pub const fn priority(self) -> Priority {
         Priority::ALL[self.field(0) as usize]
     }
 
-    /// How far the message goes; `None` for the reserved value 3.
+    /// The broadcast scope; `None` for the reserved value 3.
     #[must_use]
     pub const fn broadcast(self) -> Option<Broadcast> {
         match self.field(2) {
@@ -170,7 +170,7 @@ impl Flags {
         }
     }
 
-    /// Whether it wants to be acknowledged, or acknowledges.
+    /// The acknowledgement field.
     #[must_use]
     pub const fn acknowledgement(self) -> Acknowledgement {
         match self.field(4) {
@@ -181,7 +181,7 @@ impl Flags {
         }
     }
 
-    /// Which part of a large message it is.
+    /// The data control field.
     #[must_use]
     pub const fn data(self) -> DataControl {
         match self.field(6) {
@@ -192,25 +192,25 @@ impl Flags {
         }
     }
 
-    /// The same with another priority.
+    /// The same flags with another priority.
     #[must_use]
     pub const fn with_priority(self, priority: Priority) -> Self {
         self.with_field(0, priority.bits())
     }
 
-    /// The same with another scope.
+    /// The same flags with another scope.
     #[must_use]
     pub const fn with_broadcast(self, broadcast: Broadcast) -> Self {
         self.with_field(2, broadcast as u8)
     }
 
-    /// The same with another acknowledgement field.
+    /// The same flags with another acknowledgement field.
     #[must_use]
     pub const fn with_acknowledgement(self, acknowledgement: Acknowledgement) -> Self {
         self.with_field(4, acknowledgement as u8)
     }
 
-    /// The same with another data control.
+    /// The same flags with another data control.
     #[must_use]
     pub const fn with_data(self, data: DataControl) -> Self {
         self.with_field(6, data as u8)
@@ -226,7 +226,7 @@ impl Flags {
 }
 
 impl Default for Flags {
-    /// Standard priority, one receiver, no acknowledgement, a single message.
+    /// Standard priority, no broadcast, no acknowledgement, a single message.
     fn default() -> Self {
         Self::new(Priority::Standard)
     }
@@ -260,22 +260,22 @@ impl Kind {
         self.0 & 0x3F
     }
 
-    /// The header compression flags, 0..=3. Compression is read past and never offered.
+    /// The header compression flags, 0..=3. Compression is skipped when reading and never offered.
     #[must_use]
     pub const fn compression(self) -> u8 {
         self.0 >> 6
     }
 
-    /// Whether a header compression number and length follow the size. They do when any flag is
-    /// set.
+    /// Whether a header compression number and length follow the size field, as they do if any flag
+    /// is set.
     #[must_use]
     pub const fn has_compression_fields(self) -> bool {
         self.compression() != 0
     }
 
-    /// Whether the rest of the header is itself compressed (flags 3), which cannot be read without
-    /// the negotiation that we never enter. With flags 1 and 2 the peer only offers, and the header
-    /// is whole.
+    /// Whether the rest of the header is itself compressed (flags 3). It cannot be read without
+    /// negotiation, which this implementation never enters. With flags 1 and 2 the peer only offers
+    /// compression, and the header is complete.
     #[must_use]
     pub const fn is_compressed(self) -> bool {
         self.compression() == 3

@@ -1,4 +1,4 @@
-//! How a link frames messages: which octets stand around them, and where one ends.
+//! The framing of a link: how messages are delimited on it.
 
 use bytes::Bytes;
 
@@ -7,20 +7,20 @@ use super::{EncodeError, Frame, jserial, jtcp, judp};
 /// The framing of a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Framing {
-    /// Datagrams, each with its version in front: UDP.
+    /// UDP: datagrams, each beginning with its version.
     #[default]
     Judp,
-    /// Messages in a stream that delimit themselves: TCP.
+    /// TCP: a stream of messages that carry their own sizes.
     Jtcp,
-    /// Packets marked and checked, each with one message: serial lines.
+    /// Serial lines: packets with markers and checksums, one message each.
     Jserial,
 }
 
 impl Framing {
-    /// The octets that carry one frame on such a link, with the frame's own header version.
+    /// Encodes one frame for such a link, with the frame's own header version.
     ///
     /// # Errors
-    /// A frame that its header cannot carry.
+    /// The header cannot carry the frame.
     pub fn encode(self, frame: &Frame) -> Result<Bytes, EncodeError> {
         match self {
             Self::Judp => judp::encode(frame),

@@ -1,14 +1,14 @@
-//! JUDP: what one UDP datagram holds. The first octet tells which transport wrote it.
+//! JUDP: the messages in a UDP datagram. The first octet identifies the transport.
 //!
-//! An AS5669A datagram is the octet 02h and one message or several. JAUS++ does not shorten its
-//! send buffer, so that the end of an older, longer message may follow; hence reading stops quietly
-//! at the first implausible header after the first message.
+//! An AS5669A datagram is the octet 02h and one or more messages. JAUS++ does not truncate its send
+//! buffer, so the end of an older, longer message may follow. Reading therefore stops silently at
+//! the first implausible header after the first message.
 
 use bytes::{BufMut, Bytes, BytesMut};
 
 use super::{EncodeError, Error, Frame, Problem, Version, as5669, as5669a, ra};
 
-/// The port that IANA registered for JAUS.
+/// The UDP port that IANA registered for JAUS.
 pub const PORT: u16 = 3794;
 
 /// The first octet of an AS5669A datagram.
@@ -19,10 +19,10 @@ pub const VERSION_AS5669: u8 = 1;
 /// The longest payload of one AS5669A message in one datagram over IPv4.
 pub const MAX_PAYLOAD: usize = 65_507 - 1 - as5669a::MIN_LEN;
 
-/// Which transport wrote the datagram, and where its first message begins.
+/// Identifies the transport, and the offset of the first message.
 ///
 /// # Errors
-/// An empty datagram, or octets that belong to none.
+/// The datagram is empty or belongs to no JAUS transport.
 pub fn version(datagram: &[u8]) -> Result<(Version, usize), Error> {
     let at_start = |problem| Error { offset: 0, problem };
     match datagram.first() {
@@ -49,7 +49,8 @@ pub fn version(datagram: &[u8]) -> Result<(Version, usize), Error> {
 /// ```
 ///
 /// # Errors
-/// A datagram of no JAUS transport. What is wrong with the first message comes out of the iterator.
+/// The datagram belongs to no JAUS transport. Errors in the first message are returned by the
+/// iterator.
 pub fn frames(datagram: Bytes) -> Result<Frames, Error> {
     let (version, offset) = version(&datagram)?;
     Ok(Frames {
@@ -60,8 +61,8 @@ pub fn frames(datagram: Bytes) -> Result<Frames, Error> {
     })
 }
 
-/// The messages of a datagram: the first, or why it cannot be read; then the others up to the first
-/// implausible one.
+/// Iterates over the messages of a datagram: the first, or its error; then the others up to the
+/// first implausible one.
 #[derive(Clone, Debug)]
 pub struct Frames {
     datagram: Bytes,
@@ -78,20 +79,19 @@ enum State {
 }
 
 impl Frames {
-    /// Which transport wrote the datagram.
+    /// The transport of the datagram.
     #[must_use]
     pub fn version(&self) -> Version {
         self.version
     }
 
-    /// Where the next message would begin, or at the end where the octets begin that no message was
-    /// found in.
+    /// The offset of the next message or, at the end, of the octets after the last message.
     #[must_use]
     pub fn offset(&self) -> usize {
         self.offset
     }
 
-    /// How many octets lie behind the messages read so far; at the end, how many are stale.
+    /// How many octets follow the messages read so far; at the end, these are stale.
     #[must_use]
     pub fn remaining(&self) -> usize {
         self.datagram.len().saturating_sub(self.offset)
@@ -129,20 +129,20 @@ impl Iterator for Frames {
     }
 }
 
-/// Writes a datagram that holds one message, with the frame's own header version.
+/// Encodes a datagram with one message, with the frame's own header version.
 ///
 /// # Errors
-/// A frame that its header cannot carry.
+/// The header cannot carry the frame.
 pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
     let mut out = BytesMut::with_capacity(ra::PREFIX.len() + ra::HEADER_LEN + frame.payload.len());
     emit(frame, &mut out)?;
     Ok(out.freeze())
 }
 
-/// Writes such a datagram behind what `out` holds; on an error nothing is written.
+/// Appends such a datagram to `out`; on an error nothing is written.
 ///
 /// # Errors
-/// A frame that its header cannot carry.
+/// The header cannot carry the frame.
 pub fn emit(frame: &Frame, out: &mut BytesMut) -> Result<(), EncodeError> {
     let start = out.len();
     let emitted = match frame.version {

@@ -1,14 +1,14 @@
-//! Large messages, whose fragments have arrived: where the message code stands in them.
+//! Joins the fragments of large messages, and detects where they hold the message code.
 //!
-//! AS5669A and Junior cut the message as it is, so that only the first fragment begins with the
-//! message code. JAUS++ repeats the code at the beginning of every fragment, and so does what is
-//! read from the older headers. Nothing in a fragment tells which it is.
+//! AS5669A and Junior cut the message as it is, so only the first fragment begins with the message
+//! code. JAUS++ repeats the code at the beginning of every fragment, and so do fragments read from
+//! the older headers. A fragment does not say which of the two it is.
 
 use bytes::{Bytes, BytesMut};
 
 pub use super::ra::CODE_LEN;
 
-/// Whether every fragment begins with the code that the first begins with.
+/// Whether every fragment begins with the same code as the first.
 #[must_use]
 pub fn repeats_code<'a>(fragments: impl IntoIterator<Item = &'a Bytes>) -> bool {
     let mut fragments = fragments.into_iter();
@@ -16,7 +16,7 @@ pub fn repeats_code<'a>(fragments: impl IntoIterator<Item = &'a Bytes>) -> bool 
     code.is_some_and(|code| fragments.all(|fragment| fragment.starts_with(code)))
 }
 
-/// The fragments behind one another; of all but the first, `skip` octets are left out.
+/// Joins the fragments, leaving out `skip` octets of each but the first.
 #[must_use]
 pub fn join<'a, I>(fragments: I, skip: usize) -> Bytes
 where

@@ -1,13 +1,15 @@
-//! Octets ↔ frames: what JAUS transports put around a message. Pure functions, no I/O, no clock.
+//! Wire formats: encoding and decoding of JAUS transport messages. Pure functions, without I/O or
+//! clock.
 //!
-//! A [`Frame`] is one transport message, whichever header it came with: [`as5669a`] is today's,
-//! [`as5669`] its first edition and [`ra`] the header of the Reference Architecture that the latter
-//! took over. [`judp`] reads and writes datagrams, whose first octet tells the three apart;
-//! [`jtcp`] reads and writes the streams of TCP connections, [`jserial`] the packets of serial lines.
+//! A [`Frame`] is one transport message, whatever its header: [`as5669a`] is the current one,
+//! [`as5669`] its first edition, and [`ra`] the header of the Reference Architecture, which the
+//! first edition adopted. [`judp`] reads and writes datagrams, whose first octet tells the three
+//! apart; [`jtcp`] reads and writes the streams of TCP connections, [`jserial`] the packets of
+//! serial lines.
 //!
-//! Parsing checks every length against what is there, and gives an [`Error`] with the offset at
-//! fault; payloads are shared slices of the datagram. Nothing here judges whether a frame makes
-//! sense: that is the endpoint's business.
+//! Parsing checks every length against the available octets, and returns an [`Error`] with the
+//! offset of the fault. Payloads are shared slices of the datagram. The endpoint, not this module,
+//! checks whether a frame makes sense.
 
 pub mod as5669;
 pub mod as5669a;
@@ -32,10 +34,10 @@ pub use framing::Framing;
 
 use crate::address::JausId;
 
-/// Which header a frame came with, or is to be sent with.
+/// The header of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Version {
-    /// SAE AS5669A, today's transport: first octet 02h.
+    /// SAE AS5669A, the current transport: first octet 02h.
     As5669a,
     /// SAE AS5669, its first edition: first octet 01h.
     As5669,
@@ -61,30 +63,31 @@ impl fmt::Display for Version {
     }
 }
 
-/// One transport message: who to whom, how, and the octets of the JAUS message in it.
+/// One transport message: addresses, flags, and the octets of its JAUS message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// The header that it came with.
+    /// Its header.
     pub version: Version,
-    /// Message type and header compression; zero but in rare AS5669A frames.
+    /// Message type and header compression; zero except in rare AS5669A frames.
     pub kind: Kind,
-    /// Priority, broadcast, acknowledgement and data control. For the older headers these are
-    /// translated.
+    /// Priority, broadcast, acknowledgement and data control, translated from the older headers
+    /// where necessary.
     pub flags: Flags,
-    /// For whom; may hold wildcards.
+    /// The destination; may hold wildcards.
     pub destination: JausId,
-    /// From whom.
+    /// The source.
     pub source: JausId,
-    /// The number that acknowledgements, duplicates and fragments are told by.
+    /// The sequence number, which identifies acknowledgements, duplicates and fragments.
     pub sequence: u16,
-    /// The JAUS message, beginning with its two code octets (in the older headers these are a
-    /// header field, and are moved here). Empty in an AS5669A acknowledgement; without code in all
-    /// but the first fragment of a large message.
+    /// The JAUS message, beginning with its two code octets (the older headers hold these in a
+    /// header field, from which they are moved here). It is empty in an AS5669A acknowledgement,
+    /// and lacks the code in all but the first fragment of a large message.
     pub payload: Bytes,
 }
 
 impl Frame {
-    /// A single unacknowledged message for one receiver, with today's header and sequence number 0.
+    /// A single unacknowledged message for one receiver, with the AS5669A header and sequence
+    /// number 0.
     #[must_use]
     pub fn new(source: JausId, destination: JausId, payload: Bytes) -> Self {
         Self {
@@ -98,7 +101,7 @@ impl Frame {
         }
     }
 
-    /// The message code, which the payload begins with; `None` if it is too short.
+    /// The message code at the beginning of the payload; `None` if that is too short.
     #[must_use]
     pub fn code(&self) -> Option<u16> {
         self.payload
@@ -106,7 +109,7 @@ impl Frame {
             .map(|&code| u16::from_le_bytes(code))
     }
 
-    /// What the payload holds besides the code, of which the older headers' acknowledgements carry
+    /// The payload length without the code, of which acknowledgements with the older headers carry
     /// a copy.
     fn body_len(&self) -> usize {
         match self.version {
@@ -115,17 +118,16 @@ impl Frame {
         }
     }
 
-    /// Whether this is a pure acknowledgement, positive or negative, as it should be: without a
-    /// message.
+    /// Whether this is a well-formed acknowledgement, positive or negative: one without a message.
     #[must_use]
     pub fn is_acknowledgement(&self) -> bool {
         self.flags.acknowledgement().is_answer() && self.body_len() == 0
     }
 
-    /// Whether this could have been written on purpose: an uncompressed message of type 0 from
-    /// somebody to somebody.
+    /// Whether a sender could have meant this frame: an uncompressed message of type 0 with a valid
+    /// source and destination.
     ///
-    /// One peer leaves stale octets behind its messages; their beginnings seldom pass this test.
+    /// One peer leaves stale octets after its messages; these seldom pass this test.
     #[must_use]
     pub fn is_plausible(&self) -> bool {
         self.kind == Kind::default()

@@ -1,4 +1,4 @@
-//! Frames as recorded from Junior, JAUS++ and OpenJAUS, and frames that nobody should have sent.
+//! Frames recorded from Junior, JAUS++ and OpenJAUS, and invalid frames.
 
 use bytes::{Bytes, BytesMut};
 use proptest::prelude::*;
@@ -38,7 +38,7 @@ fn error(datagram: &str) -> String {
 /// Junior: the first message to an unknown id, multicast with a request for acknowledgement.
 const JUNIOR_FIRST: &str =
     "02 00 1e00 19 01010200 01010100 014b 00000000 7878787878787878 7878 0100";
-/// Junior: the acknowledgement of it.
+/// Junior: its acknowledgement.
 const JUNIOR_ACK: &str = "02 00 0e00 31 01010100 01010200 0100";
 /// Junior: AS5669 first edition, and its acknowledgement.
 const JUNIOR_V1: &str =
@@ -95,7 +95,7 @@ fn several_messages_share_a_datagram() {
 }
 
 /// JAUS++ sends a short message from the buffer of a longer one, whose end follows. Both tails were
-/// recorded; the second looks like a message from 29295.99.58 with a fitting size, but is an
+/// recorded. The second looks like a message from 29295.99.58 with a fitting size, but is an
 /// acknowledgement with a payload.
 #[test]
 fn stale_octets_behind_a_message_end_the_reading_quietly() {
@@ -177,7 +177,7 @@ fn the_code_of_an_older_header_is_moved_in_front_of_the_payload() {
 
 #[test]
 fn older_headers_are_written_as_their_peers_write_them() {
-    // Junior writes the length of header and data there, big-endian; its 16 octets of data make
+    // Junior writes the length of header and data here, big-endian; with 16 octets of data it is
     // 20h.
     for recorded in [JUNIOR_V1, JUNIOR_V1_ACK, OPENJAUS_HEARTBEAT] {
         assert_eq!(
@@ -294,7 +294,7 @@ pub(super) fn any_frame(version: Version) -> impl Strategy<Value = Frame> {
             } else {
                 Broadcast::None
             };
-            // The older headers tell the scope by the destination alone.
+            // In the older headers, only the destination shows the scope.
             let flags = match version {
                 Version::As5669a => Flags(flags),
                 Version::As5669 | Version::Ra => Flags(flags).with_broadcast(scope),

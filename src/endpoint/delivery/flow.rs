@@ -1,10 +1,9 @@
-//! One destination's messages that want an acknowledgement: what waits, what is on its way, what
-//! was lost.
+//! The flow to one destination: its messages that want an acknowledgement, queued, in flight or
+//! lost.
 //!
-//! Acknowledgements name one packet each, so nothing is sent again but what was not acknowledged.
-//! A packet counts as lost when several that were sent after it were acknowledged (how many is
-//! learned from repetitions that turn out to have been needless), or when nothing was acknowledged
-//! for as long as a round trip should take.
+//! Each acknowledgement names one packet, so only unacknowledged packets are retransmitted. A
+//! packet counts as lost when enough packets sent after it were acknowledged (the threshold adapts
+//! to needless retransmissions), or when nothing was acknowledged for the retransmission timeout.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -18,28 +17,30 @@ use crate::endpoint::large::{Cut, Numbers};
 use crate::endpoint::{Config, Unacknowledged};
 use crate::wire::{Frame, Priority, Version};
 
-/// So many packets may be on their way to somebody whose address is unknown: they go to everybody.
+/// The window for a destination with unknown address, because its packets are broadcast.
 const SEEKING: usize = 1;
-/// The longest wait before sending again to somebody whose address is unknown. Whoever hears it
-/// remembers such a message for a short time only.
+/// The longest retransmission timeout for a destination with unknown address. Receivers remember
+/// such a message for a short time only.
 const SEEKING_TIMEOUT: Duration = Duration::from_millis(400);
-/// The shortest wait before sending again on a connection, which loses nothing: only a receiver that
-/// was busy makes repeating of use. Twice what Junior waits; what comes to it twice it acknowledges
-/// twice, also to those who have hung up since, and its engine may end of that.
+/// The shortest retransmission timeout on a connection. Connections lose nothing, so a
+/// retransmission helps only if the receiver was busy. It is twice Junior's timeout: Junior
+/// acknowledges every duplicate, even to connections closed since, and that can terminate its
+/// engine.
 const CONNECTED_TIMEOUT: Duration = Duration::from_millis(200);
-/// So many more than the window allows may be on their way if they are urgent, by priority: what
-/// is urgent does not wait for the answers to what is not.
+/// How far urgent packets may exceed the window, by priority: they do not wait for acknowledgements
+/// of less urgent ones.
 const RESERVE: [usize; Priority::ALL.len()] = [0, 0, 8, 32];
-/// A packet is lost when one that was sent so much later is acknowledged; at first and at most.
+/// A packet is lost when one sent this many packets later is acknowledged: initial and largest
+/// value.
 const TOLERANCE: (u64, u64) = (3, 96);
-/// After so long without traffic the window is not known to be right any more.
+/// After this long without traffic, the measured window is out of date.
 const STALE: Duration = Duration::from_secs(1);
-/// To a destination that was silent before, messages get this part of the usual patience.
+/// The divisor of the usual patience for messages to a destination that was silent before.
 const SILENT_PART: u32 = 6;
-/// Numbers go round after so many.
+/// The period of sequence numbers.
 const ROUND: u64 = 1 << 16;
 
-/// A fragment, or a message that is not cut, that was sent and not acknowledged.
+/// A fragment or unfragmented message that was sent and not acknowledged yet.
 #[derive(Debug)]
 struct Packet {
     message: u64,
@@ -47,62 +48,63 @@ struct Packet {
     priority: Priority,
     first_sent: Instant,
     sent: Instant,
-    /// How many packets were sent before this one was, the last time.
+    /// How many packets had been sent before its latest transmission.
     order: u64,
     tries: u32,
-    /// Taken for lost, and waiting to be sent again.
+    /// Counts as lost, and is queued for retransmission.
     lost: bool,
 }
 
-/// What an acknowledgement did.
+/// The effect of an acknowledgement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Progress {
-    /// Nobody waits for it.
+    /// No packet awaits it.
     Unawaited,
-    /// Parts of the message are still to be acknowledged.
+    /// Further fragments of the message are unacknowledged.
     Part,
-    /// The message is acknowledged.
+    /// The message is fully acknowledged.
     Whole(u64),
 }
 
-/// All that goes to one destination.
+/// All messages to one destination.
 #[derive(Debug)]
 pub(super) struct Flow {
-    /// By handle, hence in the order in which they were handed in.
+    /// By handle, and so in the order in which they were queued.
     pending_messages: BTreeMap<u64, PendingMessage>,
-    /// Messages of which not all was sent, by priority.
+    /// Messages not fully sent yet, by priority.
     waiting: [VecDeque<u64>; Priority::ALL.len()],
-    /// What is to be sent again, by priority.
+    /// Packets to retransmit, by priority.
     lost: [VecDeque<u16>; Priority::ALL.len()],
     flight: HashMap<u16, Packet>,
-    /// What was sent, oldest first; entries of what was acknowledged meanwhile are passed over.
+    /// Sent packets, oldest first; entries of acknowledged packets are skipped.
     order: VecDeque<(u64, u16)>,
     sends: u64,
-    /// The order of the latest packet that was acknowledged.
+    /// The `order` of the latest acknowledged packet.
     newest: u64,
     tolerance: u64,
     in_flight: usize,
     window: Window,
     round_trip: RoundTrip,
-    /// Since when something is on its way and nothing was acknowledged.
+    /// The start of the retransmission timer: when packets are in flight, the time of the latest
+    /// acknowledgement or first transmission.
     armed: Option<Instant>,
-    /// When the latest acknowledgement came.
+    /// When the latest acknowledgement arrived.
     heard: Option<Instant>,
-    /// When something was handed in or acknowledged.
+    /// When a message was last queued or acknowledged.
     active: Instant,
-    /// Whether messages were given up because nothing was heard, and nothing was since.
+    /// Whether messages were given up because of silence, and no acknowledgement has arrived since.
     silent: bool,
     /// Whether the address is known.
     pub(super) known: bool,
-    /// Whether it is at the other end of a connection.
+    /// Whether it is reached through a connection.
     pub(super) connected: bool,
-    /// By priority, whether it stands in the list of those that have something to send.
+    /// By priority, whether the flow is in the list of flows with something to send.
     pub(super) listed: [bool; Priority::ALL.len()],
-    /// When it is looked at, at the latest.
+    /// When the flow is checked next, at the latest.
     pub(super) timer: Option<Instant>,
-    /// Messages of which a packet was sent as often as is allowed.
+    /// Messages with a packet that has used up its attempts.
     exhausted: Vec<u64>,
-    /// No message under way has a lower serial number.
+    /// No message in flight has a lower serial number.
     floor: u64,
     patience: Duration,
     tries: u32,
@@ -154,7 +156,7 @@ impl Flow {
         }
     }
 
-    /// Takes in a message.
+    /// Queues a message.
     pub(super) fn push(&mut self, now: Instant, message: u64, pending: PendingMessage) {
         if self.is_idle() {
             self.round_trip.restart();
@@ -167,7 +169,7 @@ impl Flow {
         self.pending_messages.insert(message, pending);
     }
 
-    /// The highest priority at which something is to be sent and may be.
+    /// The highest priority at which a packet is ready and the window has room.
     pub(super) fn wants(&self) -> Option<Priority> {
         let limit = if self.known {
             self.window.packets()
@@ -181,16 +183,16 @@ impl Flow {
         })
     }
 
-    /// Whether the message that begins next has more octets than that.
+    /// Whether the next message to begin is longer than this.
     pub(super) fn begins_more_than(&self, octets: usize) -> bool {
         let next = self.waiting.iter().rev().find_map(VecDeque::front);
         let pending = next.and_then(|message| self.pending_messages.get(message));
         pending.is_some_and(|pending| pending.started.is_none() && pending.payload.len() > octets)
     }
 
-    /// The next packet to send, of that priority or, if that must wait for numbers, of a lower one;
-    /// without its destination. How a message of that length is cut, and for which header, is asked
-    /// when its first packet is due.
+    /// The next packet to send, without its destination: of that priority or, if that must wait for
+    /// sequence numbers, of a lower one. `begin` is called with the length of a message when its
+    /// first packet is due, and returns how to cut it and which header to use.
     pub(super) fn take(
         &mut self,
         now: Instant,
@@ -204,7 +206,7 @@ impl Flow {
         })
     }
 
-    /// A lost packet again.
+    /// Retransmits a lost packet.
     fn repeat(&mut self, now: Instant, level: usize) -> Option<(Frame, u32)> {
         while let Some(sequence) = self.lost[level].pop_front() {
             let Some(packet) = self.flight.get_mut(&sequence).filter(|packet| packet.lost) else {
@@ -225,7 +227,7 @@ impl Flow {
         None
     }
 
-    /// The next packet of the first message that waits.
+    /// The next packet of the first queued message.
     fn advance(
         &mut self,
         now: Instant,
@@ -264,8 +266,8 @@ impl Flow {
         }
     }
 
-    /// Cuts and numbers a message if that was not done before; `None` while the numbers that it
-    /// needs are those of what is on its way.
+    /// Cuts and numbers a message if necessary; `None` as long as the sequence numbers that it
+    /// needs are in flight.
     fn start(
         &mut self,
         message: u64,
@@ -306,7 +308,7 @@ impl Flow {
         self.armed.get_or_insert(now);
     }
 
-    /// A packet was acknowledged.
+    /// Processes the acknowledgement of a packet.
     pub(super) fn acknowledge(&mut self, now: Instant, source: JausId, sequence: u16) -> Progress {
         let Some(message) = self.owner_of(source, sequence) else {
             return Progress::Unawaited;
@@ -335,7 +337,7 @@ impl Flow {
         Progress::Whole(message)
     }
 
-    /// The message that a packet of `source` belongs to.
+    /// The message that a packet from `source` belongs to.
     pub(super) fn owner_of(&self, source: JausId, sequence: u16) -> Option<u64> {
         let message = self.flight.get(&sequence)?.message;
         let pending = self.pending_messages.get(&message)?;
@@ -348,7 +350,7 @@ impl Flow {
         self.silent = false;
         let time = now.saturating_duration_since(packet.sent);
         let shortest = self.round_trip.shortest().unwrap_or_default();
-        // Answered before the repetition can have been: the first copy had only been overtaken.
+        // Too early to answer the retransmission: the first copy was only reordered.
         let needless = if packet.tries == 1 {
             packet.lost
         } else {
@@ -363,7 +365,7 @@ impl Flow {
         self.window.grow(packet.order, self.in_flight);
     }
 
-    /// Finds packets that others have overtaken by more than is tolerated.
+    /// Finds packets overtaken by more later packets than tolerated.
     fn find_lost(&mut self, now: Instant) {
         while let Some(&(order, sequence)) = self.order.front() {
             let is_current = |packet: &Packet| packet.order == order && !packet.lost;
@@ -392,7 +394,7 @@ impl Flow {
         }
     }
 
-    /// When something is to be done though nothing is heard.
+    /// The next timeout.
     pub(super) fn deadline(&self) -> Option<Instant> {
         [self.repetition(), self.end_of_patience()]
             .into_iter()
@@ -400,7 +402,7 @@ impl Flow {
             .min()
     }
 
-    /// When all that is on its way counts as lost.
+    /// When all packets in flight count as lost.
     fn repetition(&self) -> Option<Instant> {
         let timeout = self.round_trip.timeout();
         let timeout = match (self.known, self.connected) {
@@ -411,7 +413,7 @@ impl Flow {
         self.armed.map(|armed| armed + timeout)
     }
 
-    /// When the message that was handed in first is given up, unless something is heard before.
+    /// When the oldest message is given up, unless an acknowledgement arrives before.
     fn end_of_patience(&self) -> Option<Instant> {
         let (_, oldest) = self.pending_messages.first_key_value()?;
         let patience = if self.silent {
@@ -425,8 +427,8 @@ impl Flow {
         Some(since + patience)
     }
 
-    /// Takes everything for lost if nothing was acknowledged in time, and gives up what is
-    /// hopeless.
+    /// Treats all packets in flight as lost if the retransmission timeout has passed, and gives up
+    /// messages that are out of time.
     pub(super) fn handle_timeout(&mut self, now: Instant) -> Vec<(u64, Undelivered)> {
         if self.repetition().is_some_and(|due| due <= now) {
             self.armed = None;
@@ -452,7 +454,7 @@ impl Flow {
         given_up
     }
 
-    /// Gives up messages of which a packet was sent as often as is allowed.
+    /// Gives up messages with a packet that has used up its attempts.
     pub(super) fn take_exhausted(&mut self) -> Vec<(u64, Undelivered)> {
         std::mem::take(&mut self.exhausted)
             .into_iter()
@@ -460,7 +462,7 @@ impl Flow {
             .collect()
     }
 
-    /// Gives up a message, and tells what became of it.
+    /// Gives up a message and returns its outcome.
     pub(super) fn give_up(
         &mut self,
         message: u64,
@@ -480,7 +482,7 @@ impl Flow {
         Some((message, undelivered))
     }
 
-    /// Takes a message out, with what is on its way of it.
+    /// Removes a message and its packets in flight.
     pub(super) fn remove(&mut self, message: u64) -> Option<PendingMessage> {
         let pending = self.pending_messages.remove(&message)?;
         if let Some(started) = pending
@@ -500,7 +502,7 @@ impl Flow {
         Some(pending)
     }
 
-    /// The messages of a component.
+    /// The messages of one component.
     pub(super) fn messages_of(&self, source: JausId) -> Vec<u64> {
         let theirs = |(_, pending): &(&u64, &PendingMessage)| pending.source == source;
         self.pending_messages

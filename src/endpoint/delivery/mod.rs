@@ -1,17 +1,20 @@
-//! Reliable delivery: messages that want an acknowledgement, until they have it or are given up.
+//! Reliable delivery: retransmits messages until they are acknowledged or given up.
 //!
-//! Each destination has a [flow](flow) of its own with a sliding window, so that a destination that
-//! does not answer keeps nobody else waiting. A message is given up when nothing at all was
-//! acknowledged by its destination for [`Config::acknowledge_patience`] since it was handed in, or
-//! when one of its packets was sent for that long and [`Config::acknowledge_tries`] times. So an
-//! attempt on a peer that never acknowledges ends, for every message that waits, that long after it
-//! was handed in. The silence is remembered: until something is heard again, further messages get a
-//! sixth of the time.
+//! Each destination has a [flow](flow) of its own with a sliding window, so that an unresponsive
+//! destination delays no other. A message is given up when its destination has acknowledged nothing
+//! for [`Config::acknowledge_patience`] since the message was queued, or when one of its packets
+//! was retransmitted for that long and [`Config::acknowledge_tries`] times. If a peer never
+//! acknowledges anything, each queued message is therefore given up that long after it was queued.
+//! The silence is remembered: until the peer is heard again, further messages get a sixth of the
+//! time.
 //!
-//! Frames are made when they are sent; a waiting message costs its own octets, which are shared.
+//! Frames are created when they are sent; a waiting message costs only its own octets, which are
+//! shared.
 //!
-//! Two things to know about Junior as receiver: it forgets fragments beyond the latest 50 (or 100,
-//! as configured) though it has acknowledged them, so a message must not have more; and it reads ten
+//! Two limits of Junior as a receiver matter here. It drops all but the latest 50 fragments (or
+//! 100, as configured) although it has acknowledged them, so a message must not have more. And it
+//! reads ten datagrams per millisecond from a buffer of 70000 octets, which the window finds out by
+//! loss.
 //! datagrams a millisecond from a buffer of 70000 octets, which the window finds out by loss.
 
 mod flow;
@@ -32,23 +35,23 @@ use crate::wire::{Acknowledgement, Broadcast, DataControl, Frame, Framing, Prior
 use flow::{Flow, Progress};
 use pending::PendingMessage;
 
-/// So many packets of a flow go one after the other, which lets links send them with one call.
+/// Packets of one flow are sent in runs of this length, so that links can batch them in one call.
 const TURN: usize = 32;
 
-/// How it goes with the messages to one destination that want an acknowledgement.
+/// The state of reliable delivery to one destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlowStatus {
     /// The smoothed round trip; `None` before the first measurement.
     pub round_trip: Option<Duration>,
-    /// How many packets may be on their way at a time.
+    /// How many packets may be unacknowledged at a time.
     pub window: usize,
-    /// How many are.
+    /// How many are unacknowledged now.
     pub in_flight: usize,
-    /// Messages that wait or are on their way.
+    /// Messages that are queued or unacknowledged.
     pub messages: usize,
 }
 
-/// What became of a message that was given up.
+/// The outcome of a message that was given up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Undelivered {
     awaited: bool,
@@ -57,15 +60,15 @@ pub(super) struct Undelivered {
     length: usize,
 }
 
-/// All flows, and which of them have something to send.
+/// All flows, with their schedule.
 #[derive(Debug)]
 pub(super) struct Deliveries {
     flows: HashMap<JausId, Flow>,
-    /// Flows that may have something to send, by its priority; the first has its turn.
+    /// Flows that may have something to send, by priority; the first is next.
     ready: [VecDeque<JausId>; Priority::ALL.len()],
-    /// Who had the turn last, and how many packets it has sent since.
+    /// The flow that sent last, and how many packets it has sent in its turn.
     turn: Option<(JausId, usize)>,
-    /// When to look at a flow at the latest; one entry each at the most.
+    /// The latest time to check each flow; at most one entry per flow.
     timers: BTreeSet<(Instant, JausId)>,
     handed_in: u64,
     messages: usize,
@@ -87,13 +90,13 @@ impl Deliveries {
         }
     }
 
-    /// A handle for the next message.
+    /// Allocates a handle for the next message.
     pub(super) fn next_handle(&mut self) -> MessageHandle {
         self.handed_in += 1;
         MessageHandle(self.handed_in)
     }
 
-    /// Checks whether one more message can be taken in, while so many `results` were not polled.
+    /// Checks that one more message fits, while this many `results` have not been polled.
     pub(super) fn check_room(&self, results: usize, length: usize) -> Result<(), SendError> {
         let limit = self.config.max_unacknowledged;
         if self.messages + results >= limit {
@@ -128,7 +131,7 @@ impl Deliveries {
         Ok(())
     }
 
-    /// Makes room for one more flow, by forgetting the one that has been idle for longest.
+    /// Makes room for one more flow by dropping the one idle for longest.
     fn make_room(&mut self, now: Instant) -> bool {
         if self.flows.len() < self.config.max_flows.max(1) {
             return true;
@@ -144,7 +147,7 @@ impl Deliveries {
         true
     }
 
-    /// Sees to it that a flow in which something has changed has its turn and its timer.
+    /// Reschedules a flow whose state has changed: its turn and its timer.
     pub(super) fn touch(&mut self, destination: JausId) {
         let Some(flow) = self.flows.get_mut(&destination) else {
             return;
@@ -163,7 +166,7 @@ impl Deliveries {
         }
         let deadline = flow.deadline();
         match (flow.timer, deadline) {
-            // A timer that is early is harmless, and moving it for each answer is not.
+            // An early timer is harmless; moving it with each answer would be costly.
             (Some(set), Some(deadline)) if set <= deadline => {}
             (set, deadline) => {
                 if let Some(set) = set {
@@ -175,7 +178,7 @@ impl Deliveries {
         }
     }
 
-    /// The next flow whose turn it is at this priority.
+    /// The next flow in turn at this priority.
     fn next_ready(&mut self, priority: Priority) -> Option<JausId> {
         let level = usize::from(priority.bits());
         loop {
@@ -191,7 +194,7 @@ impl Deliveries {
         }
     }
 
-    /// A packet is sent: after some of one flow it is another's turn.
+    /// Counts a sent packet against the flow's turn.
     fn take_turn(&mut self, destination: JausId) {
         self.turn = match self.turn {
             Some((whose, sent)) if whose == destination && sent < TURN => {
@@ -222,7 +225,7 @@ impl Deliveries {
         self.octets -= length;
     }
 
-    /// Forgets the messages of a component that has gone; how many.
+    /// Drops the messages of a detached component; returns how many.
     pub(super) fn forget_source(&mut self, source: JausId) -> u64 {
         let before = self.messages;
         let destinations: Vec<_> = self.flows.keys().copied().collect();
@@ -244,14 +247,13 @@ impl Deliveries {
 }
 
 impl Endpoint {
-    /// How it goes with the messages to `destination` that want an acknowledgement; `None` if there
-    /// were none lately.
+    /// The state of reliable delivery to `destination`; `None` if there was none recently.
     #[must_use]
     pub fn flow(&self, destination: JausId) -> Option<FlowStatus> {
         self.deliveries.flows.get(&destination).map(Flow::status)
     }
 
-    /// Takes in a message that wants an acknowledgement, or a large one for an unknown address.
+    /// Queues a message that wants an acknowledgement, or a large one for an unknown address.
     pub(super) fn deliver_reliably(
         &mut self,
         now: Instant,
@@ -266,14 +268,14 @@ impl Endpoint {
             .push(now, message.destination, handle, pending)
     }
 
-    /// Sends the packets that are next of this priority, as many as one flow may send in its turn;
-    /// whether there were any.
+    /// Sends the next packets of this priority, at most one flow's turn. Returns whether any were
+    /// sent.
     pub(super) fn send_deliveries(&mut self, now: Instant, priority: Priority) -> bool {
         let mut sent = 0;
         while sent < TURN
             && let Some(destination) = self.deliveries.next_ready(priority)
         {
-            // What waits for numbers to be free has its next turn when something is acknowledged or
+            // A flow without free sequence numbers is rescheduled when a message is acknowledged or
             // given up.
             if self.send_packet(now, destination, priority).is_some() {
                 self.deliveries.take_turn(destination);
@@ -284,8 +286,8 @@ impl Endpoint {
         sent > 0
     }
 
-    /// Sends the next packet to a destination, if there is one. If no way leads there, it counts as
-    /// lost on the way.
+    /// Sends the next packet to a destination, if there is one. Without a route, the packet counts
+    /// as lost on the way.
     fn send_packet(&mut self, now: Instant, destination: JausId, priority: Priority) -> Option<()> {
         let route = self.route(destination);
         let version = route.map_or(Version::As5669a, |(_, version)| version);
@@ -328,13 +330,14 @@ impl Endpoint {
         Some(())
     }
 
-    /// Whether a message, or a part of it, waits for an acknowledgement of `peer` with this number.
+    /// Whether a message or fragment with this number awaits an acknowledgement of `peer`.
     pub(super) fn awaits_answer(&self, peer: JausId, local: JausId, number: u16) -> bool {
         let flow = self.deliveries.flows.get(&peer);
         flow.is_some_and(|flow| flow.owner_of(local, number).is_some())
     }
 
-    /// A message was given up: who was not heard meanwhile is not where it was, and is called for.
+    /// Handles a message that was given up: if its destination was silent meanwhile, its route
+    /// becomes stale, and further messages go to the group.
     fn lose(&mut self, now: Instant, destination: JausId) {
         let is_datagram = |path: Path| self.framing(path.link) == Framing::Judp;
         if let Some(since) = now.checked_sub(self.config.acknowledge_patience)
@@ -346,7 +349,7 @@ impl Endpoint {
         }
     }
 
-    /// Takes the answer to a message of ours.
+    /// Processes an acknowledgement of one of our messages.
     pub(super) fn receive_answer(&mut self, now: Instant, frame: &Frame) -> Result<(), Counter> {
         let (destination, source) = (frame.source, frame.destination);
         let flow = self
@@ -421,7 +424,7 @@ impl Endpoint {
         }
     }
 
-    /// Sends again what was not acknowledged in time, or gives up.
+    /// Retransmits unacknowledged packets whose timeout has passed, or gives their messages up.
     pub(super) fn retry_unacknowledged(&mut self, now: Instant) {
         while let Some(destination) = self.deliveries.take_due(now) {
             let Some(flow) = self.deliveries.flows.get_mut(&destination) else {

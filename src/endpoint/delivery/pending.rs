@@ -1,4 +1,4 @@
-//! A message on its way, and the packets that it is sent in.
+//! A message in delivery, and the packets that carry it.
 
 use std::time::Instant;
 
@@ -9,33 +9,33 @@ use crate::endpoint::Outgoing;
 use crate::endpoint::large::Cut;
 use crate::wire::{Acknowledgement, Broadcast, Flags, Frame, Priority, Version};
 
-/// A message that waits to be sent or acknowledged.
+/// A message that is queued or unacknowledged.
 #[derive(Debug)]
 pub(super) struct PendingMessage {
     pub(super) source: JausId,
     pub(super) priority: Priority,
     pub(super) broadcast: Broadcast,
     pub(super) payload: Bytes,
-    /// Whether the sender wants to be told the result.
+    /// Whether the sender wants the result reported.
     pub(super) awaited: bool,
-    /// When it was handed in.
+    /// When it was queued.
     pub(super) accepted: Instant,
-    /// How it was cut, once the first of it was sent.
+    /// How it was cut, once its first packet is sent.
     pub(super) started: Option<Started>,
-    /// Octets that were acknowledged.
+    /// Octets acknowledged so far.
     pub(super) acknowledged: usize,
 }
 
-/// What is known of a message once the first of it was sent.
+/// The state of a message whose first packet is sent.
 #[derive(Debug)]
 pub(super) struct Started {
     pub(super) cut: Cut,
     pub(super) version: Version,
     /// The serial number of the first fragment.
     pub(super) first: u64,
-    /// The first fragment that was never sent.
+    /// The first fragment not sent yet.
     pub(super) next: usize,
-    /// How many fragments were not acknowledged yet.
+    /// How many fragments are unacknowledged.
     pub(super) missing: usize,
 }
 
@@ -53,7 +53,7 @@ impl PendingMessage {
         }
     }
 
-    /// The frame that carries a fragment; without its destination.
+    /// The frame that carries a fragment, without its destination.
     pub(super) fn frame(&self, index: usize) -> Option<Frame> {
         let started = self.started.as_ref()?;
         let (data, payload) = started.cut.fragment(&self.payload, index);

@@ -1,24 +1,24 @@
-//! How long a destination takes to answer, and hence how long to wait before sending again
-//! (after RFC 6298).
+//! Round trip measurement and the retransmission timeout that follows from it (after RFC 6298).
 
 use std::time::Duration;
 
-/// Before the first measurement: what Junior waits.
+/// The timeout before the first measurement, which is Junior's.
 const UNMEASURED: Duration = Duration::from_millis(100);
-/// Timers have a granularity of a millisecond, and a busy board answers some milliseconds late.
+/// The shortest timeout: timers have a granularity of a millisecond, and a busy board answers some
+/// milliseconds late.
 const LEAST: Duration = Duration::from_millis(10);
-/// By so much do answers differ where nothing queues up.
+/// Round trips vary by this much even without queueing.
 const GRANULARITY: Duration = Duration::from_micros(500);
-/// What is added to the smoothed time at the least.
+/// The least margin over the smoothed round trip.
 const LEAST_VARIATION: Duration = Duration::from_millis(5);
-/// Also with back-off no longer than this.
+/// The longest timeout, back-off included.
 const MOST: Duration = Duration::from_secs(2);
 
 /// The measured round trip to one destination.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct RoundTrip {
     measured: Option<Measured>,
-    /// How often the time to wait was doubled since the last measurement.
+    /// How often the timeout was doubled since the last measurement.
     doublings: u32,
 }
 
@@ -30,8 +30,8 @@ struct Measured {
 }
 
 impl RoundTrip {
-    /// Takes a measurement of something that was sent once: after a repetition nobody knows which
-    /// of the two was answered (Karn).
+    /// Records the round trip of a packet that was sent once. After a retransmission, an
+    /// acknowledgement could belong to either copy (Karn).
     pub(super) fn measure(&mut self, time: Duration) {
         self.doublings = 0;
         let Some(known) = &mut self.measured else {
@@ -47,23 +47,24 @@ impl RoundTrip {
         known.shortest = known.shortest.min(time);
     }
 
-    /// Nothing was answered in time.
+    /// Doubles the timeout after it has passed without an acknowledgement.
     pub(super) fn back_off(&mut self) {
         self.doublings = (self.doublings + 1).min(8);
     }
 
-    /// Something new is sent after a pause: what was not answered long ago says nothing.
+    /// Resets the back-off when traffic resumes after a pause: old timeouts say nothing about now.
     pub(super) fn restart(&mut self) {
         self.doublings = 0;
     }
 
-    /// Whether answers take so much longer than the fastest one that packets must queue up somewhere.
+    /// Whether round trips exceed the shortest one by so much that packets must be queueing
+    /// somewhere.
     pub(super) fn has_grown(&self) -> bool {
         self.measured
             .is_none_or(|known| known.smoothed > known.shortest * 3 / 2 + GRANULARITY)
     }
 
-    /// How long to wait for an answer before sending again.
+    /// The retransmission timeout.
     pub(super) fn timeout(&self) -> Duration {
         let once = self.measured.map_or(UNMEASURED, |known| {
             let variation = (known.variation * 4).max(LEAST_VARIATION);
@@ -72,12 +73,12 @@ impl RoundTrip {
         (once * (1 << self.doublings)).min(MOST)
     }
 
-    /// The smoothed round trip, if it was measured.
+    /// The smoothed round trip, if measured.
     pub(super) fn smoothed(&self) -> Option<Duration> {
         self.measured.map(|known| known.smoothed)
     }
 
-    /// The shortest round trip ever measured.
+    /// The shortest round trip measured so far.
     pub(super) fn shortest(&self) -> Option<Duration> {
         self.measured.map(|known| known.shortest)
     }

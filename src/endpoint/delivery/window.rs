@@ -1,20 +1,20 @@
-//! How many packets may be on their way to one destination: slow start, then additive increase and
-//! multiplicative decrease, counted in packets.
+//! The congestion window of one destination, counted in packets: slow start, then additive increase
+//! and multiplicative decrease.
 //!
-//! What a receiver can take is nowhere stated and so found by loss: Junior takes ten datagrams a
-//! millisecond from a buffer that holds some twenty of its full ones, a node on a slow line less, a
-//! node on the same host some hundreds.
+//! No receiver announces what it can take, so the window finds out by loss: Junior reads ten
+//! datagrams per millisecond from a buffer that holds some twenty of its full ones, a node on a
+//! slow line less, a node on the same host some hundreds.
 //!
-//! A radio loses packets at random, and a smaller window does not help. So a loss shrinks the window
-//! only if the round trip has grown, because packets queue up somewhere, or if a large share of a
-//! window was lost.
+//! A radio loses packets at random, and a smaller window does not help. So a loss shrinks the
+//! window only if the round trip has grown, because packets are queueing somewhere, or if a large
+//! share of a window was lost.
 
-/// Fewer are never allowed: a window of one would wait for the timer after each loss.
+/// The smallest window: with one packet, every loss would wait for the timeout.
 const LEAST: usize = 2;
 
-/// A larger share of losses, in percent, is not chance.
+/// A higher loss rate, in percent, is not random.
 const MOST_LOST: usize = 20;
-/// Losses are counted over a window, and over no fewer packets than this.
+/// Losses are counted over one window, but over at least this many packets.
 const LEAST_COUNT: usize = 64;
 
 /// The window of one destination.
@@ -23,19 +23,19 @@ pub(super) struct Window {
     packets: usize,
     initial: usize,
     most: usize,
-    /// Above this growth is slow.
+    /// Growth is slow above this.
     threshold: usize,
-    /// Answers since the last step of slow growth.
+    /// Acknowledgements since the last step of slow growth.
     answered: usize,
-    /// What was sent before this belongs to a loss that has been reacted to.
+    /// Packets sent before this one belong to a loss already handled.
     recovery: u64,
-    /// Where the next count of losses begins.
+    /// The packet with which the next loss count begins.
     next_count: u64,
     losses: usize,
 }
 
 impl Window {
-    /// A window that begins with `initial` packets and never has more than `most`.
+    /// Creates a window of `initial` packets that never exceeds `most`.
     pub(super) fn new(initial: usize, most: usize) -> Self {
         let most = most.max(LEAST);
         let initial = initial.clamp(LEAST, most);
@@ -51,15 +51,15 @@ impl Window {
         }
     }
 
-    /// How many packets may be on their way.
+    /// How many packets may be in flight.
     pub(super) fn packets(&self) -> usize {
         self.packets
     }
 
-    /// A packet that was the `order`th sent was answered while `in_flight` were on their way.
+    /// Handles the acknowledgement of the `order`th packet sent, while `in_flight` were in flight.
     pub(super) fn grow(&mut self, order: u64, in_flight: usize) {
         self.begin_count(order);
-        // A window that is not made use of proves nothing.
+        // An unused window proves nothing.
         if order < self.recovery || in_flight * 2 < self.packets {
             return;
         }
@@ -70,8 +70,8 @@ impl Window {
         }
     }
 
-    /// The packet that was the `order`th sent was lost, and `sent` were sent so far, while packets
-    /// queued up or not. Losses in one round trip count once.
+    /// Handles the loss of the `order`th packet sent, after `sent` packets in total; `is_queued`
+    /// says whether packets are queueing. Losses within one round trip count once.
     pub(super) fn lose(&mut self, order: u64, sent: u64, is_queued: bool) {
         self.begin_count(order);
         self.losses += 1;
@@ -97,8 +97,8 @@ impl Window {
         self.packets.max(LEAST_COUNT)
     }
 
-    /// Nothing was answered in time: begins anew, and grows fast to half of what it was, if that had
-    /// ever been answered.
+    /// Restarts from the smallest window after a timeout. If `has_proven`, because acknowledgements
+    /// have arrived before, growth is fast up to half the former size.
     pub(super) fn collapse(&mut self, sent: u64, has_proven: bool) {
         if has_proven && self.packets > LEAST {
             self.threshold = (self.packets / 2).max(LEAST);
@@ -108,7 +108,7 @@ impl Window {
         self.answered = 0;
     }
 
-    /// Nothing was sent for a while, so what was found out is stale.
+    /// Falls back to the initial window after a pause: the measured size is out of date.
     pub(super) fn rest(&mut self) {
         self.threshold = self.threshold.max(self.packets);
         self.packets = self.packets.min(self.initial);

@@ -1,8 +1,9 @@
-//! Large messages without acknowledgement: their fragments leave no faster than receivers can take
-//! them, because nobody would send again what overflows a receive buffer.
+//! Pacing of large messages without acknowledgement: fragments leave no faster than receivers can
+//! take them, because a fragment lost to a full receive buffer is not retransmitted.
 //!
-//! What is counted is not octets but what a datagram occupies in a Linux receive buffer, which is a
-//! good deal more: the kernel charges the whole allocation, a power of two, and its own bookkeeping.
+//! The unit is not payload octets but the space that a datagram occupies in a Linux receive buffer,
+//! which is a good deal more: the kernel charges the whole allocation, a power of two, plus its own
+//! bookkeeping.
 
 use std::time::{Duration, Instant};
 
@@ -11,25 +12,25 @@ use crate::endpoint::rate::Bucket;
 use crate::peer::Intake;
 use crate::wire::{Frame, Priority, Version};
 
-/// Headers in front of a datagram and the kernel's notes behind it.
+/// Headers before a datagram and kernel metadata after it.
 const ENVELOPE: usize = 384;
-/// The kernel's description of a datagram.
+/// The kernel's descriptor of a datagram.
 const DESCRIPTION: usize = 256;
 
-/// How fast the fragments of unacknowledged large messages may leave towards one other end.
+/// The rate limit for fragments of unacknowledged large messages to one remote end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pacing {
-    /// Octets of a receive buffer that may be filled at once.
+    /// Octets of the receive buffer that may be filled at once.
     pub burst: usize,
-    /// Octets of a receive buffer that are taken to be emptied each second.
+    /// Octets of the receive buffer assumed to be emptied per second.
     pub rate: u64,
 }
 
 impl Default for Pacing {
-    /// A burst fits Linux's default receive buffer of 212992 octets and leaves a tenth to others:
-    /// a datagram of 1440 octets occupies 2304 of it, so a message of 100 KiB, in 72 fragments of
-    /// the default length, 165888. The rate is that of a gigabit line, 125 MB a second in such
-    /// datagrams.
+    /// The burst fits Linux's default receive buffer of 212992 octets and leaves a tenth to other
+    /// senders. A datagram of 1440 octets occupies 2304 of it, so a message of 100 KiB, in 72
+    /// fragments of the default length, occupies 165888. The rate is that of a gigabit link: 125 MB
+    /// per second in such datagrams.
     fn default() -> Self {
         Self {
             burst: 192_000,
@@ -39,7 +40,7 @@ impl Default for Pacing {
 }
 
 impl Pacing {
-    /// The same for a receiver that takes less.
+    /// The pacing for a receiver with less capacity.
     pub(in crate::endpoint) fn within(self, intake: Intake) -> Self {
         Self {
             burst: self.burst.min(intake.burst),
@@ -47,8 +48,8 @@ impl Pacing {
         }
     }
 
-    /// Takes room for one datagram, the last one perhaps beyond the burst; or tells how long to wait
-    /// for room.
+    /// Reserves room for one datagram, which may overrun the burst; or returns how long to wait for
+    /// room.
     pub(super) fn take(
         self,
         bucket: &mut Bucket,
@@ -58,35 +59,35 @@ impl Pacing {
         let burst = self.time_for(self.burst as u64);
         let excess = bucket.debt(now).saturating_sub(burst);
         if !excess.is_zero() {
-            // Not for each datagram: timers are coarse.
+            // Not per datagram: timers are coarse.
             return Err(excess + burst / 4);
         }
         bucket.spend(now, self.time_for(occupied(datagram)));
         Ok(())
     }
 
-    /// How long it takes to make room for so much.
+    /// How long it takes to free this much room.
     fn time_for(self, octets: u64) -> Duration {
         Duration::from_nanos(octets.saturating_mul(1_000_000_000) / self.rate.max(1))
     }
 }
 
-/// What a datagram occupies in the receive buffer.
+/// The space that a datagram occupies in the receive buffer.
 const fn occupied(datagram: usize) -> u64 {
     ((datagram + ENVELOPE).next_power_of_two() + DESCRIPTION) as u64
 }
 
-/// A large message of which fragments are to be sent.
+/// A large message that is being sent in fragments.
 #[derive(Clone, Debug)]
 pub(in crate::endpoint) struct FragmentedSend {
-    /// All of it, without data control.
+    /// The whole message, without data control.
     whole: Frame,
     cut: Cut,
     /// The serial number of the first fragment.
     first: u64,
     /// The next fragment.
     next: usize,
-    /// How fast its fragments may leave; `None` for as fast as the link takes them.
+    /// The pacing of its fragments; `None` sends as fast as the link accepts them.
     pub(super) pacing: Option<Pacing>,
 }
 
@@ -121,28 +122,28 @@ impl FragmentedSend {
         }
     }
 
-    /// The next fragment is on its way; whether it was the last.
+    /// Marks the next fragment as sent; returns whether it was the last.
     pub(super) fn advance(&mut self) -> bool {
         self.next += 1;
         self.next == self.cut.count()
     }
 
-    /// Whether the next fragment has that header and no more octets.
+    /// Whether the next fragment has that header and is not longer.
     pub(super) fn continues(&self, (version, octets): (Version, usize)) -> bool {
         self.whole.version == version && self.next_len() <= octets
     }
 
-    /// The octets of the next fragment.
+    /// The length of the next fragment, in octets.
     pub(super) fn next_len(&self) -> usize {
         self.cut.fragment_len(self.next)
     }
 
-    /// How many fragments wait.
+    /// How many fragments are left.
     pub(super) fn fragments(&self) -> usize {
         self.cut.count() - self.next
     }
 
-    /// The octets of the fragments that wait.
+    /// The octets of the fragments that are left.
     pub(super) fn remaining(&self) -> usize {
         (self.next..self.cut.count())
             .map(|index| self.cut.fragment_len(index))

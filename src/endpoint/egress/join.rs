@@ -1,4 +1,4 @@
-//! Several messages in one datagram, and several datagrams with one call.
+//! Packs several messages into one datagram, and several datagrams into one batch.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -11,13 +11,13 @@ use crate::endpoint::recent::Recent;
 use crate::endpoint::{Counter, Counters};
 use crate::wire::{EncodeError, Frame, Framing, Priority, as5669a, judp};
 
-/// What fragments leave with.
+/// The context in which fragments are sent.
 pub(super) struct Fragments<'a> {
     pub(super) now: Instant,
     pub(super) framing: Framing,
-    /// Where to remember them, if they go to a group.
+    /// Where to record them, if they go to a group.
     pub(super) echoes: Option<&'a mut Recent>,
-    /// The octets of all that wait.
+    /// The total of octets in queued fragments.
     pub(super) octets: &'a mut usize,
     pub(super) counters: &'a mut Counters,
 }
@@ -32,8 +32,9 @@ impl Fragments<'_> {
 }
 
 impl HopQueue {
-    /// The first message that waits, with others in the same datagram of up to `longest` octets, and
-    /// with further datagrams, of which only the last may be shorter; and their length.
+    /// The first queued message, packed with others into a datagram of up to `longest` octets, and
+    /// followed by further datagrams of the same length, of which only the last may be shorter.
+    /// Returns the octets and that length.
     pub(super) fn join_messages(
         &mut self,
         level: Level,
@@ -43,7 +44,7 @@ impl HopQueue {
     ) -> Option<(Bytes, Option<usize>)> {
         let priority = usize::from(level.priority().bits());
         let mut joined = Joined::new(self.whole[priority].pop_front()?, buffer);
-        // Less urgent messages use the room that is left, but keep nothing safety-critical waiting.
+        // Less urgent messages use the remaining room, but must not delay a safety-critical one.
         let least = if level.priority() == Priority::SafetyCritical {
             priority
         } else {
@@ -67,7 +68,7 @@ impl HopQueue {
         Some((joined.finish(), segment))
     }
 
-    /// The next fragment that may leave, with others of the same length.
+    /// The next fragment that may be sent, batched with others of the same length.
     pub(super) fn join_fragments(
         &mut self,
         level: Level,
@@ -103,10 +104,10 @@ impl HopQueue {
     }
 }
 
-/// Octets that leave together. One message alone stays where it is.
+/// Octets sent together. A single message is not copied.
 struct Joined<'a> {
     first: Bytes,
-    /// All of them, once there is more than the first.
+    /// All of the octets, once there is more than the first message.
     buffer: &'a mut BytesMut,
 }
 
@@ -135,7 +136,7 @@ impl<'a> Joined<'a> {
         judp::emit(frame, self.buffer)
     }
 
-    /// Puts messages that wait, the most urgent first, into the datagram that begins at `start`, up
+    /// Packs queued messages, the most urgent first, into the datagram that begins at `start`, up
     /// to `longest` octets.
     fn pack(&mut self, start: usize, queues: &mut [VecDeque<Bytes>], longest: usize) {
         let datagram = if start == 0 {
@@ -146,7 +147,7 @@ impl<'a> Joined<'a> {
         if !may_pack(datagram, longest) {
             return;
         }
-        // A message without its version octet.
+        // A packed message lacks its version octet.
         let room = |joined: &Self| 1 + longest - (joined.len() - start);
         for queue in queues.iter_mut().rev() {
             while let Some(next) =
@@ -174,12 +175,12 @@ fn pop_if(queue: &mut VecDeque<Bytes>, is_wanted: impl FnOnce(&Bytes) -> bool) -
     }
 }
 
-/// Whether another message fits behind a datagram with today's header.
+/// Whether another message fits after a datagram with the AS5669A header.
 pub(super) fn may_pack(datagram: &[u8], longest: usize) -> bool {
     has_current_header(datagram) && datagram.len() + as5669a::MIN_LEN <= longest
 }
 
-/// Whether a datagram has today's header, AS5669A's.
+/// Whether a datagram has the AS5669A header.
 fn has_current_header(datagram: &[u8]) -> bool {
     datagram.first() == Some(&judp::VERSION_AS5669A)
 }

@@ -1,10 +1,10 @@
 //! Outgoing datagrams: one queue per link and remote, by priority.
 //!
-//! One [dequeue](Egress::dequeue) serves them all. It takes the most urgent datagram, packs further
-//! small messages to the same place into it, and puts further datagrams of the same length behind
-//! it where the link sends several with one call. Nothing leaves a queue that does not leave with
-//! the datagram. Octets are written to a buffer that is used again as soon as they are sent, so a
-//! small message allocates nothing.
+//! One [dequeue](Egress::dequeue) serves all queues. It takes the most urgent datagram, packs
+//! further small messages to the same hop into it, and appends further datagrams of the same length
+//! if the link sends batches. A message leaves its queue only with the datagram that carries it.
+//! Octets are written to a buffer that is reused as soon as they are sent, so a small message
+//! allocates nothing.
 
 mod fragmented;
 mod join;
@@ -25,15 +25,15 @@ use join::{Fragments, may_pack};
 use queue::HopQueue;
 pub(super) use queue::Level;
 
-/// What the kernel takes at once, whatever the number of datagrams; a little less than it says,
-/// for IPv6's longer headers.
+/// The most octets that the kernel accepts in one call, whatever the number of datagrams; slightly
+/// less than it states, to allow for IPv6's longer headers.
 pub(crate) const MOST_OCTETS: usize = 65_000;
-/// The octets that the buffer is made for. While one datagram of it waits in a link, so do they.
+/// The capacity of the buffer. While a link holds one datagram of it, all of it stays allocated.
 const BUFFER: usize = 16 << 10;
-/// Queues that are kept, empty, for what is sent next.
+/// How many idle queues are kept for later use.
 const IDLE_QUEUES: usize = 128;
 
-/// The other end of a link, or all of them.
+/// A next hop: the remote end of a link, or its group.
 pub(super) type Hop = (LinkId, To);
 
 impl From<Path> for Hop {
@@ -44,35 +44,36 @@ impl From<Path> for Hop {
 
 /// Whether small messages to the same address share a datagram.
 ///
-/// Only messages with today's header do. Junior and JAUS++ read several in a datagram, and neither
-/// ever sends more than one.
+/// Only messages with the AS5669A header do. Junior and JAUS++ read several messages per datagram,
+/// but never send more than one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Packing {
-    /// Each message has a datagram of its own.
+    /// Each message gets its own datagram.
     #[default]
     Off,
-    /// Messages wait up to so long for others to the same address, a safety-critical one not at
-    /// all. With zero, those share a datagram that wait anyway when the link takes the next.
+    /// Messages wait up to this long for others to the same address; safety-critical ones do not
+    /// wait. With zero, only messages that are queued anyway when the link takes the next datagram
+    /// share one.
     Within(Duration),
 }
 
-/// The links, and what waits to be sent on them.
+/// The links and their queues.
 #[derive(Debug)]
 pub(super) struct Egress {
     links: BTreeMap<LinkId, LinkProfile>,
     queues: Queues,
     turns: Turns,
-    /// Datagrams that wait, by priority, without fragments.
+    /// Queued datagrams, by priority, without fragments.
     waiting: [usize; Priority::ALL.len()],
-    /// Octets of messages of which fragments wait.
+    /// Octets of messages in queued fragments.
     fragmented: usize,
     buffer: BytesMut,
-    /// What went to a group, and may come back.
+    /// Messages sent to a group, which may come back.
     echoes: Recent,
     echo_window: Duration,
-    /// How long messages wait for others, unless they do not.
+    /// How long messages wait to be packed; `None` if they do not.
     patience: Option<Duration>,
-    /// The longest datagram that messages are packed into; 0 if they are not.
+    /// The longest datagram to pack messages into; 0 if packing is off.
     longest_packed: usize,
     queue_limit: usize,
     max_fragmented: usize,
@@ -107,7 +108,7 @@ impl Egress {
         self.links.insert(link, profile);
     }
 
-    /// Removes a link; how many datagrams waited to be sent on it.
+    /// Removes a link; returns how many datagrams were queued on it.
     pub(super) fn remove_link(&mut self, link: LinkId) -> u64 {
         self.links.remove(&link);
         self.turns.forget(|hop| hop.0 == link);
@@ -132,34 +133,35 @@ impl Egress {
         self.links.contains_key(&link)
     }
 
-    /// How a link frames messages.
+    /// The framing of a link.
     pub(super) fn framing(&self, link: LinkId) -> Framing {
         let profile = self.links.get(&link);
         profile.map_or(Framing::default(), |profile| profile.framing)
     }
 
-    /// How many queues there are.
+    /// The number of queues.
     #[cfg(test)]
     pub(super) fn len(&self) -> usize {
         self.queues.known.len()
     }
 
-    /// Whether so many more datagrams of a priority fit.
+    /// Whether `count` more datagrams of a priority fit.
     pub(super) fn has_room(&self, priority: Priority, count: usize) -> bool {
         self.waiting[usize::from(priority.bits())] + count <= self.queue_limit
     }
 
-    /// Whether messages of that length fit that leave in fragments; the first always does.
+    /// Whether fragmented messages of that length fit; the first always does.
     pub(super) fn has_room_for_fragments(&self, octets: usize) -> bool {
         self.fragmented == 0 || self.fragmented + octets <= self.max_fragmented
     }
 
-    /// The octets that carry a frame on a link, with the frame's own header.
+    /// Encodes a frame for a link, with the frame's own header.
     pub(super) fn encode(&mut self, link: LinkId, frame: &Frame) -> Result<Bytes, EncodeError> {
         encode(self.framing(link), &mut self.buffer, frame)
     }
 
-    /// Queues a datagram with a message of these flags, or tells why it cannot be.
+    /// Queues a datagram that carries a message with these flags, or returns why it cannot be
+    /// queued.
     pub(super) fn push(
         &mut self,
         now: Instant,
@@ -174,7 +176,7 @@ impl Egress {
         if !self.has_room(priority, 1) {
             return Err(Counter::TransmitQueueFull);
         }
-        // Its sender waits for the answer.
+        // A sender waits for the answer, so do not delay the message.
         let is_awaited = flags.acknowledgement() == Acknowledgement::Request;
         let may_wait = !is_awaited && may_pack(&octets, self.longest_packed);
         let patience = self.patience.filter(|_| may_wait);
@@ -188,8 +190,7 @@ impl Egress {
         Ok(())
     }
 
-    /// Queues a message to several places, encoded once for each framing. What is not queued is
-    /// counted.
+    /// Queues a message for several hops, encoded once per framing. Failures are counted.
     pub(super) fn push_to_many(
         &mut self,
         now: Instant,
@@ -215,7 +216,7 @@ impl Egress {
         Ok(())
     }
 
-    /// Queues a message that leaves in fragments, if there is a link.
+    /// Queues a fragmented message, if the link exists.
     pub(super) fn push_fragmented(
         &mut self,
         now: Instant,
@@ -232,17 +233,17 @@ impl Egress {
         Ok(())
     }
 
-    /// Remembers a message of ours that goes to a group.
+    /// Records a message of ours that goes to a group.
     pub(super) fn remember_echo(&mut self, now: Instant, frame: &Frame) {
         self.echoes.insert(now, self.echoes.fingerprint(frame));
     }
 
-    /// Whether that went to a group lately.
+    /// Whether that message was recently sent to a group.
     pub(super) fn is_echo(&self, now: Instant, seen: &Fingerprint) -> bool {
         self.echoes.contains(now, seen, self.echo_window)
     }
 
-    /// The next datagram of a level, with what leaves together with it.
+    /// The next datagram of a level, with everything packed or batched with it.
     pub(super) fn dequeue(
         &mut self,
         now: Instant,
@@ -293,7 +294,7 @@ impl Egress {
         None
     }
 
-    /// Lets those go on that have waited long enough.
+    /// Releases queues whose hold or pacing time has passed.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         while let Some(hop) = self.turns.next_due(now) {
             let queue = self.queues.get(now, hop);
@@ -308,11 +309,11 @@ impl Egress {
     }
 }
 
-/// The queues, of which idle ones are kept for what is sent next.
+/// The queues; idle ones are kept for later use.
 #[derive(Debug, Default)]
 struct Queues {
     known: HashMap<Hop, HopQueue>,
-    /// How many there were when the idle ones were forgotten.
+    /// How many queues there were after the last sweep of idle ones.
     swept: usize,
 }
 
@@ -326,18 +327,17 @@ impl Queues {
     }
 }
 
-/// Whose turn it is, and when.
+/// The schedule of the queues.
 #[derive(Debug, Default)]
 struct Turns {
-    /// Queues that have something to send, by level; each stands in a list at most once.
+    /// Queues with something to send, by level; each is in a list at most once.
     ready: [VecDeque<Hop>; Level::COUNT],
-    /// When what is held, or paced, may go on.
+    /// When held or paced queues may continue.
     timers: BTreeSet<(Instant, Hop)>,
 }
 
 impl Turns {
-    /// Sees to it that a queue has its turn if it has something to send, and its timer if that must
-    /// wait.
+    /// Schedules a queue: its turns if it has something to send, its timer if that must wait.
     fn list(&mut self, hop: Hop, queue: &mut HopQueue, longest_packed: usize) {
         for level in queue.list(longest_packed) {
             self.ready[level.index()].push_back(hop);
@@ -378,7 +378,7 @@ fn encode(framing: Framing, buffer: &mut BytesMut, frame: &Frame) -> Result<Byte
             judp::emit(frame, buffer)?;
             Ok(buffer.split().freeze())
         }
-        // A slow stream keeps what it has not sent, and shall not keep the whole buffer.
+        // A slow stream keeps unsent octets, and must not keep the whole buffer alive.
         stream => stream.encode(frame),
     }
 }

@@ -1,4 +1,4 @@
-//! What waits to be sent to one other end of a link.
+//! The egress queue of one hop: a remote end of a link, or its group.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -11,7 +11,7 @@ use crate::wire::{Frame, Priority, Version};
 
 const PRIORITIES: usize = Priority::ALL.len();
 
-/// What is sent in one turn: fragments of a priority, or whole messages.
+/// The unit of scheduling: the fragments or the whole messages of one priority.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::endpoint) struct Level(usize);
 
@@ -43,24 +43,24 @@ impl Level {
     }
 }
 
-/// What waits to be sent to one other end of a link, by priority.
+/// The datagrams and fragments queued for one hop, by priority.
 #[derive(Debug, Default)]
 pub(super) struct HopQueue {
     pub(super) whole: [VecDeque<Bytes>; PRIORITIES],
     fragmented: [VecDeque<FragmentedSend>; PRIORITIES],
-    /// By level, whether it stands in the list of those that have something to send.
+    /// By level, whether the queue is in the list of queues with something to send.
     listed: [bool; Level::COUNT],
-    /// Until when messages wait for others to share a datagram.
+    /// Until when messages wait to be packed with others.
     held_until: Option<Instant>,
-    /// How much of the receive buffer at the other end its fragments fill.
+    /// How far its fragments fill the remote receive buffer.
     bucket: Bucket,
-    /// Until when there is no room for fragments.
+    /// Until when the remote receive buffer has no room for fragments.
     blocked_until: Option<Instant>,
 }
 
 impl HopQueue {
-    /// Queues a datagram. If others may join it, it waits for them until `held_until`, or until what
-    /// waits already is due; else nothing waits any longer.
+    /// Queues a datagram. If it may be packed, it waits for others until `held_until`, or until the
+    /// time already set; otherwise the whole queue stops waiting.
     pub(super) fn push(&mut self, priority: Priority, octets: Bytes, held_until: Option<Instant>) {
         self.whole[usize::from(priority.bits())].push_back(octets);
         if priority != Priority::SafetyCritical {
@@ -73,7 +73,7 @@ impl HopQueue {
         self.fragmented[level].push_back(message);
     }
 
-    /// Whether something of a level can be sent, where datagrams are packed up to `longest` octets.
+    /// Whether a level has something to send, if datagrams are packed up to `longest` octets.
     pub(super) fn is_ready(&self, level: Level, longest: usize) -> bool {
         let priority = usize::from(level.priority().bits());
         if level.is_fragments() {
@@ -87,7 +87,7 @@ impl HopQueue {
                 || fills())
     }
 
-    /// The levels into whose lists it is to be put.
+    /// The levels in whose lists the queue must be entered.
     pub(super) fn list(&mut self, longest: usize) -> impl Iterator<Item = Level> + '_ {
         if self.whole.iter().all(VecDeque::is_empty) {
             self.held_until = None;
@@ -99,13 +99,13 @@ impl HopQueue {
         })
     }
 
-    /// Notes that it was taken from the list of a level.
+    /// Records that the queue was taken from the list of a level.
     pub(super) fn take_turn(&mut self, level: Level) {
         self.listed[level.index()] = false;
     }
 
-    /// The next fragment, if there is room for it and it has no other header and no more octets than
-    /// those before it.
+    /// The next fragment, if there is room for it, its header is the same, and it is not longer
+    /// than those before it.
     pub(super) fn next_fragment(
         &mut self,
         now: Instant,
@@ -130,7 +130,7 @@ impl HopQueue {
         Some(frame)
     }
 
-    /// When what is held, and fragments for which there is no room, may go on.
+    /// When held messages and blocked fragments may continue.
     pub(super) fn deadlines(&self) -> impl Iterator<Item = Instant> {
         [self.held_until, self.blocked_until].into_iter().flatten()
     }
@@ -140,12 +140,12 @@ impl HopQueue {
         self.blocked_until.take_if(|until| *until <= now);
     }
 
-    /// How many datagrams wait, by priority, without fragments.
+    /// How many datagrams are queued, by priority, without fragments.
     pub(super) fn waiting(&self) -> [usize; PRIORITIES] {
         self.whole.each_ref().map(VecDeque::len)
     }
 
-    /// How many fragments wait, and their octets.
+    /// How many fragments are queued, and their octets.
     pub(super) fn fragments(&self) -> (usize, usize) {
         let messages = self.fragmented.iter().flatten();
         messages.fold((0, 0), |(count, octets), message| {
@@ -153,7 +153,7 @@ impl HopQueue {
         })
     }
 
-    /// Whether it can be dropped without loss.
+    /// Whether the queue can be dropped without losing anything.
     pub(super) fn is_idle(&self, now: Instant) -> bool {
         self.waiting() == [0; PRIORITIES] && self.fragments().0 == 0 && self.bucket.is_full(now)
     }

@@ -1,9 +1,9 @@
-//! Large messages: cut into fragments when sent, put together when received.
+//! Large messages: fragmentation when sending, reassembly when receiving.
 //!
-//! A fragment is a message of its own with the next sequence number and the data control first,
-//! middle or last. With AS5669A the message code stands only at the beginning of the first (Junior
-//! does the same); the older headers name it with each fragment, and JAUS++ repeats it in the
-//! payload of each.
+//! Each fragment is a message of its own with the next sequence number and the data control first,
+//! middle or last. In AS5669A only the first fragment begins with the message code (as in Junior).
+//! The older headers name the code with each fragment, and JAUS++ repeats it in the payload of
+//! each.
 
 mod reassembly;
 mod split;

@@ -1,12 +1,12 @@
-//! Putting fragments together. They may come in any order.
+//! Reassembly of fragments, which may arrive in any order.
 //!
-//! Fragments with consecutive numbers form runs; a run with both ends is the message. The pieces
-//! stay where they were received and are joined once, at the end. Numbers go round, so "before" and
-//! "after" are neighbours on a circle, and what has not grown while the sender went on by a quarter
-//! of it is stale: its numbers are about to be used again.
+//! Fragments with consecutive numbers form runs; a run with both ends is a complete message. The
+//! pieces stay where they were received and are joined once, at the end. Sequence numbers wrap
+//! around, so "before" and "after" are neighbours on a circle. A run that has not grown while the
+//! sender advanced by a quarter of the circle is stale: its numbers are about to be reused.
 //!
-//! What is kept of unfinished messages is bounded in octets (with what keeping a piece costs), per
-//! sender and in all, and in time. The oldest runs go first.
+//! Unfinished messages are bounded in octets (including an overhead per piece), per sender and in
+//! total, and in time. The oldest runs are dropped first.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -21,23 +21,23 @@ use crate::endpoint::{Config, Counter, Counters};
 use crate::peer::LargeStyle;
 use crate::wire::{Acknowledgement, DataControl, Frame, Priority, Version, ra};
 
-/// What a piece costs beside its octets.
+/// The overhead of a piece, in octets.
 const PIECE_COST: usize = 64;
-/// What a run costs beside its pieces.
+/// The overhead of a run, in octets.
 const RUN_COST: usize = 256;
-/// The most runs of one sender; one that loses every second fragment has so many in 2048.
+/// The most runs of one sender; a sender that loses every second fragment has this many in 2048.
 const MAX_RUNS: usize = 1024;
-/// The most runs of one sender that are looked at because a number follows their last.
+/// The most runs of one sender that are checked because the given number is their last.
 const MOST_ENDING: usize = 8;
-/// What has not grown while the sender took so many numbers is stale.
+/// A run is stale if the sender has used this many numbers since it grew.
 const STALE: u64 = 1 << 14;
 
-/// A piece is copied if it holds on to more than so many times its length, so that it cannot keep
-/// a large datagram alive which was mostly about something else.
+/// A piece is copied if it keeps alive more than this many times its length, so that it does not
+/// retain a large datagram that consists mostly of other data.
 const MOST_HELD: usize = 4;
 
-/// What a fragment adds to its message. The older headers name the code with each fragment. The
-/// payload holds on to `held` octets.
+/// What a fragment contributes to its message: the older headers repeat the code in each fragment.
+/// The payload keeps `held` octets alive.
 fn part_of_message(frame: &Frame, held: usize) -> Bytes {
     let payload = match (frame.version, frame.flags.data()) {
         (Version::As5669a, _) | (_, DataControl::First) => frame.payload.clone(),
@@ -52,37 +52,37 @@ fn part_of_message(frame: &Frame, held: usize) -> Bytes {
     }
 }
 
-/// A message of which every fragment was received.
+/// A message whose fragments have all arrived.
 #[derive(Debug)]
 pub(in crate::endpoint) struct Whole {
     pub(in crate::endpoint) payload: Bytes,
-    /// How it was cut, if that can be told.
+    /// How it was cut, if that can be detected.
     pub(in crate::endpoint) style: LargeStyle,
-    /// The number of its first fragment, and what was in it.
+    /// The number and payload of its first fragment.
     pub(in crate::endpoint) first: (u16, Bytes),
 }
 
-/// What the fragments of one message have in common.
+/// The properties that all fragments of a message share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Kind {
     version: Version,
     priority: Priority,
 }
 
-/// Fragments with consecutive sequence numbers.
+/// A run of fragments with consecutive sequence numbers.
 #[derive(Debug)]
 struct Run {
     kind: Kind,
     last: u16,
-    /// Whether it begins with the message's first fragment.
+    /// Whether it includes the message's first fragment.
     begins: bool,
-    /// Whether it ends with the message's last fragment.
+    /// Whether it includes the message's last fragment.
     ends: bool,
     pieces: VecDeque<Bytes>,
     octets: usize,
-    /// When the latest of its fragments came.
+    /// When its latest fragment arrived.
     updated: Instant,
-    /// Where the sender was then.
+    /// The sender's position at that time.
     position: i64,
 }
 
@@ -91,14 +91,14 @@ impl Run {
         sequence.wrapping_sub(first) <= self.last.wrapping_sub(first)
     }
 
-    /// Whether it begins with the same first fragment, for which an acknowledgement is wanted.
+    /// Whether the frame requests an acknowledgement and repeats the first fragment of this run.
     fn is_begun_by(&self, frame: &Frame) -> bool {
         frame.flags.acknowledgement() == Acknowledgement::Request
             && self.begins
             && self.pieces.front() == Some(&frame.payload)
     }
 
-    /// The message, of which it has both ends; its sender may be known to cut in some style.
+    /// Joins a run that has both ends; `known` is the sender's style, if known.
     fn join(&self, known: Option<LargeStyle>) -> Whole {
         let (payload, style) = style::join(self.kind.version, &self.pieces, known);
         let after_first = (self.pieces.len() as u16).wrapping_sub(1);
@@ -114,7 +114,7 @@ impl Run {
         RUN_COST + self.pieces.len() * PIECE_COST + self.octets
     }
 
-    /// Puts what follows behind it.
+    /// Appends the run that follows.
     fn append(&mut self, mut next: Self) {
         if self.pieces.len() >= next.pieces.len() {
             self.pieces.append(&mut next.pieces);
@@ -131,27 +131,27 @@ impl Run {
     }
 }
 
-/// The place of a run: for whom, and the number of its first fragment.
+/// The key of a run: the destination, and the number of its first fragment.
 type Place = (JausId, u16);
 
 /// The unfinished messages of one sender.
 #[derive(Debug)]
 struct Sender {
     runs: BTreeMap<Place, Run>,
-    /// The same by age.
+    /// The runs by age.
     ages: BTreeSet<(Instant, Place)>,
-    /// The same by their last numbers.
+    /// The runs by their last numbers.
     ends: BTreeSet<(u16, Place)>,
-    /// Where it is.
+    /// Its network address.
     origin: Origin,
     cost: usize,
-    /// When one of its runs has grown last, or a fragment came again.
+    /// When one of its runs last grew, or a fragment was repeated.
     grown: Instant,
-    /// Whether a fragment was acknowledged.
+    /// Whether one of its fragments was acknowledged.
     acknowledged: bool,
-    /// The same, the last time that somebody looked.
+    /// The idle time under which the sender is listed; it may lag behind.
     listed: Instant,
-    /// The latest number, and how far it is from the first that was heard.
+    /// The latest number, and its distance from the first one.
     latest: u16,
     position: i64,
 }
@@ -178,7 +178,7 @@ impl Sender {
         self.position += i64::from(ahead);
     }
 
-    /// The place of the run that begins at the number or as the next one before it.
+    /// The run that begins at this number, or else the nearest one before it.
     fn at_or_before(&self, destination: JausId, sequence: u16) -> Option<Place> {
         let from = (destination, 0);
         let before = self.runs.range(from..=(destination, sequence)).next_back();
@@ -210,7 +210,7 @@ impl Sender {
         self.ages.first().copied()
     }
 
-    /// Puts a new fragment to its neighbours; gives the place of the run that it is in then.
+    /// Inserts a new fragment next to its neighbours; returns the key of the run that holds it.
     fn insert(&mut self, destination: JausId, first: u16, mut run: Run) -> Place {
         let (mut place, kind) = ((destination, first), run.kind);
         let before = self.at_or_before(destination, first.wrapping_sub(1));
@@ -242,24 +242,24 @@ impl Sender {
     }
 }
 
-/// What is kept of the senders at one network address.
+/// The share of the senders at one network address.
 #[derive(Debug, Default)]
 struct Share {
     cost: usize,
-    /// When something that wants an acknowledgement came from there last.
+    /// When a message that wants an acknowledgement last arrived from there.
     heard: Option<Instant>,
     /// As in [`Reassembly::listed`].
     listed: BTreeSet<(Instant, JausId)>,
 }
 
-/// The unfinished large messages.
+/// The reassembly buffer.
 #[derive(Debug)]
 pub(in crate::endpoint) struct Reassembly {
     senders: HashMap<JausId, Sender>,
-    /// The senders by since when they are idle, or earlier.
+    /// The senders by the time since which they are idle, or an earlier one.
     listed: BTreeSet<(Instant, JausId)>,
     cost: usize,
-    /// The share of each network address, and the addresses in the order of their shares.
+    /// The share of each network address, and the addresses ranked by their share.
     shares: HashMap<Origin, Share>,
     ranking: BTreeSet<(usize, Origin)>,
     max_message: usize,
@@ -283,9 +283,9 @@ impl Reassembly {
         }
     }
 
-    /// Takes a fragment of a sender that is known to cut in some style, and gives the message if it
-    /// is whole now. Its payload holds on to `held` octets of memory. What a bound makes it forget
-    /// is counted.
+    /// Adds a fragment; returns the message if it is complete. `style` is the sender's style, if
+    /// known. The payload keeps `held` octets of memory alive. Runs dropped to stay within bounds
+    /// are counted.
     pub(in crate::endpoint) fn insert(
         &mut self,
         Arrival {
@@ -325,7 +325,7 @@ impl Reassembly {
         }
     }
 
-    /// Takes note of a fragment that came again: its sender is still at it.
+    /// Records a repeated fragment: its sender is still active.
     pub(in crate::endpoint) fn keep(&mut self, now: Instant, frame: &Frame) {
         if frame.flags.data() != DataControl::Single
             && let Some(sender) = self.senders.get_mut(&frame.source)
@@ -334,16 +334,16 @@ impl Reassembly {
         }
     }
 
-    /// Notes that a message that wants an acknowledgement came from that network address.
+    /// Records that a message that wants an acknowledgement arrived from that network address.
     pub(in crate::endpoint) fn hear(&mut self, now: Instant, origin: Origin) {
         if let Some(share) = self.shares.get_mut(&origin) {
             share.heard = Some(now);
         }
     }
 
-    /// Since when a sender is idle. A sender never repeats acknowledged parts, and it pauses a large
-    /// message while its node has something more urgent for us, from any component. So parts that
-    /// were acknowledged count as active while such messages arrive from that address.
+    /// The time since which a sender is idle. A sender never repeats acknowledged fragments, and it
+    /// pauses a large message while its node, with any component, has something more urgent for us.
+    /// So acknowledged fragments count as active while such messages arrive from that address.
     fn idle_since(&self, sender: &Sender) -> Instant {
         let share = self.shares.get(&sender.origin);
         let heard = share.and_then(|share| share.heard);
@@ -351,8 +351,8 @@ impl Reassembly {
         heard.map_or(sender.grown, |heard| heard.max(sender.grown))
     }
 
-    /// Whether this fragment is the next one of a message that is being put together, and not in it
-    /// yet. Then it is none that was sent again: its sender has begun anew with the same numbers.
+    /// Whether this fragment is the next one of an unfinished message. In that case it is not a
+    /// retransmission: its sender has restarted with the same numbers.
     pub(in crate::endpoint) fn awaits(&self, frame: &Frame) -> bool {
         let continues = matches!(frame.flags.data(), DataControl::Middle | DataControl::Last);
         let number = frame.sequence.wrapping_sub(1);
@@ -363,10 +363,10 @@ impl Reassembly {
         continues && run.is_some_and(|run| run.begins && !run.ends && run.last == number)
     }
 
-    /// Takes the number of a whole message, and gives the large one before it, with its receiver
-    /// and priority, that has just lacked the mark of its end: JAUS++ gives the number of the last
-    /// fragment to the next message again. See
-    /// [`NoLastFragment`](crate::peer::Departure::NoLastFragment).
+    /// Finishes the large message whose end is shown by `number`, the sequence number of the next
+    /// whole message; returns it with its receiver and priority. JAUS++ does not mark the end of a
+    /// message that fills its fragments, and reuses the number of the last fragment for the next
+    /// message. See [`NoLastFragment`](crate::peer::Departure::NoLastFragment).
     pub(in crate::endpoint) fn finish(
         &mut self,
         source: JausId,
@@ -400,7 +400,7 @@ impl Reassembly {
         }
     }
 
-    /// Forgets the oldest runs, of this sender or of all, until all is within its bounds.
+    /// Drops the oldest runs, of this sender or of all, until all bounds are met.
     fn keep_within_bounds(&mut self, source: JausId, runs: usize, counters: &mut Counters) {
         if runs > MAX_RUNS {
             self.forget_oldest_of(source, counters);
@@ -420,13 +420,13 @@ impl Reassembly {
         }
     }
 
-    /// Of the network address that holds most, the sender that has not grown for longest.
+    /// The sender idle for longest, of the network address with the largest share.
     fn oldest_of_most(&self) -> Option<(Instant, JausId)> {
         let (_, origin) = self.ranking.last()?;
         self.shares.get(origin)?.listed.first().copied()
     }
 
-    /// What is kept of a sender has changed.
+    /// Updates the accounts when the cost of a sender has changed.
     fn account(&mut self, origin: Origin, before: usize, after: usize) {
         self.cost = self.cost + after - before;
         let share = self.shares.entry(origin).or_default();
@@ -441,7 +441,7 @@ impl Reassembly {
         share.listed.insert((listed, source));
     }
 
-    /// Takes a sender off the lists, and forgets the share of an address that is on none.
+    /// Removes a sender from the lists, and the share of its address if that is empty.
     fn strike(&mut self, origin: Origin, listed: Instant, source: JausId) {
         self.listed.remove(&(listed, source));
         if let Some(share) = self.shares.get_mut(&origin) {
@@ -465,7 +465,7 @@ impl Reassembly {
         self.list(source);
     }
 
-    /// Lists a sender by since when it is idle, or forgets it if it has no run.
+    /// Lists a sender by the time since which it is idle, or drops it if it has no run.
     fn list(&mut self, source: JausId) {
         let Some(sender) = self.senders.get(&source) else {
             return;
@@ -483,8 +483,8 @@ impl Reassembly {
         }
     }
 
-    /// Forgets the runs of senders that are idle for too long. A run may rest longer than that, while
-    /// its sender tries in vain to send one fragment and the others are acknowledged.
+    /// Drops the runs of senders that are idle for too long. A single run may rest for longer,
+    /// while its sender keeps retransmitting one fragment and the others are acknowledged.
     pub(in crate::endpoint) fn expire(&mut self, now: Instant, counters: &mut Counters) {
         while let Some(&(listed, source)) = self.listed.first()
             && listed + self.timeout <= now
@@ -498,20 +498,20 @@ impl Reassembly {
         }
     }
 
-    /// When something may expire.
+    /// When the next run may expire.
     pub(in crate::endpoint) fn next_expiry(&self) -> Option<Instant> {
         let &(listed, _) = self.listed.first()?;
         Some(listed + self.timeout)
     }
 
-    /// What is kept, with what keeping it costs, in octets.
+    /// The octets buffered, overhead included.
     pub(in crate::endpoint) const fn cost(&self) -> usize {
         self.cost
     }
 }
 
 impl Sender {
-    /// Takes a fragment; gives the run that is the whole message, if it is.
+    /// Adds a fragment; returns the run if it is a complete message.
     fn take_in(
         &mut self,
         now: Instant,
@@ -527,8 +527,8 @@ impl Sender {
             && let Some(known) = self.runs.get(&place)
             && known.covers(place.1, sequence)
         {
-            // Most repetitions were filtered before, so this is a restarted sender that begins anew;
-            // but one that waits for our acknowledgement may have been unheard for long.
+            // Most retransmissions were filtered before, so this is a restarted sender; but a
+            // sender that waits for our acknowledgement may have been silent for long.
             let begins_anew = data == DataControl::First && !known.is_begun_by(frame);
             if !begins_anew && !self.is_stale(known) {
                 return Err(Counter::Duplicate);

@@ -1,26 +1,26 @@
-//! Cutting a message into fragments, and numbering them.
+//! Cuts messages into fragments, and assigns sequence numbers.
 
 use bytes::{BufMut, Bytes, BytesMut};
 
 use crate::wire::{DataControl, ra};
 
-/// The most fragments of a message: sequence numbers are 16 bits wide and 0 is left out.
+/// The most fragments of a message: sequence numbers have 16 bits, and 0 is skipped.
 const MOST: usize = u16::MAX as usize;
 
-/// How messages to one destination are cut.
+/// The rules for cutting messages to one destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::endpoint) struct Cutting {
     /// The longest payload of a packet.
     pub(in crate::endpoint) limit: usize,
-    /// Whether each fragment begins with the message code, or the first alone.
+    /// Whether each fragment begins with the message code, or only the first.
     pub(in crate::endpoint) repeat_code: bool,
-    /// The most fragments that the destination keeps, and the longest payload for what would be
-    /// more of them.
+    /// The most fragments that the destination keeps, and the payload limit to use instead if there
+    /// would be more.
     pub(in crate::endpoint) kept: Option<(usize, usize)>,
 }
 
 impl Cutting {
-    /// How a message of `length` octets is cut.
+    /// How to cut a message of `length` octets.
     pub(in crate::endpoint) fn cut(self, length: usize) -> Cut {
         let cut = Cut::new(length, self.limit, self.repeat_code);
         match self.kept {
@@ -31,29 +31,29 @@ impl Cutting {
         }
     }
 
-    /// The longest message that can be cut like that.
+    /// The longest message that can be cut by these rules.
     pub(in crate::endpoint) fn longest(self) -> usize {
         Cut::longest(self.limit, self.repeat_code)
     }
 }
 
-/// How a message is cut: which of its octets go into which fragment. Costs nothing to keep; the
-/// fragments are made one by one, when they are sent.
+/// The layout of a cut message: which octets go into which fragment. It allocates nothing; the
+/// fragments are created one by one, when they are sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::endpoint) struct Cut {
     length: usize,
-    /// Octets of the message that the first fragment holds.
+    /// Octets of the message in the first fragment.
     first: usize,
-    /// Octets of the message that each other fragment holds, but for the last.
+    /// Octets of the message in each later fragment, except the last.
     part: usize,
-    /// Octets of the message's beginning that each other fragment repeats.
+    /// Octets of the message's beginning that each later fragment repeats.
     repeated: usize,
 }
 
 impl Cut {
-    /// A message of `length` octets in payloads of at most `limit`; the code is in the first only
-    /// or, with `repeat_code`, in each. Fragments are longer than `limit` if there would be more
-    /// than there are numbers.
+    /// Cuts a message of `length` octets into payloads of at most `limit`. The code is in the first
+    /// only or, with `repeat_code`, in each. Fragments exceed `limit` if the sequence numbers would
+    /// not suffice.
     pub(in crate::endpoint) fn new(length: usize, limit: usize, repeat_code: bool) -> Self {
         let repeated = if repeat_code { ra::CODE_LEN } else { 0 };
         let first = limit
@@ -67,13 +67,13 @@ impl Cut {
         }
     }
 
-    /// The longest message that can be cut into payloads of `limit` octets.
+    /// The longest message that fits payloads of `limit` octets.
     fn longest(limit: usize, repeat_code: bool) -> usize {
         let repeated = if repeat_code { ra::CODE_LEN } else { 0 };
         limit.saturating_sub(repeated).saturating_mul(MOST)
     }
 
-    /// The number of fragments; 1 for a message that is not cut.
+    /// The number of fragments; 1 for a message sent whole.
     pub(in crate::endpoint) fn count(&self) -> usize {
         1 + self
             .length
@@ -81,7 +81,7 @@ impl Cut {
             .div_ceil(self.part.max(1))
     }
 
-    /// The octets of the message that the fragment holds.
+    /// The octets of the message in the fragment.
     pub(in crate::endpoint) fn range(&self, index: usize) -> std::ops::Range<usize> {
         let start = match index {
             0 => 0,
@@ -91,7 +91,7 @@ impl Cut {
         start.min(self.length)..end.min(self.length)
     }
 
-    /// The octets of the fragment.
+    /// The length of the fragment, in octets.
     pub(in crate::endpoint) fn fragment_len(&self, index: usize) -> usize {
         let repeated = if index == 0 { 0 } else { self.repeated };
         repeated + self.range(index).len()
@@ -120,26 +120,27 @@ impl Cut {
     }
 }
 
-/// The sequence numbers of an endpoint.
+/// The sequence number generator of an endpoint.
 ///
-/// One counter serves all destinations and all components: Junior tells duplicates by source and
-/// number alone, so that a broadcast and a message to it must not share a number. The numbers
-/// neither hold 0, which JAUS++ refuses in fragments, nor go round within a message, which it does
-/// not follow.
+/// One counter serves all destinations and components: Junior detects duplicates by source and
+/// number alone, so a broadcast and a unicast message to it must not share a number. The numbers
+/// skip 0, which JAUS++ refuses in fragments, and do not wrap around within a message, which JAUS++
+/// does not support.
 ///
-/// A *serial* number is a sequence number that does not go round: its lower 16 bits go out.
+/// A *serial* number is a sequence number that does not wrap around; its lower 16 bits are
+/// transmitted.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::endpoint) struct Numbers {
     last: u64,
 }
 
 impl Numbers {
-    /// Numbers that begin behind `last`.
+    /// Creates a generator that continues after `last`.
     pub(in crate::endpoint) fn after(last: u16) -> Self {
         Self { last: last.into() }
     }
 
-    /// The first of `count` consecutive numbers, 1 to 65535 of them, which are then taken.
+    /// Takes `count` consecutive numbers, 1 to 65535, and returns the first.
     pub(in crate::endpoint) fn take(&mut self, count: usize) -> u64 {
         let count = count as u64;
         let first = self.peek(count);
@@ -147,7 +148,7 @@ impl Numbers {
         first
     }
 
-    /// What [`take`](Self::take) would give.
+    /// What [`take`](Self::take) would return.
     pub(in crate::endpoint) fn peek(&self, count: u64) -> u64 {
         const ROUND: u64 = 1 << 16;
         if self.last % ROUND + count < ROUND {

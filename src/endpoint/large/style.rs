@@ -1,5 +1,4 @@
-//! Putting the fragments of a whole message together: with their codes left out where they repeat
-//! them, as JAUS++ does.
+//! Joins the fragments of a message, and removes the codes that JAUS++ repeats in each fragment.
 
 use std::collections::VecDeque;
 
@@ -8,10 +7,10 @@ use bytes::Bytes;
 use crate::peer::{JAUSPP_FRAGMENT, LargeStyle};
 use crate::wire::{Version, large};
 
-/// Joins the fragments of a whole message, whose sender may be known to cut in some style; tells
-/// how it was cut.
+/// Joins the fragments of a message; `known` is the sender's style, if known. Returns the style
+/// found.
 ///
-/// Nothing in a fragment tells the style. JAUS++ is known by the length of its fragments, all of
+/// A fragment does not name its style. JAUS++ is recognised by the length of its fragments, all of
 /// which begin with the same code.
 pub(super) fn join(
     version: Version,
@@ -33,12 +32,12 @@ pub(super) fn join(
     (large::join(pieces, skip), style)
 }
 
-/// Whether these are full fragments of JAUS++, by their length.
+/// Whether all pieces have the length of a full JAUS++ fragment.
 fn are_of_jauspp<'a>(mut pieces: impl Iterator<Item = &'a Bytes>) -> bool {
     pieces.all(|piece| piece.len() == JAUSPP_FRAGMENT)
 }
 
-/// Whether these may be all fragments of a message of JAUS++ that fills them, so that the last is
+/// Whether these may be all the fragments of a JAUS++ message that fills them, so that the last is
 /// not marked.
 pub(super) fn may_lack_the_mark(version: Version, pieces: &VecDeque<Bytes>) -> bool {
     version == Version::As5669a

@@ -1,4 +1,4 @@
-//! Which challenges are under way, when to look at them, and what comes of them.
+//! The challenges in progress: their deadlines, their limits and their outcome.
 
 use std::collections::{BTreeSet, HashMap};
 use std::time::{Duration, Instant};
@@ -11,18 +11,19 @@ use crate::endpoint::rate::Origin;
 use crate::peer::Recogniser;
 use crate::wire::Frame;
 
-/// The most challenges under way.
+/// The most challenges in progress.
 const MOST: usize = 256;
-/// The most of them because of what one network address has sent.
+/// The most challenges caused by traffic from one network address.
 const MOST_OF_ADDRESS: usize = 32;
-/// By so many other ways can a peer be known to be reached.
+/// The most alternative paths remembered for a peer.
 const MOST_WAYS: usize = 4;
-/// After a challenge has moved nobody who proved it, its peer is not challenged again for so long.
+/// The pause before a peer is challenged again, after any challenge but a verified move or an
+/// unanswered one without a rival.
 const SETTLED: Duration = Duration::from_secs(2);
-/// After a path has not answered, it is not challenged again for so long.
+/// How long a path that did not answer is not challenged again.
 const UNANSWERED: Duration = Duration::from_secs(10);
 
-/// The challenges under way, in the order of their times, and the share of each network address.
+/// The challenges in progress, by deadline, and the count for each network address.
 #[derive(Debug, Default)]
 pub(super) struct Challenges {
     due: BTreeSet<(Instant, JausId)>,
@@ -30,7 +31,7 @@ pub(super) struct Challenges {
 }
 
 impl Challenges {
-    /// Whether one more may begin because of what came from an address.
+    /// Whether traffic from an address may start one more challenge.
     pub(super) fn has_room(&self, cause: Origin) -> bool {
         let share = self.shares.get(&cause).copied().unwrap_or_default();
         self.due.len() < MOST && share < MOST_OF_ADDRESS
@@ -56,14 +57,14 @@ impl Challenges {
         }
     }
 
-    /// The one to look at next.
+    /// The challenge that is due first.
     pub(super) fn first(&self) -> Option<(Instant, JausId)> {
         self.due.first().copied()
     }
 }
 
 impl Peers {
-    /// Whether a peer may be challenged now because of what came from an address.
+    /// Whether traffic from a path may start a challenge of a peer now.
     pub(in crate::endpoint) fn may_challenge(&self, now: Instant, id: JausId, cause: Path) -> bool {
         self.challenges.has_room(cause.into())
             && self.pin(id).is_none()
@@ -79,7 +80,8 @@ impl Peers {
         state.is_some_and(|state| state.challenge.is_some())
     }
 
-    /// A challenge is sent with these numbers, to where the peer is or, if it has a rival, to both.
+    /// Records a challenge sent with these probes: to the peer's path and, if it has a rival, to
+    /// both.
     pub(in crate::endpoint) fn begin_challenge(
         &mut self,
         now: Instant,
@@ -110,7 +112,8 @@ impl Peers {
         state.challenge = Some(challenge);
     }
 
-    /// An acknowledgement came that no message waits for; what it is for a challenge, and which.
+    /// Processes an acknowledgement that no message awaits: the challenge that it belongs to, if
+    /// any, and its effect.
     pub(in crate::endpoint) fn answer_challenge(
         &mut self,
         now: Instant,
@@ -137,8 +140,8 @@ impl Peers {
         Some((answer, challenge))
     }
 
-    /// The next challenge that is due: whose, and what it has shown; `None` for one that is to be
-    /// sent again.
+    /// The next challenge that is due: the peer, the challenge and its finding; `None` as finding
+    /// if it must be sent again.
     pub(in crate::endpoint) fn next_due(
         &mut self,
         now: Instant,
@@ -162,7 +165,7 @@ impl Peers {
         self.challenges.first().map(|(due, _)| due)
     }
 
-    /// Does what a challenge has shown.
+    /// Applies the finding of a challenge.
     fn settle(&mut self, now: Instant, id: JausId, finding: Finding) {
         let Some(challenge) = self.end_challenge(id) else {
             return;
@@ -181,8 +184,8 @@ impl Peers {
             (Finding::Stays, _) => (before, RouteState::Verified),
             _ => (before, RouteState::of(challenge.doubt.was_verified)),
         };
-        // Programs that run one after the other share an id: a verified move may be followed by
-        // the next at once, and an unanswered challenge must not delay a move.
+        // Programs that run one after the other may share an id. The next move may follow a
+        // verified one at once, and an unanswered challenge must not delay a move.
         match finding {
             Finding::Moves { verified: true } => {}
             Finding::Unanswered if challenge.rival.is_none() => {

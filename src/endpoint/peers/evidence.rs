@@ -1,7 +1,7 @@
-//! What peers are, by configuration or by what was seen of them.
+//! Peer profiles, from the configuration or from observed behaviour.
 //!
-//! Evidence belongs to where a peer is: it ends when the peer moves, begins its numbers anew or was
-//! silent for long.
+//! Evidence is tied to a peer's address: it is dropped when the peer moves, restarts its sequence
+//! numbers or is silent for long.
 
 use super::{PeerState, Peers, RouteState};
 use crate::address::JausId;
@@ -9,12 +9,13 @@ use crate::endpoint::Path;
 use crate::peer::{self, Assignment, LargeStyle, Recogniser};
 
 impl Peers {
-    /// What a peer is: what was configured, or what it was recognised as for sure.
+    /// The profile of a peer: the configured one, or the one recognised with certainty.
     pub(in crate::endpoint) fn profile(&self, id: JausId) -> peer::Peer {
         self.assigned_or(id, Recogniser::certain)
     }
 
-    /// The same, or what it may be taken for where it does little harm if it is something else.
+    /// The same, but falls back to a presumed profile, for uses where a wrong guess does little
+    /// harm.
     pub(in crate::endpoint) fn presumed(&self, id: JausId) -> peer::Peer {
         self.assigned_or(id, Recogniser::presumed)
     }
@@ -25,8 +26,8 @@ impl Peers {
         assigned.or_else(recognised).unwrap_or_default()
     }
 
-    /// Whether a peer is better not answered on the TCP connections that it opened: for sure, or by
-    /// the habit that makes it so.
+    /// Whether to avoid answering a peer on the TCP connections that it opened: its profile says
+    /// so, or it shows the habit that goes with it.
     pub(in crate::endpoint) fn is_deaf_on_its_connections(&self, id: JausId) -> bool {
         let is_by_habit = || {
             let state = self.states.get(&id);
@@ -36,21 +37,21 @@ impl Peers {
         self.profile(id).is_deaf_on_its_connections() || assigned.is_none() && is_by_habit()
     }
 
-    /// How a peer cuts large messages, if that is known. Who is configured to be no particular peer
-    /// keeps to the standard.
+    /// How a peer cuts large messages, if known. A peer configured as standard cuts them as the
+    /// standard says.
     pub(in crate::endpoint) fn large_style(&self, id: JausId) -> Option<LargeStyle> {
         let style = self.profile(id).large_style();
         let assigned = || Assignment::find(&self.assigned, id);
         style.or_else(|| assigned().map(|_| LargeStyle::Standard))
     }
 
-    /// Whether large messages to a peer repeat their code in each fragment. Anybody can make a
-    /// peer look as if it wanted that, so it is done only where the peer's address is proven.
+    /// Whether large messages to a peer repeat the code in each fragment. Any sender can make a
+    /// peer look as if it wanted that, so its address must be verified.
     pub(in crate::endpoint) fn wants_repeated_code(&self, id: JausId) -> bool {
         self.large_style(id) == Some(LargeStyle::RepeatedCode) && self.trusts_evidence(id)
     }
 
-    /// Whether a peer's large messages must wait until it is known how to cut them.
+    /// Whether large messages to a peer must wait until it is known how to cut them.
     pub(in crate::endpoint) fn awaits_proof(&self, id: JausId) -> bool {
         self.large_style(id) == Some(LargeStyle::RepeatedCode) && !self.trusts_evidence(id)
     }
@@ -61,8 +62,8 @@ impl Peers {
             || self.states.get(&id).is_some_and(is_verified)
     }
 
-    /// Something else about a peer than a frame that was taken, and that came along `from`, may
-    /// tell who it is.
+    /// Passes evidence other than an accepted frame, which arrived on path `from`, to the peer's
+    /// recogniser.
     pub(in crate::endpoint) fn recognise(
         &mut self,
         id: JausId,

@@ -1,7 +1,7 @@
-//! Who is where: addresses learned from what peers send, and configured ones.
+//! The peer table: routes learned from received messages, and configured ones.
 //!
-//! There is one record for each peer, in a bounded table of which each network address can hold a
-//! share ([`places`]).
+//! Each peer has one record. The table is bounded, and each network address can hold a limited
+//! share of it ([`places`]).
 
 mod challenges;
 mod evidence;
@@ -27,36 +27,37 @@ pub(super) use route::{
 use state::PeerState;
 pub use state::{Peer, Traffic};
 
-/// Where a message came from and what it teaches.
+/// A received frame and its path, from which the table learns.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sighting<'a> {
     pub(super) now: Instant,
     pub(super) path: Path,
-    /// Whether both ends of the path have shown that they are there.
+    /// Whether the path is a connection or line, on which both ends have shown that they are
+    /// present.
     pub(super) is_stream: bool,
-    /// Whether a component of ours could challenge the sender.
+    /// Whether a local component could challenge the sender.
     pub(super) can_challenge: bool,
     pub(super) frame: &'a Frame,
 }
 
-/// What [`Peers::hear`] did.
+/// The result of [`Peers::hear`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Heard {
     /// Nothing new.
     Known,
-    /// A peer not known before; another may have been forgotten for it.
+    /// A new peer, for which another may have been evicted.
     New { evicted: Option<JausId> },
-    /// A peer that was elsewhere before. If `contested`, it may still be there.
+    /// A peer whose route has changed. If `contested`, it may still be on the old path.
     Moved {
         from: Path,
         contested: bool,
         was_verified: bool,
     },
-    /// A peer that is elsewhere, unless a challenge shows that it has moved.
+    /// A peer heard on another path; its route changes only if a challenge shows that it has moved.
     Contested { incumbent: Path, was_verified: bool },
-    /// A peer that is elsewhere, which was found out a moment ago or is being found out.
+    /// A peer heard on another path, while a challenge is running or was just decided.
     Elsewhere,
-    /// A peer not known before, for which there is no room.
+    /// A new peer for which there is no room.
     NoRoom,
 }
 
@@ -65,7 +66,7 @@ pub(super) enum Heard {
 pub(super) struct Peers {
     states: HashMap<JausId, PeerState>,
     places: Places,
-    /// How many peers have proven that they are there.
+    /// The number of verified peers on each path.
     proven: HashMap<Path, usize>,
     challenges: Challenges,
     configured: Vec<StaticPeer>,
@@ -98,25 +99,25 @@ impl Peers {
         self.states.contains_key(&id)
     }
 
-    /// Whether we have neither spoken to a peer nor been answered by it.
+    /// Whether we have neither sent to a peer nor received an acknowledgement from it.
     pub(super) fn is_stranger(&self, id: JausId) -> bool {
         let state = self.states.get(&id);
         state.is_none_or(|state| state.place.standing == Standing::Heard)
     }
 
-    /// Where and when it was heard last.
+    /// Where and when a peer was last heard.
     pub(super) fn last_heard(&self, id: JausId) -> Option<(Path, Instant)> {
         let peer = &self.states.get(&id)?.peer;
         Some((peer.path, peer.last_heard))
     }
 
-    /// Where on a link somebody was heard, each once or more.
+    /// The paths on a link on which peers were heard, possibly with repetitions.
     pub(super) fn paths_on(&self, link: LinkId) -> impl Iterator<Item = Path> + '_ {
         let paths = self.states.values().map(|state| state.peer.path);
         paths.filter(move |path| path.link == link)
     }
 
-    /// The configured address of an id: its own, or that of the first pattern that it matches.
+    /// The configured address of an id: its own entry, or the first pattern that matches it.
     fn pin(&self, id: JausId) -> Option<Path> {
         if self.configured.is_empty() {
             return None;
@@ -126,14 +127,14 @@ impl Peers {
         Some(pin.path)
     }
 
-    /// Whether an id is configured to be at another network address.
+    /// Whether an id is configured at another network address.
     pub(super) fn is_pinned_elsewhere(&self, id: JausId, from: Path) -> bool {
         let mut pins = self.configured.iter().filter(|pin| pin.id.matches(id));
         self.pin(id).is_some() && !pins.any(|pin| pin.path.is_near(from))
     }
 
-    /// Whether it is proven that a peer is at another host than the one at the end of this path, and
-    /// not that it is there too.
+    /// Whether a peer is verified at another host than this path's, and not at this path's host as
+    /// well.
     pub(super) fn is_proven_elsewhere(&self, id: JausId, from: Path) -> bool {
         self.states.get(&id).is_some_and(|state| {
             let mut proven = state.also_at.iter().chain([&state.peer.path]);
@@ -141,12 +142,12 @@ impl Peers {
         })
     }
 
-    /// Whether somebody at the other end of a path has shown to be there, or is configured to be.
+    /// Whether a peer on a path is verified or configured.
     pub(super) fn is_proven(&self, path: Path) -> bool {
         self.proven.contains_key(&path) || self.configured.iter().any(|pin| pin.path == path)
     }
 
-    /// Takes note of where a message came from, and of what it tells about its sender.
+    /// Records where a message came from, and learns about its sender.
     pub(super) fn hear(&mut self, seen: Sighting<'_>) -> Heard {
         let Sighting { now, frame, .. } = seen;
         let pin = self.pin(frame.source);
@@ -184,7 +185,7 @@ impl Peers {
         }
         let is_near = from.is_near(path);
         let was_verified = state.peer.route == RouteState::Verified;
-        // A connection shows that somebody is there, not that the id is theirs.
+        // A connection shows that a sender is there, not that the id belongs to it.
         let is_free =
             is_near || now.saturating_duration_since(state.heard_on_route) >= route::SILENT;
         let (route, contested) = match state.peer.route {
@@ -243,7 +244,7 @@ impl Peers {
         Heard::New { evicted }
     }
 
-    /// Changes where a peer is and how far that is proven.
+    /// Changes the path and state of a peer's route.
     fn set_route(&mut self, id: JausId, path: Path, route: RouteState) {
         let Some(state) = self.states.get_mut(&id) else {
             return;
@@ -276,8 +277,8 @@ impl Peers {
         }
     }
 
-    /// A peer has acknowledged what was sent to it. If the acknowledgement came from where it is,
-    /// that is proven.
+    /// Records that a peer has acknowledged a message. If the acknowledgement came on its route,
+    /// the route is verified.
     pub(super) fn verify(&mut self, id: JausId, from: Path) {
         self.raise(id, Standing::Answered);
         if let Some(state) = self.states.get(&id)
@@ -292,7 +293,8 @@ impl Peers {
         }
     }
 
-    /// Nothing was heard of a peer while a message waited for its acknowledgement since then.
+    /// Marks a route as stale if the peer was silent since `since`, while a message waited for its
+    /// acknowledgement.
     pub(super) fn lose(&mut self, id: JausId, since: Instant) {
         if let Some(state) = self.states.get(&id)
             && state.peer.last_heard < since
@@ -303,15 +305,15 @@ impl Peers {
         }
     }
 
-    /// The round of its sequence numbers in which a sender is with this frame; 0 if its number is not
-    /// the sender's next.
+    /// The round of the sender's sequence numbers that a frame belongs to; 0 if it does not carry
+    /// its sender's next number.
     pub(super) fn round(&self, frame: &Frame) -> u16 {
         self.counted_on(frame)
             .map_or(0, |number| (number >> 16) as u16)
     }
 
-    /// The frame's sequence number, counted on over all rounds, if it is its sender's next: of the
-    /// numbers that it can stand for the one nearest to the sender's latest.
+    /// A frame's sequence number extended over all rounds, if it is its sender's next: the
+    /// candidate nearest to the sender's latest.
     fn counted_on(&self, frame: &Frame) -> Option<u32> {
         const FIRST_ROUND: u32 = 1 << 16;
         let latest = self
@@ -323,21 +325,21 @@ impl Peers {
         has_own_number(frame).then(|| latest.wrapping_add_signed(ahead.into()))
     }
 
-    /// A component of ours sent `octets` to it alone.
+    /// Records a unicast message of `octets` from a local component.
     pub(super) fn note_sent(&mut self, id: JausId, octets: usize) {
         self.note(id, |peer| peer.sent.add(octets));
         self.raise(id, Standing::SpokenTo);
     }
 
-    /// Changes what is counted about a peer.
+    /// Updates a peer's statistics.
     pub(super) fn note(&mut self, id: JausId, change: impl FnOnce(&mut Peer)) {
         if let Some(state) = self.states.get_mut(&id) {
             change(&mut state.peer);
         }
     }
 
-    /// Where and with which header to reach `id`, if known. A configured address goes before a
-    /// learned one.
+    /// The path and header for `id`, if known. A configured address takes precedence over a learned
+    /// one.
     pub(super) fn route(&self, id: JausId) -> Option<(Path, Version)> {
         let learned = self.states.get(&id).map(|state| &state.peer);
         let known = learned.filter(|peer| peer.route != RouteState::Stale);
@@ -397,7 +399,7 @@ impl Peers {
         }
     }
 
-    /// All of them, in order of their ids.
+    /// All peers, sorted by id.
     pub(super) fn iter(&self) -> impl Iterator<Item = Peer> + '_ {
         let peers = self.states.values().map(|state| Peer {
             profile: self.profile(state.peer.id),
@@ -409,7 +411,7 @@ impl Peers {
     }
 }
 
-/// Whether two ids, each of which may hold wildcards, have a component in common.
+/// Whether two ids, each possibly with wildcards, overlap.
 fn overlap(one: JausId, other: JausId) -> bool {
     let subsystem = one.subsystem() == other.subsystem()
         || [one.subsystem(), other.subsystem()].contains(&JausId::ANY_SUBSYSTEM);

@@ -1,10 +1,10 @@
-//! Which peer is forgotten when the table is full, and how many peers each network address holds.
+//! The eviction order of the full peer table, and the share of each network address.
 //!
-//! A newcomer evicts a peer of the network address that holds most, if that is another one. Otherwise
-//! peers that were only heard go first, then those we have spoken to, then those that have
-//! acknowledged something of ours; among equals the one heard longest ago. Peers in conversation
-//! with us stay as long as they are heard now and then: if none can be evicted, the newcomer is
-//! refused. Invented ids therefore only replace each other.
+//! A new peer evicts a peer of the network address that holds the most, if that is another one.
+//! Otherwise peers that were only heard go first, then those that we have sent to, then those that
+//! have acknowledged a message; among equals the one heard longest ago. Peers in conversation with
+//! us stay as long as they are heard from time to time: if none can be evicted, the new peer is
+//! refused. Invented ids can therefore only replace each other.
 
 use std::collections::{BTreeSet, HashMap};
 use std::time::{Duration, Instant};
@@ -14,19 +14,19 @@ use crate::address::JausId;
 use crate::endpoint::Path;
 use crate::endpoint::rate::Origin;
 
-/// What we have had to do with a peer.
+/// Our history with a peer, which determines the eviction order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Standing {
     Heard,
     SpokenTo,
-    /// It has acknowledged something of ours.
+    /// It has acknowledged one of our messages.
     Answered,
 }
 
 impl Standing {
     pub(super) const ALL: [Self; 3] = [Self::Heard, Self::SpokenTo, Self::Answered];
 
-    /// How long a peer must have been silent to be forgotten for a newcomer.
+    /// How long a peer must have been silent to be evicted.
     pub(super) const fn silence(self) -> Duration {
         match self {
             Self::Heard | Self::SpokenTo => Duration::ZERO,
@@ -35,18 +35,18 @@ impl Standing {
     }
 }
 
-/// A peer's place in the order of eviction.
+/// A peer's position in the eviction order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) standing: Standing,
     pub(super) origin: Origin,
     number: u64,
-    /// When the peer was heard last before it got this place.
+    /// When the peer was last heard before it got this position.
     pub(super) heard: Instant,
 }
 
-/// The order of eviction, overall and for each network address. It follows the time at which
-/// peers were heard last only when somebody looks, so that hearing a peer costs nothing.
+/// The eviction order, overall and per network address. It catches up with the times at which peers
+/// were heard only during a search, so that receiving a message costs nothing.
 #[derive(Debug, Default)]
 pub(super) struct Places {
     latest: u64,
@@ -57,7 +57,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Puts a peer behind all others of its standing.
+    /// Appends a peer to those of its standing.
     pub(super) fn insert(
         &mut self,
         id: JausId,
@@ -110,12 +110,12 @@ impl Places {
         self.held.get(&origin).copied().unwrap_or(0)
     }
 
-    /// The network address that holds most, and how many.
+    /// The network address that holds the most peers, and how many.
     pub(super) fn most(&self) -> Option<(usize, Origin)> {
         self.ranking.last().copied()
     }
 
-    /// The first of a standing, of one network address or overall.
+    /// The first peer of a standing, of one network address or overall.
     pub(super) fn first(&self, standing: Standing, of: Option<Origin>) -> Option<JausId> {
         match of {
             Some(origin) => {
@@ -146,8 +146,8 @@ impl Peers {
             || self.next_to_go(now, from.into()).is_some()
     }
 
-    /// The peer to evict for a newcomer from a network address. An address that holds a quarter of the
-    /// table gets no more of it, and makes room for addresses that hold less.
+    /// The peer to evict for a new one from a network address. An address that holds a quarter of
+    /// the table gets no more of it, and makes room for addresses that hold less.
     pub(super) fn next_to_go(&mut self, now: Instant, newcomer: Origin) -> Option<JausId> {
         let (most, holder) = self.places.most()?;
         let own = self.places.held(newcomer);
@@ -171,8 +171,9 @@ impl Peers {
             .find_map(|standing| self.longest_silent(now, of, standing, standing.silence()))
     }
 
-    /// The peer of a standing that was heard longest ago, if that is long enough. Peers heard since
-    /// they got their place move to the end, so a search costs no more than was heard.
+    /// The peer of a standing that was heard longest ago, if it was silent for long enough. Peers
+    /// heard since they got their position move to the end, so a search costs no more than the
+    /// messages heard.
     fn longest_silent(
         &mut self,
         now: Instant,

@@ -1,9 +1,9 @@
-//! How far it is proven where a peer is, and the challenges that prove it.
+//! Route verification: the states of a route, and the challenges that verify it.
 //!
-//! A datagram's source address can be forged, and so can the id in it. So a path counts as
-//! verified only when the peer has acknowledged along it what was sent along it. Where an id
-//! is heard on two paths, both are challenged: with a query that wants an acknowledgement and has
-//! an unpredictable sequence number, which nobody else can acknowledge.
+//! A datagram's source address can be forged, and so can the source id. A path therefore counts as
+//! verified only when the peer has acknowledged on it a message sent on it. If an id is heard on
+//! two paths, both are challenged, with a query that requests an acknowledgement and has an
+//! unpredictable sequence number, which no other host can acknowledge.
 
 use std::time::{Duration, Instant};
 
@@ -13,26 +13,26 @@ use crate::endpoint::rate::Origin;
 use crate::wire::{Acknowledgement, Flags, Frame, Priority};
 
 /// A challenge is a Query Heartbeat Pulse, which every peer understands and which changes nothing.
-/// Its priority tells an endpoint that the query is not for the component, which never sees it: no
-/// other peer is known to ask for a heartbeat so urgently, and our services ask at high priority.
+/// Its priority tells an endpoint not to deliver the query to the component: no other peer is known
+/// to query heartbeats at this priority, and our services query at high priority.
 pub(in crate::endpoint) const CHALLENGE: &[u8] = b"\x02\x22";
 pub(in crate::endpoint) const CHALLENGE_FLAGS: Flags =
     Flags::new(Priority::SafetyCritical).with_acknowledgement(Acknowledgement::Request);
-/// How often a challenge is sent before it counts as not answered.
+/// How often a challenge is sent before it counts as unanswered.
 const TRIES: u32 = 3;
-/// The time between two tries; the decision comes as long after the last.
+/// The interval between two tries; the decision follows after the same interval.
 pub(super) const TRY_INTERVAL: Duration = Duration::from_millis(300);
-/// An incumbent that was silent for so long before the challenge need not be waited for.
+/// An incumbent that was silent for this long before the challenge need not be waited for.
 pub(super) const SILENT: Duration = Duration::from_secs(10);
 
-/// How far it is proven that a peer is where its messages seem to come from.
+/// How far it is verified that a peer is where its messages seem to come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum RouteState {
-    /// It was heard from there, and anybody could have sent that.
+    /// It was heard there, but any host could have sent that.
     #[default]
     Unverified,
-    /// It has acknowledged what was sent there, is at the other end of a connection, or is
+    /// It has acknowledged a message sent there, is the remote end of a connection, or is
     /// configured.
     Verified,
     /// It was silent for as long as a message waited for its acknowledgement. Messages to it go to
@@ -40,35 +40,35 @@ pub enum RouteState {
     Stale,
 }
 
-/// A query to one path, and the number that its acknowledgement must have.
+/// A query on one path, and the number that its acknowledgement must have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::endpoint) struct Probe {
     pub(in crate::endpoint) path: Path,
     pub(in crate::endpoint) number: u16,
 }
 
-/// Why a peer is challenged, and in whose name.
+/// Why a peer is challenged, and by which component.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::endpoint) struct Doubt {
-    /// The local component that asks.
+    /// The local component that sends the challenge.
     pub(in crate::endpoint) local: JausId,
-    /// Where the peer was before.
+    /// The peer's known path.
     pub(in crate::endpoint) incumbent: Path,
     pub(in crate::endpoint) was_verified: bool,
-    /// Where else its id is heard; `None` if the one path is to be proven.
+    /// The other path on which its id is heard; `None` if the only path is to be verified.
     pub(in crate::endpoint) rival: Option<Path>,
     pub(in crate::endpoint) rival_is_stream: bool,
 }
 
-/// A challenge under way.
+/// A challenge in progress.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::endpoint) struct Challenge {
     pub(in crate::endpoint) doubt: Doubt,
     pub(in crate::endpoint) incumbent: Probe,
     pub(in crate::endpoint) rival: Option<Probe>,
-    /// Whether messages go to the rival meanwhile.
+    /// Whether messages go to the rival in the meantime.
     pub(in crate::endpoint) was_provisional: bool,
-    /// Whether an answer by the rival decides without waiting for the incumbent.
+    /// Whether an answer from the rival decides without waiting for the incumbent.
     pub(super) at_once: bool,
     pub(super) rival_answered: bool,
     pub(super) incumbent_heard: bool,
@@ -77,25 +77,25 @@ pub(in crate::endpoint) struct Challenge {
     pub(super) due: Instant,
 }
 
-/// What a challenge has shown.
+/// The outcome of a challenge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::endpoint) enum Finding {
-    /// The peer is where it was, and has proven it.
+    /// The peer is on its known path, and has proven it.
     Stays,
-    /// Nothing else than before is known.
+    /// Nothing new is known.
     Unanswered,
-    /// The peer is where the rival is.
+    /// The peer is on the rival path.
     Moves { verified: bool },
 }
 
 impl Challenge {
-    /// The network address because of which it began.
+    /// The network address that caused it.
     pub(super) fn cause(&self) -> Origin {
         self.rival.unwrap_or(self.incumbent).path.into()
     }
 
-    /// An acknowledgement with this number came along `path`. `None` if it is not the one that is
-    /// waited for, or does not decide yet.
+    /// Processes an acknowledgement with this number that arrived on `path`. `None` if the
+    /// challenge does not await it.
     pub(super) fn handle_answer(
         &mut self,
         local: JausId,
@@ -113,7 +113,7 @@ impl Challenge {
         } else {
             return None;
         }
-        // Where nothing hangs on it, both have time to answer: a peer may be reached by two ways.
+        // If nothing is at stake, both have time to answer: a peer may be reachable on two paths.
         Some(match (self.incumbent_answered, self.rival_answered) {
             (true, true) => Answer::Decides(Finding::Stays),
             (true, false) if self.at_once || self.rival.is_none() => {
@@ -129,7 +129,7 @@ impl Challenge {
         self.rival.is_some_and(|rival| rival.number == number)
     }
 
-    /// The time for an answer is over: `None` if the challenge is to be sent once more.
+    /// Handles the end of a try: `None` if the challenge must be sent again.
     pub(super) fn handle_timeout(&mut self, now: Instant) -> Option<Finding> {
         if self.tries < TRIES {
             self.tries += 1;
@@ -146,21 +146,22 @@ impl Challenge {
     }
 }
 
-/// What an acknowledgement is for a challenge.
+/// The effect of an acknowledgement on a challenge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::endpoint) enum Answer {
-    /// It was waited for, and the other path has time to answer yet.
+    /// It was awaited, but the other path still has time to answer.
     Counts,
     Decides(Finding),
 }
 
-/// Whether a message is a challenge, and not for the component that it is addressed to.
+/// Whether a message is a challenge, which is not delivered to the component that it is addressed
+/// to.
 pub(in crate::endpoint) fn is_challenge(frame: &Frame) -> bool {
     frame.flags == CHALLENGE_FLAGS && frame.payload == CHALLENGE && frame.destination.is_unicast()
 }
 
-/// Whether a frame has its sender's next number: an acknowledgement has that of what it
-/// acknowledges, and a challenge an old one.
+/// Whether a frame carries its sender's next number: an acknowledgement repeats the number that it
+/// acknowledges, and a challenge reuses an old one.
 pub(super) fn has_own_number(frame: &Frame) -> bool {
     !frame.flags.acknowledgement().is_answer() && !is_challenge(frame)
 }

@@ -1,4 +1,4 @@
-//! All that is known of one peer.
+//! The record of one peer: its route, statistics, sequence numbers and pending challenge.
 
 use std::time::{Duration, Instant};
 
@@ -9,53 +9,53 @@ use crate::endpoint::Path;
 use crate::peer::{self, Recogniser};
 use crate::wire::{Frame, Version};
 
-/// What was seen of a peer says nothing about who is heard after so long.
+/// Evidence about a peer expires after this much silence.
 const EVIDENCE_LIFE: Duration = Duration::from_secs(600);
-/// A number below the first, after one that was this much higher but not close to where numbers
-/// go round, is of a process that was started again.
+/// A sequence number below `FIRST_NUMBERS` shows a restarted process if the number before was at
+/// least `STEP_BACK` higher, but below `LAST_NUMBERS`: above that, it is a wraparound.
 const FIRST_NUMBERS: u16 = 16;
 const STEP_BACK: u16 = 256;
 const LAST_NUMBERS: u16 = 60_000;
 
-/// A peer whose address was learned, and what was counted about it since.
+/// A peer with a learned address, and its statistics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Peer {
-    /// Who.
+    /// The id.
     pub id: JausId,
-    /// Where: the source of its latest valid message. Peers behind a router have its address.
+    /// The source of its latest valid message. Peers behind a router have the router's address.
     pub path: Path,
-    /// How far it is proven that it is there.
+    /// How far that path is verified.
     pub route: RouteState,
-    /// The header of that message. What we send to it has the same.
+    /// The header of its latest message. Messages to it use the same header.
     pub version: Version,
-    /// When the first message came.
+    /// When its first message arrived.
     pub first_heard: Instant,
-    /// When the latest message came.
+    /// When its latest message arrived.
     pub last_heard: Instant,
-    /// What it is: what was configured, or what it was recognised as for sure.
+    /// Its profile: the configured one, or the one recognised with certainty.
     pub profile: peer::Peer,
-    /// Messages from it, fragments and acknowledgements among them, without duplicates.
+    /// Messages from it, including fragments and acknowledgements, without duplicates.
     pub received: Traffic,
-    /// Messages that components of ours sent to it alone.
+    /// Unicast messages from local components to it.
     pub sent: Traffic,
-    /// Messages of it that came more than once.
+    /// Duplicates received from it.
     pub duplicates: u64,
-    /// How often something was sent to it again for want of an acknowledgement.
+    /// Retransmissions to it for want of an acknowledgement.
     pub retransmissions: u64,
-    /// Messages to it that were given up for want of an acknowledgement.
+    /// Messages to it given up for want of an acknowledgement.
     pub lost: u64,
-    /// The smoothed time between sending something to it and its acknowledgement; `None` before the
-    /// first measurement.
+    /// The smoothed round trip from transmission to acknowledgement; `None` before the first
+    /// measurement.
     pub round_trip: Option<Duration>,
 }
 
-/// Messages and their octets.
+/// A count of messages and octets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
-    /// How many messages.
+    /// Number of messages.
     pub messages: u64,
-    /// Octets of their payloads.
+    /// Octets of payload.
     pub octets: u64,
 }
 
@@ -80,18 +80,18 @@ impl RouteState {
 #[derive(Debug)]
 pub(super) struct PeerState {
     pub(super) peer: Peer,
-    /// Its place in the order of eviction.
+    /// Its position in the eviction order.
     pub(super) place: Place,
-    /// Its latest sequence number, counted on over all rounds, once one was heard.
+    /// Its latest sequence number, extended over all rounds; `None` before the first.
     pub(super) latest: Option<u32>,
-    /// Who it is.
+    /// The evidence of what it is.
     pub(super) recogniser: Recogniser,
-    /// Where else it has answered a challenge since it began.
+    /// Other paths on which it has answered a challenge since it started.
     pub(super) also_at: Vec<Path>,
-    /// When it was heard last where it is.
+    /// When it was last heard on its route.
     pub(super) heard_on_route: Instant,
     pub(super) challenge: Option<Challenge>,
-    /// Until when it is not challenged again, nor moved.
+    /// Until when it is neither challenged again nor moved.
     pub(super) settled_until: Option<Instant>,
     /// The path on which a challenge timed out, and when it may be challenged again.
     pub(super) unanswered: Option<(Path, Instant)>,
@@ -136,8 +136,8 @@ impl PeerState {
         }
     }
 
-    /// A frame came from where the peer is, after `silence`; `number` is where its sender is in its
-    /// own numbers, if it tells.
+    /// Processes a frame that arrived on the peer's route after `silence`; `number` is its extended
+    /// sequence number, if it carries its sender's own.
     pub(super) fn hear_on_route(&mut self, frame: &Frame, number: Option<u32>, silence: Duration) {
         self.heard_on_route = self.peer.last_heard;
         self.peer.version = frame.version;
@@ -153,7 +153,7 @@ impl PeerState {
         if !self.latest.is_some_and(is_before) {
             self.latest = number;
         }
-        // Whoever may not be the peer teaches nothing about it.
+        // A frame that may not be the peer's teaches nothing about it.
         if self
             .challenge
             .is_none_or(|challenge| challenge.rival.is_none())
@@ -162,7 +162,7 @@ impl PeerState {
         }
     }
 
-    /// The peer begins anew: what was seen of it before says nothing about it.
+    /// Resets the evidence of a restarted or moved peer.
     pub(super) fn begin_anew(&mut self, frame: &Frame, number: Option<u32>) {
         self.latest = number.or(self.latest);
         self.heard_on_route = self.peer.last_heard;

@@ -54,7 +54,7 @@ fn a_repeated_request_is_acknowledged_again_but_not_delivered_again() {
 #[test]
 fn an_offer_of_header_compression_is_acknowledged_without_it() {
     let mut rig = Rig::new();
-    // The request with compression flags 1, and number and length behind the size.
+    // The request with compression flags 1, and number and length after the size.
     let mut datagram = judp::encode(&request()).unwrap().to_vec();
     datagram[1] = 0x40;
     datagram[2] += 2;

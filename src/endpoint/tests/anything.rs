@@ -1,4 +1,4 @@
-//! Whatever comes, in whatever order: no panic, no growth, and every message accounted for.
+//! Arbitrary input in arbitrary order: no panic, no growth, and every message accounted for.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -7,7 +7,7 @@ use super::*;
 
 const LIMIT: usize = 8;
 
-/// Something that happens to an endpoint.
+/// An event in the life of an endpoint.
 #[derive(Clone, Debug)]
 enum Step {
     Hear {
@@ -25,7 +25,7 @@ enum Step {
     Poll,
 }
 
-/// Few ids, so that they meet: zero, wildcard, ours and theirs.
+/// A small set of ids, so that they coincide: zero, wildcard, ours and theirs.
 fn any_id() -> impl Strategy<Value = JausId> {
     let subsystem = prop_oneof![Just(0_u16), Just(101), Just(42), Just(0xFFFF)];
     let small = || prop_oneof![3 => 1_u8..4, 1 => Just(0), 1 => Just(0xFF)];
@@ -145,7 +145,7 @@ fn take(rig: &mut Rig, step: Step) {
     }
 }
 
-/// No message is dropped for two reasons: those that exclude each other do not outnumber the
+/// No message is dropped for two reasons: mutually exclusive reasons together do not outnumber the
 /// messages.
 fn is_accounted_for(rig: &Rig) -> bool {
     let before_delivery: u64 = [
@@ -194,7 +194,7 @@ proptest! {
         }
         prop_assert!(rig.events().len() <= 6 * LIMIT);
         prop_assert!(rig.transmits().len() <= 4 * LIMIT);
-        // Left alone, it comes to rest.
+        // Without further input, it comes to rest.
         for _wake in 0..100 {
             let Some(timeout) = rig.endpoint.poll_timeout() else { break };
             rig.now = rig.now.max(timeout);

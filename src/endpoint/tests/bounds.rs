@@ -1,5 +1,4 @@
-//! Nothing that peers or components do makes an endpoint grow without end; what is dropped for that
-//! is counted.
+//! Neither peers nor components can make an endpoint grow without bound; every drop is counted.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Messages that want an acknowledgement, over wires of all kinds.
+//! Reliable delivery over wires of all kinds.
 
 use super::wire::{Conditions, Wire, large, reliable};
 use super::*;
@@ -245,7 +245,7 @@ fn a_message_whose_numbers_are_still_under_way_waits_and_holds_up_nobody() {
     rig.events();
     let first = rig.send(reliable(large(2000))).unwrap();
     assert_eq!(rig.transmits().len(), 2);
-    // Nobody answers, and meanwhile all numbers are taken by messages to somebody else.
+    // No acknowledgement arrives, and meanwhile messages to another destination use up all numbers.
     let other = Outgoing {
         destination: id("42.1.2"),
         ..to_peer()
@@ -303,12 +303,12 @@ fn on_a_connection_nothing_is_sent_again_for_want_of_a_quick_answer() {
     assert_eq!(rig.transmits().len(), 3);
     rig.pass(Duration::from_millis(1));
     hear(&mut rig, positive, 1, b"");
-    // As recorded: Junior's engine pauses for 15 ms amid a large message.
+    // As recorded: Junior's engine pauses for 15 ms during a large message.
     for _millisecond in 0..150 {
         rig.pass(Duration::from_millis(1));
         assert_eq!(rig.transmits(), []);
     }
-    // A receiver that was busy has acknowledged nothing, and never will unless it is asked again.
+    // A busy receiver has acknowledged nothing, and does so only after a retransmission.
     rig.pass(Duration::from_millis(100));
     assert_eq!(rig.transmits().len(), 2);
 }

@@ -1,4 +1,4 @@
-//! Floods of invented senders: what they may cost, and that a conversation goes on.
+//! Floods of invented senders: bounded cost, and undisturbed conversations.
 
 use super::*;
 
@@ -7,13 +7,13 @@ const SOURCES: u32 = 10_000;
 /// Packets of the flood between two messages of the conversation.
 const BETWEEN: u32 = 50;
 
-/// One of the invented senders.
+/// The id of an invented sender.
 fn invented(number: u32) -> JausId {
     let number = number % SOURCES;
     JausId::new(1000 + (number / 250) as u16, 1, (number % 250 + 1) as u8)
 }
 
-/// A packet of the flood: now one kind, now another.
+/// A packet of the flood, in alternating kinds.
 fn packet(number: u32) -> Frame {
     use crate::wire::DataControl::{First, Middle};
     let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
@@ -35,7 +35,7 @@ fn packet(number: u32) -> Frame {
     }
 }
 
-/// A message of [`PEER`] that wants an acknowledgement, with a number in it.
+/// A message of [`PEER`] that requests an acknowledgement and contains a number.
 fn said(number: u32) -> Frame {
     let [one, two, three, four] = number.to_le_bytes();
     let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
@@ -46,8 +46,8 @@ fn said(number: u32) -> Frame {
     }
 }
 
-/// Floods an endpoint from `hosts` addresses, 100 packets a millisecond, while [`PEER`] and [`US`]
-/// talk; each of the peer's messages comes a second time later, for want of an acknowledgement.
+/// Floods an endpoint from `hosts` addresses, 100 packets per millisecond, while [`PEER`] and
+/// [`US`] talk. Each of the peer's messages arrives twice, for want of an acknowledgement.
 fn flood(hosts: u32, config: Config) -> Rig {
     let mut rig = Rig::with(config);
     rig.hear(&from_peer(QUERY_HEARTBEAT));
@@ -97,8 +97,8 @@ fn flood(hosts: u32, config: Config) -> Rig {
     rig
 }
 
-/// With the usual settings: 1024 peers, 1024 buckets, 40 960 fingerprints, 16 MiB of fragments at
-/// the most.
+/// Checks the default bounds: 1024 peers, 1024 buckets, 40 960 fingerprints and 16 MiB of
+/// fragments.
 fn is_bounded(rig: &Rig) {
     let (tables, config) = (rig.endpoint.occupancy(), Config::default());
     assert!(tables.peers <= config.max_peers, "{tables:?}");

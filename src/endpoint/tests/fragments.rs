@@ -175,7 +175,7 @@ fn messages_of_two_senders_do_not_mix() {
     assert_eq!(payloads(&mut rig), [one, other]);
 }
 
-/// What was acknowledged is not sent again, however long its sender tries in vain to send the rest.
+/// Acknowledged fragments are not repeated, however long their sender retries the rest in vain.
 #[test]
 fn a_part_of_a_message_waits_for_the_rest_while_its_sender_sends_fragments() {
     let mut rig = Rig::new();
@@ -368,7 +368,7 @@ fn what_is_left_of_a_message_is_not_put_into_one_that_has_its_numbers_again() {
     let mut left = fragments(5, &torn, 200);
     left.remove(2);
     left.iter().for_each(|frame| rig.hear(frame));
-    // Many numbers later, within the time that fragments are kept for.
+    // Many numbers later, but within the time for which fragments are kept.
     for round in 0..8_u16 {
         let first = 1000 + round * 8000;
         fragments(first, &large(400), 200)
@@ -382,7 +382,7 @@ fn what_is_left_of_a_message_is_not_put_into_one_that_has_its_numbers_again() {
     assert_eq!(payloads(&mut rig), [whole]);
 }
 
-/// As JAUS++ cuts: the code and 1571 octets in each fragment.
+/// As JAUS++ cuts: the code and 1571 more octets in each fragment.
 fn of_jauspp(first: u16, message: &Bytes) -> Vec<Frame> {
     let cut = large::Cut::new(message.len(), 1573, true);
     (0..cut.count())
@@ -486,14 +486,14 @@ fn a_first_fragment_that_is_repeated_late_does_not_undo_the_message() {
     }
     rig.hear(&fragments[0]);
     rig.hear(&fragments[1]);
-    // Our acknowledgement of the first was lost, and so were its next copies.
+    // Our acknowledgement of the first fragment was lost, and so were its next copies.
     rig.pass(Config::default().retransmission_window);
     rig.hear(&fragments[0]);
     rig.hear(&fragments[2]);
     assert_eq!(payloads(&mut rig), [message]);
 }
 
-/// Its node sends what is more urgent first, of whichever of its components.
+/// Its node sends more urgent messages first, from any of its components.
 #[test]
 fn what_was_acknowledged_is_kept_while_its_host_has_something_else_acknowledged() {
     let wish = |mut frame: Frame| {

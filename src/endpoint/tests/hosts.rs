@@ -1,12 +1,11 @@
-//! Parts of large messages with one id that come from several hosts: forged, by two ways, or of a
-//! peer that moves.
+//! Fragments with one id from several hosts: forged, on two paths, or from a peer that moves.
 
 use super::wire::large;
 use super::*;
 
 const ELSEWHERE: u8 = 66;
 
-/// The parts of a large message from [`PEER`] that wants an acknowledgement.
+/// The fragments of a large message from [`PEER`] that requests acknowledgements.
 fn parts(message: &Bytes) -> Vec<Frame> {
     let cut = large::Cut::new(message.len(), 1000, false);
     let ask = Flags::default().with_acknowledgement(Acknowledgement::Request);
@@ -34,7 +33,7 @@ fn payloads(rig: &mut Rig) -> Vec<Bytes> {
     messages.map(|message| message.payload).collect()
 }
 
-/// Lets a host hear a part; whether it was acknowledged.
+/// Receives a fragment from a host; returns whether it was acknowledged.
 fn is_acknowledged(rig: &mut Rig, host: u8, part: &Frame) -> bool {
     rig.hear_from(host, part);
     let sent = rig.sent();
@@ -74,7 +73,8 @@ fn parts_from_elsewhere_are_refused_and_not_acknowledged() {
     assert_eq!(rig.count(Counter::PartFromElsewhere), 1);
 }
 
-/// A peer sends parts from another host until they are acknowledged, and answers challenges at these.
+/// Sends a peer's fragments from another host until they are acknowledged, and answers challenges
+/// at the given hosts.
 fn insist(rig: &mut Rig, parts: &[Frame], answers_at: &[u8]) {
     let mut left = parts.to_vec();
     for _try in 0..20 {

@@ -1,4 +1,4 @@
-//! Whose ids these are: attaching, echoes, conflicts.
+//! Attached ids: attaching, echoes and id conflicts.
 
 use super::*;
 
@@ -36,7 +36,7 @@ fn only_an_id_of_one_component_can_be_attached_and_only_once() {
     assert_eq!(endpoint.components().collect::<Vec<_>>(), [PEER, SIBLING]);
 }
 
-/// Sends a broadcast and gives the datagram.
+/// Sends a broadcast and returns the datagram.
 fn broadcast(rig: &mut Rig) -> Bytes {
     rig.send(Outgoing::new(
         US,

@@ -1,5 +1,4 @@
-//! What Junior does with what we send, and what its processes send: its memory of numbers, its
-//! restarts, its calls.
+//! Interoperation with Junior: its memory of sequence numbers, its restarts and its calls.
 
 use std::collections::HashMap;
 
@@ -8,15 +7,14 @@ use crate::peer::{Assignment, Peer as Known};
 use crate::wire::DataControl;
 
 const CODE: [u8; 2] = [0xF0, 0xD7];
-/// Octets of a fragment of Junior's.
+/// Octets of a Junior fragment.
 const FRAGMENT: usize = 4079;
-/// The flags of Junior's, as recorded: standard priority, and an acknowledgement wanted.
+/// Junior's flags, as recorded: standard priority, acknowledgement requested.
 const WANTED: Flags = Flags(0x11);
 /// The same, as a global broadcast.
 const CALL: Flags = Flags(0x19);
 
-/// For how long Junior takes a number for one that it has heard before, with its settings file and
-/// without.
+/// How long Junior remembers a sequence number, with its settings file and without.
 const REMEMBERED: [Duration; 2] = [Duration::from_secs(3), Duration::from_secs(10)];
 
 fn message(octets: usize) -> Bytes {
@@ -24,7 +22,8 @@ fn message(octets: usize) -> Bytes {
     CODE.into_iter().chain(rest).collect()
 }
 
-/// Junior's memory of the numbers of one id. Whatever has one of them is acknowledged and dropped.
+/// Junior's memory of the sequence numbers of one id. A message with a remembered number is
+/// acknowledged and dropped.
 struct Memory {
     heard: HashMap<u16, Instant>,
     time: Duration,
@@ -52,7 +51,7 @@ fn a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers()
             dropped: 0,
         };
         let begin = Rig::new().now;
-        // As a command that is run again and again: greeting, 1 MiB, end.
+        // A command that runs again and again: greeting, 1 MiB, end.
         for run in 0..40 {
             let alive = Duration::from_millis(200) * run;
             let mut rig = Rig::with(Config {
@@ -84,8 +83,8 @@ fn a_node_that_is_started_again_and_again_uses_no_number_that_junior_remembers()
     }
 }
 
-/// What a process of Junior sends of an acknowledged message that has these numbers; the first of
-/// all goes to everybody, because its engine has just begun too.
+/// The frames in which a Junior process sends an acknowledged message with these numbers. The very
+/// first is broadcast, because its engine has just started as well.
 fn of_junior(first: u16, message: &Bytes) -> Vec<Frame> {
     let pieces = message.chunks(FRAGMENT).enumerate();
     let last = message.len().div_ceil(FRAGMENT) - 1;
@@ -108,7 +107,7 @@ fn of_junior(first: u16, message: &Bytes) -> Vec<Frame> {
     pieces.map(frame).collect()
 }
 
-/// Whether everything has come, by the acknowledgements; what was delivered.
+/// Checks that all frames were acknowledged; returns the lengths delivered.
 fn lengths_of(rig: &mut Rig, frames: &[Frame]) -> Vec<usize> {
     for frame in frames {
         rig.hear(frame);
@@ -125,7 +124,7 @@ fn lengths_of(rig: &mut Rig, frames: &[Frame]) -> Vec<usize> {
 
 #[test]
 fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_come_again() {
-    // Whether it is known by its fragments or taken for anybody.
+    // Whether it is recognised by its fragments or counts as standard.
     let anybody = Assignment {
         id: PEER,
         profile: Known::Standard,
@@ -135,8 +134,8 @@ fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_c
             profiles,
             ..Config::default()
         });
-        // As recorded: three times 10 KiB, and 3.07 s later another process with 100 KiB of which
-        // the second fragment is the same.
+        // As recorded: three times 10 KiB, and 3.07 s later another process with 100 KiB whose
+        // second fragment is the same.
         let small = [1, 4, 7]
             .map(|first| of_junior(first, &message(10_240)))
             .concat();
@@ -144,7 +143,7 @@ fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_c
         rig.pass(Duration::from_millis(3070) - Duration::from_millis(18));
         let large = of_junior(1, &message(102_400));
         assert_eq!(lengths_of(&mut rig, &large), [102_400]);
-        // And once more the same, all of it.
+        // The same large message again.
         rig.pass(Duration::from_millis(2500));
         assert_eq!(lengths_of(&mut rig, &large), [102_400]);
     }
@@ -154,7 +153,7 @@ fn a_large_message_of_a_restarted_junior_arrives_though_its_numbers_and_octets_c
 fn what_junior_sends_again_is_delivered_once_also_while_the_message_is_put_together() {
     let mut rig = Rig::new();
     let frames = of_junior(1, &message(102_400));
-    // Each of them four times, as when no acknowledgement arrives.
+    // Each of them four times, as if no acknowledgement arrived.
     for frame in &frames {
         for _try in 0..4 {
             rig.hear(frame);
@@ -163,7 +162,7 @@ fn what_junior_sends_again_is_delivered_once_also_while_the_message_is_put_toget
     }
     let lengths: Vec<_> = rig.received().iter().map(|it| it.payload.len()).collect();
     assert_eq!(lengths, [102_400]);
-    // The end once more, when the message has been delivered.
+    // The end again, after the message has been delivered.
     for frame in &frames[24..] {
         rig.hear(frame);
     }
@@ -178,7 +177,7 @@ fn a_program_of_junior_that_is_started_again_beside_its_engine_is_heard() {
             profiles: vec![Assignment { id: PEER, profile }],
             ..Config::default()
         });
-        // Its engine knows where we are: nothing goes to everybody.
+        // Its engine knows our address: nothing is broadcast.
         let first = Frame {
             flags: WANTED,
             ..from_peer(QUERY_HEARTBEAT)
@@ -194,7 +193,7 @@ fn a_program_of_junior_that_is_started_again_beside_its_engine_is_heard() {
     }
 }
 
-/// A frame comes, to us alone or to everybody, whatever its flags say.
+/// Receives a frame by unicast or multicast, whatever its flags say.
 fn hear_as_sent(rig: &mut Rig, frame: &Frame, to_all: bool) {
     let datagram = judp::encode(frame).unwrap();
     let from = path(PEER_HOST);
@@ -213,7 +212,7 @@ fn hear_as_sent(rig: &mut Rig, frame: &Frame, to_all: bool) {
 
 #[test]
 fn a_call_without_its_flag_is_known_by_the_way_that_it_came() {
-    // As recorded of fkie's node manager in Python.
+    // As recorded from fkie's node manager in Python.
     let call = Frame {
         flags: WANTED,
         ..from_peer(QUERY_HEARTBEAT)

@@ -1,5 +1,5 @@
-//! What an endpoint must and must not do, one rule a test. Time is virtual; peers are frames
-//! written by hand.
+//! Behaviour tests of the endpoint, one rule per test. Time is virtual; peers are hand-written
+//! frames.
 
 mod acknowledgements;
 mod anything;
@@ -40,7 +40,7 @@ fn id(text: &str) -> JausId {
     text.parse().unwrap()
 }
 
-/// The path of host `host` on the wire, with the ordinary port.
+/// The path of host `host` on the wire, with the default port.
 fn path(host: u8) -> Path {
     Path {
         link: WIRE,
@@ -51,7 +51,7 @@ fn path(host: u8) -> Path {
 const OUR_HOST: u8 = 1;
 const PEER_HOST: u8 = 2;
 
-/// What components were given, and who has no room for more.
+/// Messages delivered to components, and the components without room.
 #[derive(Default)]
 struct Inbox {
     messages: Vec<Received>,
@@ -68,7 +68,7 @@ impl Sink for Inbox {
     }
 }
 
-/// An endpoint with a link and [`US`] attached, and a clock.
+/// An endpoint with a link, an attached [`US`] and a clock.
 struct Rig {
     endpoint: Endpoint,
     inbox: Inbox,
@@ -117,13 +117,13 @@ impl Rig {
             .handle_datagram(self.now, from, datagram, &mut self.inbox);
     }
 
-    /// Lets a peer have acknowledged something, where it was heard.
+    /// Has a peer acknowledge a message on its route.
     fn vouch_for(&mut self, id: JausId) {
         let (path, _) = self.endpoint.route(id).unwrap();
         self.endpoint.peers.verify(id, path);
     }
 
-    /// Lets [`PEER`] be known, and have acknowledged something.
+    /// Makes [`PEER`] known and verified.
     fn meet_peer(&mut self) {
         self.hear(&Frame {
             sequence: 900,
@@ -142,7 +142,7 @@ impl Rig {
         std::iter::from_fn(|| self.endpoint.poll_event()).collect()
     }
 
-    /// The messages for components.
+    /// The messages delivered to components.
     fn received(&mut self) -> Vec<Received> {
         std::mem::take(&mut self.inbox.messages)
     }
@@ -157,7 +157,7 @@ impl Rig {
         messages.is_empty() && events.is_empty() && self.transmits().is_empty()
     }
 
-    /// What is sent, read again.
+    /// The datagrams sent, decoded.
     fn sent(&mut self) -> Vec<(To, Frame)> {
         let read = |transmit: Transmit| {
             (

@@ -1,4 +1,4 @@
-//! How datagrams leave: paced, several messages in one, several of them at once.
+//! Outgoing datagrams: pacing, packing and batches.
 
 use super::wire::{Conditions, Wire, large, reliable};
 use super::*;
@@ -214,7 +214,7 @@ fn fragments_leave_several_at_once_where_the_link_takes_them_so() {
         .iter()
         .map(|t| (t.payload.len(), t.segment))
         .collect();
-    // 70 fragments of 1425 octets and one of 250; 45 fit what the kernel takes at once.
+    // 70 fragments of 1425 octets and one of 250; the kernel accepts 45 in one call.
     let expected = [(45 * 1440, Some(1440)), (25 * 1440 + 265, Some(1440))];
     assert_eq!(shapes, expected);
     assert_eq!(rig.count(Counter::DatagramsSent), 71);

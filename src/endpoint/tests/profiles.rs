@@ -1,5 +1,4 @@
-//! What is done otherwise for peers that depart from the standard, and that it is done for them
-//! alone.
+//! Special handling of peers that depart from the standard, and only of those.
 
 use super::*;
 use crate::peer::{Assignment, Peer as Known};
@@ -56,7 +55,8 @@ fn a_message_of_jauspp_that_fills_its_fragments_is_whole_with_the_next_message()
         rig.hear(&frame);
     }
     assert_eq!(payloads(&mut rig), Vec::<Bytes>::new());
-    // Its reserved numbers are one ahead: the next message has the number of the last fragment.
+    // The numbers that it reserves are one ahead: the next message has the number of the last
+    // fragment.
     rig.hear(&Frame {
         sequence: 6,
         destination: JausId::EVERYONE,
@@ -65,7 +65,7 @@ fn a_message_of_jauspp_that_fills_its_fragments_is_whole_with_the_next_message()
     let next = Bytes::from_static(QUERY_IDENTIFICATION);
     assert_eq!(payloads(&mut rig), [full.clone(), next]);
     assert_eq!(rig.endpoint.unfinished(), 0);
-    // A message of which the end was lost is not taken for whole.
+    // A message whose end was lost does not count as complete.
     for frame in of_jauspp(20, &full) {
         rig.hear(&frame);
     }
@@ -139,7 +139,8 @@ fn who_is_recognised_for_sure_is_treated_so_and_shown() {
     rig.meet_peer();
     let profile = |rig: &Rig| rig.endpoint.peers().next().unwrap().profile;
     assert_eq!(profile(&rig), Known::Standard);
-    // Stale octets alone are not enough; a registration from another subsystem is, with them.
+    // Stale octets alone are not sufficient; together with a registration from another subsystem
+    // they are.
     let stale = Frame {
         sequence: 901,
         ..from_peer(QUERY_HEARTBEAT)
@@ -178,7 +179,7 @@ fn who_is_configured_is_what_it_is_said_to_be() {
     );
 }
 
-/// A link whose peers have connected to us.
+/// A link for incoming connections.
 const CONNECTIONS: LinkId = LinkId(1);
 
 fn add_connections(rig: &mut Rig) {
@@ -189,7 +190,7 @@ fn add_connections(rig: &mut Rig) {
     rig.endpoint.add_link(CONNECTIONS, stream);
 }
 
-/// By which links a peer is answered that has asked on its connection.
+/// The links on which a peer is answered after a query on its connection.
 fn links_of_answer(rig: &mut Rig) -> Vec<LinkId> {
     let connection = Path {
         link: CONNECTIONS,
@@ -235,7 +236,7 @@ fn who_repeats_the_version_octet_on_a_stream_is_answered_by_datagram_before_it_i
 fn a_call_of_junior_is_acknowledged_by_the_one_alone_from_its_own_address() {
     let mut rig = Rig::new();
     rig.endpoint.attach(SIBLING).unwrap();
-    // Recorded flags: standard priority, global broadcast, acknowledgement wanted; for one id.
+    // Recorded flags: standard priority, global broadcast, acknowledgement requested; for one id.
     let call = Frame {
         flags: Flags(0x19),
         ..from_peer(QUERY_HEARTBEAT)
@@ -269,7 +270,7 @@ fn juniors_priority_zero_fault_is_dropped_and_counted_by_its_name() {
 #[test]
 fn the_first_octet_of_all_that_is_sent_is_zero() {
     let mut rig = Rig::new();
-    // An offer of header compression, with its two octets behind the size.
+    // An offer of header compression, with its two octets after the size.
     let head = [2, 0x40, 18, 0, 0, 0, 0x19];
     let ids = [US.to_wire(), PEER.to_wire()].concat();
     let octets = [&head[..], &ids, QUERY_HEARTBEAT, &[1, 0]].concat();
@@ -325,7 +326,7 @@ fn a_zero_stands_for_all_from_those_who_mean_it_so_and_from_nobody_else() {
 fn numbers_that_count_for_each_destination_are_no_duplicates() {
     let mut rig = Rig::new();
     rig.endpoint.attach(SIBLING).unwrap();
-    // As recorded of the judging tool: 1, 2, 3 … to each destination.
+    // As recorded from the judging tool: 1, 2, 3 … to each destination.
     let destinations = [US, SIBLING, US.whole_node(), JausId::EVERYONE];
     for sequence in 1..=3 {
         for destination in destinations {
@@ -338,7 +339,7 @@ fn numbers_that_count_for_each_destination_are_no_duplicates() {
     }
     assert_eq!(rig.received().len(), 3 * (1 + 1 + 2 + 2));
     assert_eq!(rig.count(Counter::Duplicate), 0);
-    // Large messages to two destinations, with the same numbers, do not mix.
+    // Large messages to two destinations with the same numbers do not mix.
     let to = |destination, octet: u8| {
         let piece = |data, sequence, payload: Vec<u8>| Frame {
             destination,
@@ -359,8 +360,8 @@ fn numbers_that_count_for_each_destination_are_no_duplicates() {
     assert_eq!(payloads(&mut rig), [vec![1; 150], vec![2; 150]]);
 }
 
-/// The fragments in which a message of 100 KiB leaves, acknowledged packet by packet if it wants
-/// that, and how long it takes.
+/// The lengths of the fragments of a 100 KiB message, acknowledged packet by packet if requested,
+/// and the time they take.
 fn fragments_to(profile: Known, acknowledge: bool) -> (Vec<usize>, Duration) {
     let mut rig = Rig::with(assigned(profile));
     rig.meet_peer();
@@ -404,7 +405,7 @@ fn to_junior_large_messages_have_no_more_fragments_than_it_keeps() {
             "others need none of that"
         );
     }
-    // What it keeps goes in packets that no router needs to cut.
+    // Messages that it can keep travel in packets that no router needs to fragment.
     let mut rig = Rig::with(assigned(Known::Junior));
     rig.meet_peer();
     let payload = message(50 * 1425);
@@ -428,7 +429,7 @@ fn to_junior_large_messages_leave_no_faster_than_its_buffer_is_emptied() {
 #[test]
 fn to_jauspp_large_messages_leave_no_faster_than_it_reads_datagrams() {
     let (fragments, time) = fragments_to(Known::JausPlusPlus, false);
-    // Those that fit its buffer leave at once; the others at less than its 900 a second.
+    // Fragments that fit its buffer leave at once; the others at less than its 900 per second.
     let later = fragments.len() as u32 - 28;
     let fastest = Duration::from_secs(1) / 900 * later;
     assert!(

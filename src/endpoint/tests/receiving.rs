@@ -1,4 +1,4 @@
-//! What is delivered to whom, and what is not.
+//! Deliveries: which receivers get a message, and which messages are dropped.
 
 use super::*;
 
@@ -138,7 +138,7 @@ fn every_message_of_a_datagram_is_delivered() {
 #[test]
 fn stale_octets_behind_a_message_are_counted_and_nothing_else() {
     let message = judp::encode(&from_peer(QUERY_IDENTIFICATION)).unwrap();
-    // The end of a name; and what has the form of a message, but is for nobody.
+    // The end of a name; and octets that look like a message, but have no receiver.
     let for_nobody = judp::encode(&Frame {
         source: id("42.1.9"),
         destination: id("101.0.1"),
@@ -272,7 +272,7 @@ fn a_restarted_peer_does_not_lose_its_first_messages() {
         (9, 0),
         "the same once more after a short time"
     );
-    // What wants an acknowledgement may be repeated for longer; then it is the same in all.
+    // Messages that request an acknowledgement may be retransmitted for longer, but then unchanged.
     for payload in [&b"\x02\x20\x01"[..], b"\x02\x20\x02", b"\x02\x20\x03"] {
         rig.hear(&Frame {
             flags: Flags::default().with_acknowledgement(Acknowledgement::Request),
@@ -302,7 +302,7 @@ fn older_headers_are_delivered_with_their_code_in_front() {
     }
 }
 
-/// OpenJAUS leaves the number 0 in all it sends, so that two equal reports look the same.
+/// OpenJAUS sends every message with number 0, so two equal reports look the same.
 #[test]
 fn older_headers_without_numbers_are_not_taken_for_duplicates() {
     let mut rig = Rig::new();

@@ -1,5 +1,4 @@
-//! Where peers are taken to be: what is proven, what is refused, and what is sent to whom nobody
-//! vouches for.
+//! Routes of peers: verification, refusals, and the budget for unverified addresses.
 
 use super::*;
 
@@ -21,7 +20,7 @@ fn acknowledgement_of(query: &Frame) -> Frame {
     }
 }
 
-/// The challenge that was sent to a host.
+/// The challenge sent to a host.
 fn challenge_to(sent: &[(To, Frame)], host: u8) -> &Frame {
     let is_it = |(to, frame): &&(To, Frame)| {
         *to == To::Peer(path(host).peer)
@@ -30,7 +29,7 @@ fn challenge_to(sent: &[(To, Frame)], host: u8) -> &Frame {
     &sent.iter().find(is_it).unwrap().1
 }
 
-/// Where the next message to [`PEER`] goes.
+/// The address to which the next message to [`PEER`] goes.
 fn destination(rig: &mut Rig) -> To {
     rig.send(to_peer()).unwrap();
     rig.sent().pop().unwrap().0
@@ -207,7 +206,7 @@ fn who_starts_many_challenges_keeps_nobody_else_from_being_challenged() {
     rig.hear(&again(1));
     rig.hear_from(PEER_HOST + 1, &again(2));
     assert!(rig.endpoint.peers.is_challenged(PEER));
-    // Those that nobody answers are over soon, and their places are free again.
+    // Unanswered challenges end soon, and their places are free again.
     rig.pass(Duration::from_secs(2));
     rig.pass(Duration::from_secs(2));
     let source = invented(499);
@@ -360,7 +359,7 @@ fn one_address_cannot_lock_newcomers_of_another_out() {
     let invented = |number: u16| JausId::new(1000 + number / 200, 1, (number % 200 + 1) as u8);
     for source in numbers.map(invented) {
         rig.hear_from(ELSEWHERE, &Frame { source, ..again(1) });
-        // A reply, as any query gets one: by that it is somebody we have spoken to.
+        // A reply, as to any query: it makes the source a peer that we have spoken to.
         rig.send(Outgoing {
             destination: source,
             ..to_peer()
@@ -373,7 +372,7 @@ fn one_address_cannot_lock_newcomers_of_another_out() {
     assert_eq!(rig.received().len(), 1);
     assert_eq!(rig.count(Counter::PeersFull), 0);
     assert!(rig.endpoint.peers().any(|peer| peer.id == PEER));
-    // Nor does the address push it out again.
+    // Nor does the address evict it again.
     for number in 2000..3000 {
         let source = invented(number);
         rig.hear_from(ELSEWHERE, &Frame { source, ..again(1) });
@@ -382,7 +381,7 @@ fn one_address_cannot_lock_newcomers_of_another_out() {
     assert!(rig.endpoint.peers().any(|peer| peer.id == PEER));
 }
 
-/// A registration by which JAUS++ is known for sure.
+/// A registration that identifies JAUS++ with certainty.
 const REGISTRATION: &[u8] = b"\x00\x0B\x01\x1Curn:jaus:jss:jpp:extras:Name\x01\x00";
 
 #[test]
@@ -398,7 +397,7 @@ fn a_forged_sign_does_not_change_how_messages_are_cut() {
             ..from_peer(REGISTRATION)
         };
         rig.hear_from(forged_from, &sign);
-        // Nobody answers challenges.
+        // The challenges stay unanswered.
         rig.pass(Duration::from_secs(5));
         rig.transmits();
         rig.hear(&again(902));
@@ -514,7 +513,7 @@ fn a_challenge_is_acknowledged_and_not_delivered_even_if_the_receiver_is_busy() 
     assert!(sent.len() == 1 && sent[0].1.is_acknowledgement());
     assert_eq!(rig.received(), []);
     rig.inbox.full.clear();
-    // So the services ask whether a client is alive, which a node must not answer for it.
+    // The services query a client's heartbeat in this way, and a node must not answer for it.
     let flags = Flags::new(Priority::High).with_acknowledgement(Acknowledgement::Request);
     rig.hear(&Frame { flags, ..again(8) });
     assert_eq!(rig.received().len(), 1, "any other query is");

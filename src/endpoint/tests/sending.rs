@@ -1,4 +1,4 @@
-//! Where messages go: siblings, known addresses, the group.
+//! Destinations of messages: local components, known addresses, the group.
 
 use super::*;
 

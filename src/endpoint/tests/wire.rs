@@ -1,19 +1,19 @@
-//! Two endpoints and a wire between them, with delay, loss and a bottleneck, in virtual time.
+//! Two endpoints and a simulated wire with delay, loss and a bottleneck, in virtual time.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::*;
 
-/// What happens to datagrams on the way.
+/// The conditions on the wire.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Conditions {
     pub(super) delay: Duration,
-    /// Each datagram takes up to so much longer, by chance; so they overtake one another.
+    /// The largest random extra delay; it reorders datagrams.
     pub(super) jitter: Duration,
-    /// Datagrams lost, of 1000.
+    /// Datagrams lost, per 1000.
     pub(super) loss: u64,
-    /// The most datagrams that may be under way in one direction; what is more is lost.
+    /// The most datagrams in transit in one direction; more are lost.
     pub(super) room: usize,
 }
 
@@ -28,7 +28,7 @@ impl Default for Conditions {
     }
 }
 
-/// When, the how-manieth, at which end, and the octets.
+/// Arrival time, serial number, receiving end and octets.
 type Arrival = (Instant, u64, usize, Vec<u8>);
 
 /// [`US`] at one end, [`PEER`] at the other.
@@ -39,7 +39,7 @@ pub(super) struct Wire {
     chance: u64,
     sent: u64,
     under_way: BinaryHeap<Reverse<Arrival>>,
-    /// What was told, and delivered, at either end.
+    /// The events and deliveries at each end.
     pub(super) told: [Vec<Event>; 2],
     inboxes: [Inbox; 2],
     /// How many datagrams each end has sent.
@@ -75,7 +75,7 @@ impl Wire {
         }
     }
 
-    /// A number below `limit`, by chance.
+    /// A random number below `limit`.
     fn draw(&mut self, limit: u64) -> u64 {
         self.chance ^= self.chance << 13;
         self.chance ^= self.chance >> 7;
@@ -90,7 +90,7 @@ impl Wire {
         message
     }
 
-    /// Takes what the ends want to send.
+    /// Collects the output of both ends.
     fn carry(&mut self) {
         for end in 0..2 {
             while let Some(transmit) = self.ends[end].poll_transmit(self.now) {
@@ -126,7 +126,7 @@ impl Wire {
         self.under_way.push(Reverse(entry));
     }
 
-    /// Goes on to the next thing that happens; whether there was one before `end`.
+    /// Advances to the next event; returns whether there was one before `end`.
     fn step(&mut self, end: Instant) -> bool {
         let arrival = self.under_way.peek().map(|entry| entry.0.0);
         let timeouts = self.ends.iter().filter_map(Endpoint::poll_timeout);
@@ -151,20 +151,20 @@ impl Wire {
         true
     }
 
-    /// Lets time pass until nothing more happens, or as much as is given; how much passed.
+    /// Advances time until nothing more happens, or for at most `time`; returns the time passed.
     pub(super) fn run_for(&mut self, time: Duration) -> Duration {
         let (begin, end) = (self.now, self.now + time);
         while self.step(end) {}
         self.now - begin
     }
 
-    /// The payloads that were delivered at the other end.
+    /// The payloads delivered at the other end.
     pub(super) fn delivered(&mut self) -> Vec<Bytes> {
         let messages = self.inboxes[1].messages.drain(..);
         messages.map(|received| received.payload).collect()
     }
 
-    /// What was told about messages at our end.
+    /// The delivery results at our end.
     pub(super) fn results(&mut self) -> Vec<Event> {
         let is_result = |event: &Event| {
             matches!(
@@ -176,7 +176,7 @@ impl Wire {
     }
 }
 
-/// A message of so many octets that no part of is like another.
+/// A message of this many octets without repeated parts.
 pub(super) fn large(length: usize) -> Bytes {
     let octets = (0..length as u64).map(|index| (index.wrapping_mul(0x9E37_79B9) >> 13) as u8);
     [0x01, 0x4B]
@@ -186,7 +186,7 @@ pub(super) fn large(length: usize) -> Bytes {
         .collect()
 }
 
-/// A message to [`PEER`] that wants an acknowledgement.
+/// A message to [`PEER`] that requests an acknowledgement.
 pub(super) fn reliable(payload: Bytes) -> Outgoing {
     Outgoing {
         acknowledge: true,

@@ -264,7 +264,7 @@ fn who_begins_with_1_and_calls_may_be_taken_for_junior_and_no_node_of_ours() {
     assert_eq!(presumed(&[call(1), frame(2, QUERY)]), likely);
     assert_eq!(presumed(&[frame(1, QUERY), long(2)]), likely);
     assert_eq!(presumed(&[call(1), long(2)]).1, Peer::Junior);
-    // A node of ours that makes its packets as long as they may be, and seeks somebody.
+    // A node of ours that sends packets of the maximum length and searches for a peer.
     let ours = [call(31_361), long(31_362), frame(31_363, QUERY)];
     assert_eq!(presumed(&ours), (Peer::Standard, Peer::Standard));
     // JAUS++ and others may begin with 1 too.

@@ -38,7 +38,7 @@ fn each_departure_names_a_file_and_a_test_that_are_there() {
     }
 }
 
-/// Set to write the page of the table anew.
+/// The environment variable that makes the test rewrite the page.
 const RENEW: &str = "JAUS_RENEW_SNAPSHOTS";
 
 #[test]

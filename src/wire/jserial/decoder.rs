@@ -1,4 +1,4 @@
-//! Reading a serial line as it comes, with noise in it.
+//! Incremental decoder for a serial line, which tolerates noise.
 
 use bytes::{Buf, Bytes, BytesMut};
 
@@ -6,46 +6,46 @@ use super::packet::{Fault, Packet, Progress};
 use super::{DLE, MAX_CONTENT, SOH};
 use crate::wire::{Frame, Version, as5669, as5669a};
 
-/// What a line has brought. The numbers only grow.
+/// Statistics of a serial line. The counters only grow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Counters {
-    /// Sound packets.
+    /// Valid packets.
     pub packets: u64,
-    /// Messages in them.
+    /// Messages in valid packets.
     pub messages: u64,
-    /// Octets that belong to no sound packet.
+    /// Octets outside valid packets.
     pub rubbish_octets: u64,
-    /// What looked like the beginning of a packet, but has no sound header.
+    /// Packet starts without a valid header.
     pub bad_headers: u64,
-    /// Packets with more messages than this side takes.
+    /// Packets longer than the decoder's limit.
     pub too_long: u64,
-    /// Packets with a marker in the wrong place, cut short or lengthened.
+    /// Packets with a misplaced marker, cut short or lengthened.
     pub bad_forms: u64,
-    /// Packets whose content does not have the stated checksum.
+    /// Packets with a wrong content checksum.
     pub bad_checksums: u64,
-    /// Sound packets in which a message does not fit its own sizes; the rest of such a packet is
+    /// Valid packets with a message that contradicts its own sizes; the rest of such a packet is
     /// lost.
     pub malformed: u64,
 }
 
-/// The receiving side of a line: octets in, frames out.
+/// Decodes the receiving direction of a line.
 ///
-/// Give it what arrives with [`push`](Self::push) and take frames until there are no more, each
-/// time. It holds at most one unfinished packet, as it came and unstuffed.
+/// Pass received octets to [`push`](Self::push), then take frames until there are no more. The
+/// decoder holds at most one unfinished packet, both raw and unstuffed.
 ///
-/// Noise costs the packets that it hits. Whatever cannot become a packet any more is searched for
-/// another beginning right behind its own, since a DLE from the noise may have hidden the next
-/// packet's; content is gone through twice at the most.
+/// Noise destroys only the packets that it hits. After a broken packet, the search for the next
+/// start resumes right after the broken one's own start, because a DLE in the noise may have hidden
+/// the next packet's. Content is scanned at most twice.
 #[derive(Debug)]
 pub struct Decoder {
     limit: usize,
-    /// What has come, from the beginning of the packet that is being read.
+    /// Received octets, from the beginning of the current packet.
     input: BytesMut,
-    /// How much of it has been read.
+    /// How many of them have been read.
     at: usize,
-    /// How much of it was content of a packet that failed. What fails in there is not gone
-    /// through again.
+    /// How many of them were content of a failed packet. A failure within them does not cause
+    /// another scan.
     searched: usize,
     packet: Option<Packet>,
     messages: Messages,
@@ -59,13 +59,13 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// A decoder that takes packets of any length.
+    /// Creates a decoder that accepts packets of any length.
     #[must_use]
     pub fn new() -> Self {
         Self::with_limit(MAX_CONTENT)
     }
 
-    /// A decoder that takes packets with at most `limit` octets of messages.
+    /// Creates a decoder that accepts at most `limit` octets of messages per packet.
     #[must_use]
     pub fn with_limit(limit: usize) -> Self {
         Self {
@@ -79,19 +79,19 @@ impl Decoder {
         }
     }
 
-    /// What the line has brought so far.
+    /// The statistics so far.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// How many octets wait for the rest of their packet.
+    /// How many octets of an unfinished packet are buffered.
     #[must_use]
     pub fn buffered(&self) -> usize {
         self.input.len()
     }
 
-    /// Takes what has arrived.
+    /// Adds received octets.
     pub fn push(&mut self, octets: &[u8]) {
         self.input.extend_from_slice(octets);
     }
@@ -111,7 +111,7 @@ impl Decoder {
         }
     }
 
-    /// Reads on to the end of the next sound packet; whether there is one.
+    /// Reads up to the end of the next valid packet; returns whether there is one.
     fn read_packet(&mut self) -> bool {
         loop {
             let Some(mut packet) = self.packet.take().or_else(|| self.begin()) else {
@@ -133,11 +133,11 @@ impl Decoder {
         }
     }
 
-    /// Finds the beginning of a packet, and drops what stands before it.
+    /// Finds the start of a packet, and drops everything before it.
     fn begin(&mut self) -> Option<Packet> {
         let found = self.input.windows(2).position(|pair| pair == [DLE, SOH]);
         let rubbish = found.unwrap_or_else(|| {
-            // The last octet may be half of a beginning.
+            // The last octet may be the first half of a start marker.
             self.input.len() - usize::from(self.input.last() == Some(&DLE))
         });
         self.counters.rubbish_octets += rubbish as u64;
@@ -147,7 +147,7 @@ impl Decoder {
         Some(Packet::new(self.limit))
     }
 
-    /// Reads what has arrived into a packet, up to its end.
+    /// Feeds received octets to a packet, up to its end.
     fn read_into(&mut self, packet: &mut Packet) -> Progress {
         while let Some(&octet) = self.input.get(self.at) {
             let progress = if octet != DLE {
@@ -170,7 +170,7 @@ impl Decoder {
         Progress::Unfinished
     }
 
-    /// Counts why there is no packet here, and lets the search go on.
+    /// Counts a broken packet, and moves on to continue the search.
     fn give_up(&mut self, fault: Fault, had_header: bool) {
         *match fault {
             Fault::Header => &mut self.counters.bad_headers,
@@ -180,7 +180,7 @@ impl Decoder {
         } += 1;
         // A false header ends within a few octets, but content can be long.
         let rubbish = if had_header && self.searched > 0 {
-            // The last two may be the marker that broke it, and begin the next packet.
+            // The last two octets may be the marker that broke the packet and starts the next one.
             self.at - 2
         } else {
             2
@@ -199,7 +199,7 @@ impl Decoder {
     }
 }
 
-/// The messages of a sound packet that have not been read yet.
+/// The unread messages of a valid packet.
 #[derive(Debug)]
 struct Messages {
     version: Version,
@@ -218,7 +218,7 @@ impl Default for Messages {
 impl Iterator for Messages {
     type Item = Result<Frame, crate::wire::Error>;
 
-    /// The next message, or what is wrong with it; behind a wrong one there is none.
+    /// The next message, or its error, which ends the iteration.
     fn next(&mut self) -> Option<Self::Item> {
         if self.octets.is_empty() {
             return None;

@@ -1,5 +1,5 @@
-//! JSerial: packets on a serial line, marked so that they are found in noise, with a checksum each
-//! for header and content.
+//! JSerial: packets on a serial line, with markers to find them in noise, and a checksum each for
+//! header and content.
 //!
 //! A packet, before stuffing:
 //!
@@ -15,10 +15,10 @@
 //! | 2 | `DLE ETX` |
 //! | 2 | checksum of everything but the markers, little-endian |
 //!
-//! The octet DLE (10h) is written twice wherever it stands for itself, also in lengths and
-//! checksums. The checksum is CRC-16/MCRF4XX. The second continues the first over the octets of
-//! the first; as a checksum followed by itself leaves nothing, the header is in fact protected by
-//! its own checksum alone.
+//! The octet DLE (10h) is doubled wherever it is not a marker, including in lengths and checksums.
+//! The checksum is CRC-16/MCRF4XX. The second checksum continues the first over the octets of the
+//! first. As a checksum followed by itself leaves no remainder, the header is in effect protected
+//! only by its own checksum.
 //!
 //! A packet may hold several messages. Junior reads only the first, so [`encode`] writes one.
 
@@ -34,16 +34,16 @@ pub use decoder::{Counters, Decoder};
 
 use super::{EncodeError, Frame, Version, as5669, as5669a, ra};
 
-/// The octet that makes a marker of the next one, or is doubled when it means itself.
+/// The octet that turns the next one into a marker, and is doubled in data.
 pub const DLE: u8 = 0x10;
-/// Behind a DLE: a packet begins.
+/// After a DLE: begin of a packet.
 pub const SOH: u8 = 0x01;
-/// Behind a DLE: the header ends.
+/// After a DLE: end of the header.
 pub const STX: u8 = 0x02;
-/// Behind a DLE: the messages end.
+/// After a DLE: end of the messages.
 pub const ETX: u8 = 0x03;
 
-/// The most octets of messages in one packet: what the length field can state.
+/// The most octets of messages in one packet, limited by the length field.
 pub const MAX_CONTENT: usize = u16::MAX as usize;
 
 /// Octets of version and length.
@@ -53,11 +53,11 @@ const CHECK_LEN: usize = 2;
 
 static CHECK: Crc<u16> = Crc::<u16>::new(&CRC_16_MCRF4XX);
 
-/// The packet that carries one message, stuffed and ready to be written.
+/// Encodes a packet with one message, stuffed and ready to send.
 ///
 /// # Errors
-/// A frame that its header cannot carry, or with the header of the Reference Architecture, which
-/// travels in datagrams only.
+/// The header cannot carry the frame, or is that of the Reference Architecture, which is only used
+/// in datagrams.
 pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
     let longest_header = as5669::PREFIX_LEN + ra::HEADER_LEN;
     let mut message = BytesMut::with_capacity(longest_header + frame.payload.len());
@@ -67,7 +67,7 @@ pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
             2
         }
         Version::As5669 => {
-            // Little-endian here, other than in datagrams and streams.
+            // Little-endian here, unlike in datagrams and streams.
             let prefix = [0; as5669::PREFIX_LEN];
             as5669::emit_behind(&prefix, u16::to_le_bytes, frame, &mut message)?;
             1
@@ -77,7 +77,7 @@ pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
     Ok(packet_of(version, &message))
 }
 
-/// A packet around messages, of which there are at most [`MAX_CONTENT`] octets.
+/// Encodes a packet around at most [`MAX_CONTENT`] octets of messages.
 fn packet_of(version: u8, messages: &[u8]) -> Bytes {
     let mut header = [version, 0, 0];
     header[1..].copy_from_slice(&(messages.len() as u16).to_le_bytes());
@@ -88,7 +88,7 @@ fn packet_of(version: u8, messages: &[u8]) -> Bytes {
     check.update(messages);
     let content_check = check.finalize().to_le_bytes();
 
-    // Room for a stuffed octet in 16, which random content does not need.
+    // Room for one stuffed octet in 16, more than random content needs.
     let mut out = BytesMut::with_capacity(messages.len() + messages.len() / 16 + 24);
     out.put_slice(&[DLE, SOH]);
     stuff(&header, &mut out);

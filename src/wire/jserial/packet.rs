@@ -1,24 +1,24 @@
-//! One packet as it is read, octet by octet: what has been unstuffed so far, and whether it can
-//! still become a packet.
+//! The state of a packet that is being read: the octets unstuffed so far, and whether they can
+//! still become a valid packet.
 
 use bytes::{Bytes, BytesMut};
 
 use super::{CHECK, CHECK_LEN, ETX, HEADER_LEN, STX};
 use crate::wire::Version;
 
-/// Octets of the address that a header may hold besides.
+/// Octets of the optional address in the header.
 const ADDRESS_LEN: usize = 2;
 
-/// A packet behind its `DLE SOH`.
+/// A packet in progress, beginning after its `DLE SOH`.
 #[derive(Debug)]
 pub(super) struct Packet {
-    /// The most octets of messages.
+    /// The most octets of messages to accept.
     limit: usize,
-    /// Header, its checksum, messages, their checksum; without markers and stuffing.
+    /// Header, header checksum, messages and content checksum, without markers and stuffing.
     octets: BytesMut,
     /// Set by `DLE STX`.
     header_len: Option<usize>,
-    /// Set when the header has proved sound.
+    /// Set when the header checksum is correct.
     header: Option<Header>,
     /// Set by `DLE ETX`.
     ended: bool,
@@ -33,27 +33,27 @@ struct Header {
     end: usize,
 }
 
-/// What an octet has made of a packet.
+/// The effect of an octet on the packet.
 #[derive(Debug)]
 pub(super) enum Progress {
-    /// It goes on.
+    /// The packet continues.
     Unfinished,
-    /// It is whole and sound: these are its messages.
+    /// The packet is complete and valid; these are its messages.
     Whole(Version, Bytes),
-    /// It cannot be a packet.
+    /// The packet is invalid.
     Broken(Fault),
 }
 
-/// Why a packet is none.
+/// Why a packet is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// The header has no form, version or checksum that a header can have.
+    /// The header has an invalid form, version or checksum.
     Header,
-    /// The header states more than is taken.
+    /// The header states more octets than are accepted.
     TooLong,
-    /// A marker stands where none can, or the end is not where the header says.
+    /// A marker is in the wrong place, or the packet does not end where the header says.
     Form,
-    /// The checksum of the content is wrong.
+    /// The content checksum is wrong.
     Checksum,
 }
 
@@ -68,12 +68,12 @@ impl Packet {
         }
     }
 
-    /// Whether the header was found to be sound.
+    /// Whether a valid header has been read.
     pub(super) const fn has_header(&self) -> bool {
         self.header.is_some()
     }
 
-    /// Takes an octet that means itself.
+    /// Adds a data octet.
     pub(super) fn octet(&mut self, octet: u8) -> Progress {
         self.octets.extend_from_slice(&[octet]);
         let len = self.octets.len();
@@ -88,7 +88,7 @@ impl Packet {
         }
     }
 
-    /// Takes an octet that stood behind a DLE.
+    /// Handles the octet after a DLE.
     pub(super) fn marker(&mut self, marker: u8) -> Progress {
         let len = self.octets.len();
         match (marker, self.header_len, self.header) {
@@ -133,7 +133,7 @@ impl Packet {
     }
 }
 
-/// Whether the two octets behind the first `len` are their checksum.
+/// Whether the two octets after the first `len` are their checksum.
 fn is_sound(octets: &[u8], len: usize) -> bool {
     let (covered, check) = octets.split_at(len);
     CHECK.checksum(covered).to_le_bytes() == *check

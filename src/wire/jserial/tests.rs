@@ -1,4 +1,4 @@
-//! Packets as recorded from Junior, between and within noise.
+//! Packets recorded from Junior, between and within noise.
 
 use bytes::Bytes;
 use proptest::prelude::*;
@@ -10,11 +10,11 @@ use crate::wire::tests::{any_frame, hex};
 /// Junior to 2.1.1: AS5669A.
 const PACKET: &str = "1001 02 1e00 1002 0a83 001e00 19 01010200 01010100 014b00000000 \
                       78787878787878787878 0100 1003 20e2";
-/// The acknowledgement and another message, as they came in one read.
+/// The acknowledgement and another message, as received in one read.
 const TWO: &str = "1001 02 0e00 1002 9b16 000e00 31 01010100 01010200 0100 1003 7c39 \
                    1001 02 1e00 1002 0a83 001e00 01 01010100 01010200 014b00000000 \
                    78787878787878787878 0100 1003 b0e8";
-/// Junior: AS5669, which holds a DLE in the data size of its header.
+/// Junior: AS5669, with a DLE in the data size of its header.
 const OLDER: &str = "1001 01 2400 1002 bc27 0000 2000 0602 014b 01010200 01010100 101000 0100 \
                      014b 7878787878787878787878787878 1003 97ea";
 
@@ -67,11 +67,11 @@ fn recorded_packets_are_read_and_written_again() {
 
 #[test]
 fn every_octet_is_stuffed_where_it_means_itself() {
-    // 2 + 14 octets make a length of 10h, which stands in the packet's and the message's header.
+    // 2 + 14 octets make a length of 10h, in the header of both packet and message.
     let sixteen = encode(&frame(hex("1001"))).unwrap();
     assert_eq!(sixteen[..6], hex("1001 02 101000")[..]);
     assert_eq!(sound(&sixteen), [frame(hex("1001"))]);
-    // Enough messages for a DLE to come up in every octet of both checksums.
+    // Enough messages for a DLE to occur in every octet of both checksums.
     let any = (0..20_000_u16).map(|n| frame(n.to_be_bytes().to_vec()));
     for frame in any {
         assert_eq!(sound(&encode(&frame).unwrap()), [frame]);
@@ -181,8 +181,8 @@ fn a_message_that_does_not_fit_its_packet_costs_the_rest_of_the_packet() {
     assert_eq!((counters.packets, counters.malformed), (1, 1));
 }
 
-/// The cases in which noise could hide the beginning of a sound packet: it ends in a DLE, it looks
-/// like a beginning, it cuts a packet in the middle of a pair.
+/// The cases in which noise could hide the beginning of a valid packet: it ends in a DLE, it looks
+/// like a beginning, or it cuts a packet in the middle of a pair.
 #[test]
 fn noise_does_not_hide_the_next_packet() {
     let next = hex(PACKET);
@@ -205,8 +205,8 @@ fn noise_does_not_hide_the_next_packet() {
     }
 }
 
-/// Exhaustive: each octet of two packets is replaced by every other one. A checksum of 16 bits
-/// finds whatever one octet can do; a marker or stuffing that is gone or new shows in the form.
+/// Exhaustive: each octet of two packets is replaced by every other value. A 16-bit checksum
+/// detects any single changed octet; a lost or added marker or stuffing octet breaks the form.
 #[test]
 fn no_flipped_octet_makes_another_message() {
     for recorded in [PACKET, OLDER] {
@@ -226,8 +226,7 @@ fn no_flipped_octet_makes_another_message() {
     }
 }
 
-/// Headers within headers, each sound and promising much: the worst that content can do to the
-/// search.
+/// Nested headers, each valid and announcing much content: the worst case for the search.
 #[test]
 fn nested_beginnings_do_not_multiply_the_work_or_the_memory() {
     let header = &packet_of(2, &[0; 60_000])[..9];
@@ -249,7 +248,7 @@ fn any_frames() -> impl Strategy<Value = Vec<Frame>> {
     prop::collection::vec(version.prop_flat_map(any_frame), 1..6)
 }
 
-/// Octets that are rich in what means something on a line.
+/// Octets with a high share of those that are special on a line.
 fn noise(most: usize) -> impl Strategy<Value = Vec<u8>> {
     let octet = prop_oneof![4 => Just(DLE), 2 => 1_u8..4, 2 => any::<u8>()];
     prop::collection::vec(octet, 0..most)

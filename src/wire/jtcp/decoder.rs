@@ -1,4 +1,4 @@
-//! Reading a JTCP stream as it arrives, cut anywhere.
+//! Incremental decoder for a JTCP stream, which may be split anywhere.
 
 use bytes::{Buf, Bytes, BytesMut};
 use nom::number::streaming::{be_u16, le_u16, u8};
@@ -8,14 +8,14 @@ use super::SIZE_LEN;
 use crate::wire::judp::{VERSION_AS5669, VERSION_AS5669A};
 use crate::wire::{Error, Frame, Kind, Problem, Version, as5669a, ra};
 
-/// Up to this length a message is copied out of the stream's buffer (well under a microsecond), so
-/// that a small payload that somebody keeps does not hold on to a large buffer.
+/// Messages up to this length are copied out of the stream's buffer (in well under a microsecond),
+/// so that a retained small payload does not keep a large buffer alive.
 const COPIED: usize = 16 * 1024;
 
-/// One direction of a connection: octets in, frames out.
+/// Decodes one direction of a connection.
 ///
-/// Put what arrives into [`input`](Self::input) and take frames until there are no more, each time:
-/// then at most one unfinished message (64 KiB) is held besides.
+/// Append received octets to [`input`](Self::input), then take frames until there are no more: the
+/// decoder then holds at most one unfinished message (64 KiB).
 ///
 /// ```
 /// use jaus::wire::jtcp::Decoder;
@@ -33,54 +33,53 @@ const COPIED: usize = 16 * 1024;
 pub struct Decoder {
     version: Option<Version>,
     input: BytesMut,
-    /// Octets of the stream before those in `input`.
+    /// Octets of the stream consumed before `input`.
     offset: usize,
-    /// Whether a version octet stands before what comes next, besides the stream's first.
+    /// Whether a repeated version octet precedes the next message.
     version_again: bool,
     repeats_version: bool,
     failed: Option<Error>,
 }
 
-/// What stands where a message may begin.
+/// What was found where a message may begin.
 enum Next {
     Version,
-    /// A message of so many octets.
+    /// A message of this many octets.
     Message(usize),
 }
 
 impl Decoder {
-    /// A decoder for a new connection.
+    /// Creates a decoder for a new connection.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Where to append what has arrived.
+    /// The buffer to append received octets to.
     pub const fn input(&mut self) -> &mut BytesMut {
         &mut self.input
     }
 
-    /// Gives the memory back that an idle connection does not need.
+    /// Frees memory that an idle connection does not need.
     pub fn release(&mut self) {
         if self.input.is_empty() {
             self.input = BytesMut::new();
         }
     }
 
-    /// The version that the stream began with, once its first octet is there.
+    /// The version of the stream, once its first octet has arrived.
     #[must_use]
     pub const fn version(&self) -> Option<Version> {
         self.version
     }
 
-    /// Whether a version octet stood before the latest frame that was not the stream's first octet.
-    /// JAUS++ writes one before each.
+    /// Whether a repeated version octet preceded the latest frame. JAUS++ writes one before each.
     #[must_use]
     pub const fn repeats_version(&self) -> bool {
         self.repeats_version
     }
 
-    /// How many octets wait for the rest of their message.
+    /// How many octets of an unfinished message are buffered.
     #[must_use]
     pub fn buffered(&self) -> usize {
         self.input.len()
@@ -89,8 +88,8 @@ impl Decoder {
     /// The next frame, or `None` if it has not arrived in full.
     ///
     /// # Errors
-    /// What is wrong, with its offset from the beginning of the stream. From then on there is
-    /// nothing but this error: close the connection.
+    /// The fault, with its offset from the beginning of the stream. From then on every call returns
+    /// this error: close the connection.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, Error> {
         if let Some(error) = self.failed {
             return Err(error);
@@ -123,7 +122,7 @@ impl Decoder {
         }
     }
 
-    /// Reads the first octet of the stream.
+    /// Reads the version octet of the stream.
     fn begin(&mut self) -> Result<Option<Version>, Error> {
         if self.version.is_none() {
             self.version = match self.input.first() {
@@ -137,13 +136,13 @@ impl Decoder {
         Ok(self.version)
     }
 
-    /// What stands at the beginning of the input; `None` if there is too little to tell.
+    /// Classifies the beginning of the input; `None` if there are too few octets.
     fn look(&self, version: Version) -> Result<Option<Next>, Error> {
         let looked = match version {
             Version::As5669a => look_as5669a(&self.input),
             Version::As5669 | Version::Ra => look_as5669(&self.input),
         };
-        // Nothing but missing octets makes these parsers fail.
+        // These parsers fail only for want of octets.
         match looked {
             Ok((_, next)) => next.map(Some).map_err(|problem| self.error(problem)),
             Err(_) => Ok(None),
@@ -199,8 +198,8 @@ fn look_as5669a(input: &[u8]) -> IResult<&[u8], Result<Next, Problem>> {
     Ok((rest, sized(size, as5669a::MIN_LEN + compression)))
 }
 
-/// The size in front of the header and the one in it must agree: nothing else in this version tells
-/// that we are in step with the stream.
+/// The size before the header and the one in it must agree: this version offers no other check that
+/// the decoder is in step with the stream.
 fn look_as5669(input: &[u8]) -> IResult<&[u8], Result<Next, Problem>> {
     const DATA_SIZE_AT: usize = 12;
     let (rest, stated) = be_u16(input)?;

@@ -1,27 +1,26 @@
-//! JTCP: messages one after the other in a TCP stream, delimited by their own size fields.
+//! JTCP: consecutive messages in a TCP stream, delimited by their own size fields.
 //!
-//! The first octet of each direction is the version, as in JUDP: 02h is AS5669A, 01h AS5669. Behind
-//! it come messages of that version:
+//! The first octet of each direction is the version, as in JUDP: 02h is AS5669A, 01h AS5669.
+//! Messages of that version follow:
 //!
-//! * AS5669A: the message of [`as5669a`]. Junior writes the version octet once,
-//!   JAUS++ before each message and as a segment of its own; both are read.
-//! * AS5669: the length of header and data (2 octets, big-endian), then the header of
-//!   [`ra`]. Only Junior writes it, and the version octet once.
+//! * AS5669A: the message of [`as5669a`]. Junior writes the version octet once, JAUS++ before each
+//!   message and as a segment of its own; both are accepted.
+//! * AS5669: the length of header and data (2 octets, big-endian), then the header of [`ra`]. Only
+//!   Junior writes it, with the version octet once.
 //!
 //! # Version octet or message?
 //!
-//! Where an AS5669A message may begin, 02h is either the version octet again or the type octet of
-//! a message of the reserved type 2. It is **the version if the octet behind it has message type 0**
-//! (bits 0-5), as the first octet of every message that anybody sends. Otherwise it is a
-//! message of type 2, which is read past by its size. That leaves one case to misread: a message
-//! of type 2 whose size is a multiple of 64. A type that nobody has defined can wait for its
-//! definition.
+//! Where an AS5669A message may begin, 02h is either a repeated version octet or the type octet of
+//! a message of the reserved type 2. It is **the version if the next octet has message type 0**
+//! (bits 0-5), as every message of a known implementation begins. Otherwise it is a message of type
+//! 2, which is skipped by its size. This misreads one case: a message of type 2 whose size is a
+//! multiple of 64. Type 2 is undefined so far, so the case does not arise yet.
 //!
 //! # After an error
 //!
-//! A size that cannot be leaves no way to tell where the next message begins, and whatever looks
-//! like one could be payload. So a [`Decoder`] that met an error gives nothing but that error, and
-//! its connection is to be closed.
+//! After an invalid size there is no way to find the next message: anything that looks like one
+//! could be payload. A [`Decoder`] therefore keeps returning its first error, and the connection
+//! must be closed.
 
 mod decoder;
 #[cfg(test)]
@@ -34,15 +33,15 @@ pub use decoder::Decoder;
 use super::judp::{VERSION_AS5669, VERSION_AS5669A};
 use super::{EncodeError, Frame, Version, as5669, as5669a, ra};
 
-/// Octets of the size in front of an AS5669 header.
+/// Octets of the size field before an AS5669 header.
 const SIZE_LEN: usize = 2;
 
-/// The octets of one message, with the version octet in front. Only where a stream begins is that
-/// octet to be written: see [`split_version`].
+/// Encodes one message, with the version octet in front. That octet is only sent at the beginning
+/// of a stream: see [`split_version`].
 ///
 /// # Errors
-/// A frame that its header cannot carry, or with the header of the Reference Architecture, which
-/// travels in datagrams only.
+/// The header cannot carry the frame, or is that of the Reference Architecture, which is only used
+/// in datagrams.
 pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
     let mut out = BytesMut::with_capacity(1 + SIZE_LEN + ra::HEADER_LEN + frame.payload.len());
     match frame.version {
@@ -59,7 +58,7 @@ pub fn encode(frame: &Frame) -> Result<Bytes, EncodeError> {
     Ok(out.freeze())
 }
 
-/// Takes what [`encode`] wrote apart: the version, and the message alone.
+/// Splits the output of [`encode`] into the version and the message.
 #[must_use]
 pub fn split_version(mut encoded: Bytes) -> (Version, Bytes) {
     let version = match encoded.first() {

@@ -1,4 +1,4 @@
-//! Streams as recorded from Junior and JAUS++, cut everywhere, and streams out of step.
+//! Streams recorded from Junior and JAUS++, split at every octet, and streams out of step.
 
 use bytes::{Bytes, BytesMut};
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ use crate::address::JausId;
 use crate::wire::tests::{any_frame, hex};
 use crate::wire::{Flags, Problem};
 
-/// Junior to 2.1.1, behind the version octet.
+/// Junior to 2.1.1, after the version octet.
 const JUNIOR: &str = "00 1e00 01 01010200 01010100 014b 00000000 78787878787878787878 0100";
 /// JAUS++: 101.1.1 asks 102.1.1 for its identification, for its configuration.
 const JAUSPP: [&str; 2] = [
@@ -190,7 +190,7 @@ fn a_small_payload_does_not_hold_on_to_the_buffer() {
     assert!(!buffer.contains(&frame.payload.as_ptr()));
 }
 
-/// A stream of one version, its version octet written where `before` says and at the beginning.
+/// A stream of one version, with the version octet at the beginning and where `before` says.
 fn stream_of(frames: &[Frame], before: &[bool]) -> BytesMut {
     let mut stream = BytesMut::new();
     for (index, frame) in frames.iter().enumerate() {

@@ -7,28 +7,28 @@ use super::Version;
 use crate::address::JausId;
 use crate::as_text::serde_as_text;
 
-/// An id as the Reference Architecture divides its four octets.
+/// The id of a component in the Reference Architecture, with one octet per field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RaId {
-    /// The subsystem, 1..=254; 255 is all of them.
+    /// The subsystem, 1..=254; 255 means all.
     pub subsystem: u8,
-    /// The node, 1..=254; 255 is all of them.
+    /// The node, 1..=254; 255 means all.
     pub node: u8,
-    /// The component, whose number names its type (33: primitive driver).
+    /// The component, whose number identifies its type (33: primitive driver).
     pub component: u8,
-    /// Which of several components of that type.
+    /// The instance among components of that type.
     pub instance: u8,
 }
 
 impl RaId {
-    /// What stands for all subsystems, nodes, components or instances.
+    /// The value that means all subsystems, nodes, components or instances.
     pub const ALL: u8 = 255;
     /// The component number of a node manager.
     pub const NODE_MANAGER: u8 = 1;
     /// The component number of a communicator.
     pub const COMMUNICATOR: u8 = 35;
 
-    /// The id of these four.
+    /// Creates an id from its four fields.
     #[must_use]
     pub const fn new(subsystem: u8, node: u8, component: u8, instance: u8) -> Self {
         Self {
@@ -39,10 +39,10 @@ impl RaId {
         }
     }
 
-    /// Whom it names as a destination.
+    /// Whether it names one or several components as a destination.
     ///
     /// # Errors
-    /// A field of 0.
+    /// A field is 0.
     pub fn recipients(self) -> Result<Recipients, BadId> {
         let fields = self.fields();
         match fields {
@@ -52,10 +52,10 @@ impl RaId {
         }
     }
 
-    /// That it names one component, as each source must.
+    /// Checks that it names one component, as every source must.
     ///
     /// # Errors
-    /// A field of 0 or 255.
+    /// A field is 0 or 255.
     pub fn require_one(self) -> Result<(), BadId> {
         match self.recipients()? {
             Recipients::One => Ok(()),
@@ -63,20 +63,19 @@ impl RaId {
         }
     }
 
-    /// Whether `id`, which names one component, is meant when this stands as the destination.
+    /// Whether this destination includes `id`, which names one component.
     #[must_use]
     pub fn includes(self, id: Self) -> bool {
         let meant = |(field, other): (u8, u8)| field == other || field == Self::ALL;
         self.fields().into_iter().zip(id.fields()).all(meant)
     }
 
-    /// The id of the Reference Architecture that stands in a header of this version, if it is one.
+    /// The RA id in a header of this version; `None` if the header holds a JAUS id.
     ///
     /// The two older headers carry both kinds: OpenJAUS's messages of the Reference Architecture,
-    /// and messages of the services, which Junior and its like send through them. Nothing in the
-    /// header says which. But the first of the four numbers of an id in the Reference Architecture
-    /// is never 0, and among ids with three numbers only those of subsystems from 256 on have
-    /// another octet there.
+    /// and service messages, which Junior and its forks send in these headers. The header does not
+    /// tell them apart. But the first field of an RA id is never 0, whereas that octet of a JAUS id
+    /// is 0 unless its subsystem is 256 or above.
     #[must_use]
     pub fn in_header(version: Version, id: JausId) -> Option<Self> {
         let id = Self::from(id);
@@ -116,18 +115,18 @@ impl fmt::Display for RaId {
     }
 }
 
-/// Why an id may not stand where it stands.
+/// Why an id is not valid in its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BadId {
-    /// Zero names nobody.
+    /// A field is zero, so that the id names no component.
     #[error("{0} has a field of 0, which names nobody: use 1 to 254")]
     Zero(RaId),
-    /// A source, or a message that asks for an answer, is of one component.
+    /// A source, or the destination of a message that wants an answer, must be one component.
     #[error("{0} has a field of 255, which stands for all: name one component with 1 to 254")]
     Wildcard(RaId),
 }
 
-/// Whom a destination names.
+/// How many components a destination names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recipients {
     /// One component.
@@ -136,7 +135,7 @@ pub enum Recipients {
     Many,
 }
 
-/// Not an id of the Reference Architecture.
+/// The text is not an id of the Reference Architecture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is not an RA id: write subsystem.node.component.instance, each from 0 to 255, for \

@@ -1,13 +1,13 @@
-//! The 16-octet header of the Reference Architecture 3.x, and its UDP framing "JAUS01.0". AS5669
-//! took the header over.
+//! The 16-octet header of the Reference Architecture 3.x, which AS5669 adopted, and its UDP framing
+//! "JAUS01.0".
 //!
 //! Layout, little-endian: properties (2), command code (2), destination (4), source (4), data
 //! control (2: size in bits 0-11, fragment flag in bits 12-15), sequence number (2). Properties:
 //! priority 0..=15 in bits 0-3, acknowledgement in 4-5, service connection in 6, experimental in 7,
 //! version in 8-13.
 //!
-//! An RA id has four fields of one octet each, so its octets read as a [`JausId`] put subsystem and
-//! node into the 16-bit subsystem number; [`RaId`] names the four.
+//! An RA id has four fields of one octet each. Read as a [`JausId`], its subsystem and node
+//! together form the 16-bit subsystem number; [`RaId`] gives access to all four.
 
 use bytes::{BufMut, Bytes, BytesMut};
 use deku::prelude::*;
@@ -21,24 +21,24 @@ use super::{
 use crate::address::JausId;
 pub use id::{BadId, InvalidRaId, RaId, Recipients};
 
-/// What an RA datagram begins with.
+/// The first octets of an RA datagram.
 pub const PREFIX: &[u8; 8] = b"JAUS01.0";
 /// Octets of the header.
 pub const HEADER_LEN: usize = 16;
 /// Octets of the message code, which is a header field here and the beginning of the payload in a
 /// [`Frame`].
 pub const CODE_LEN: usize = 2;
-/// The version bits of what is sent: RA 3.2 and 3.3.
+/// The version bits of outgoing headers: RA 3.2 and 3.3.
 const VERSION_3_3: u16 = 2 << 8;
-/// The longest data that a header of this kind may state (RA 3.3; the field would hold 4095).
+/// The longest data that such a header may state (RA 3.3; the field could hold 4095).
 pub const MAX_DATA: usize = 4080;
 
-/// What a header of version 2 (RA 3.2 and 3.3) says.
+/// The fields of a header of version 2 (RA 3.2 and 3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fields {
-    /// 0 ..= 15; a higher number is taken for 15.
+    /// The priority, 0..=15; higher values are clamped.
     pub priority: u8,
-    /// Whether one is wanted, or this is one.
+    /// Whether the message requests an acknowledgement, or is one.
     pub acknowledgement: Acknowledgement,
     /// Whether the message belongs to a service connection.
     pub service_connection: bool,
@@ -46,13 +46,13 @@ pub struct Fields {
     pub experimental: bool,
     /// The message (command) code.
     pub code: u16,
-    /// For whom.
+    /// The destination.
     pub destination: RaId,
-    /// From whom.
+    /// The source.
     pub source: RaId,
-    /// As [`Header::data_flag`].
+    /// The data flag, as in [`Header::data_flag`].
     pub data_flag: u8,
-    /// Octets of data, at most [`MAX_DATA`]; a higher number is taken for that.
+    /// Octets of data, at most [`MAX_DATA`]; higher values are clamped.
     pub data_size: usize,
     /// The sequence number.
     pub sequence: u16,
@@ -68,12 +68,12 @@ pub struct Header {
     destination: u32,
     source: u32,
     data_control: u16,
-    /// The sequence number; 0 throughout in some peers.
+    /// The sequence number; always 0 in some peers.
     pub sequence: u16,
 }
 
 impl Header {
-    /// The priority, 0..=15; 6 is the ordinary one.
+    /// The priority, 0..=15; the default is 6.
     #[must_use]
     pub const fn priority(&self) -> u8 {
         (self.properties & 0xF) as u8
@@ -103,26 +103,26 @@ impl Header {
         Flags((self.properties & 0b11_0000) as u8).acknowledgement()
     }
 
-    /// The data flag: 0 is a single message, 1 the first part of a large one, 2 a later part, 4 one
-    /// that is sent again, 8 the last; others mean nothing.
+    /// The data flag: 0 is a single message, 1 the first part of a large one, 2 a later part, 4 a
+    /// retransmitted part, 8 the last; other values are undefined.
     #[must_use]
     pub const fn data_flag(&self) -> u8 {
         (self.data_control >> 12) as u8
     }
 
-    /// Octets of data behind the header.
+    /// Octets of data after the header.
     #[must_use]
     pub const fn data_size(&self) -> usize {
         (self.data_control & 0xFFF) as usize
     }
 
-    /// For whom.
+    /// The destination.
     #[must_use]
     pub const fn destination(&self) -> JausId {
         JausId::from_u32(self.destination)
     }
 
-    /// From whom.
+    /// The source.
     #[must_use]
     pub const fn source(&self) -> JausId {
         JausId::from_u32(self.source)
@@ -131,7 +131,7 @@ impl Header {
     /// Reads a header from the beginning of `octets`.
     ///
     /// # Errors
-    /// [`Problem::Truncated`] if there are fewer octets than the header has. The data size is not
+    /// [`Problem::Truncated`] if there are too few octets for a header. The data size is not
     /// checked.
     #[inline]
     pub fn decode(octets: &[u8]) -> Result<Self, Problem> {
@@ -143,8 +143,8 @@ impl Header {
         Ok(header)
     }
 
-    /// Priority, acknowledgement and data control in AS5669A's terms; a wildcard makes the message
-    /// a global broadcast.
+    /// Priority, acknowledgement and data control translated to AS5669A; a wildcard makes the
+    /// message a global broadcast.
     fn flags(&self) -> Result<Flags, Problem> {
         let data = match self.data_control >> 12 {
             0 => DataControl::Single,
@@ -163,7 +163,7 @@ impl Header {
             .with_data(data))
     }
 
-    /// A header that says these.
+    /// Creates a header with these fields.
     #[must_use]
     pub fn new(fields: &Fields) -> Self {
         let flag = |set: bool, bit: u16| u16::from(set) << bit;
@@ -182,7 +182,7 @@ impl Header {
         }
     }
 
-    /// Its octets.
+    /// Encodes the header.
     #[must_use]
     pub fn octets(&self) -> [u8; HEADER_LEN] {
         let mut octets = [0; HEADER_LEN];
@@ -195,7 +195,7 @@ impl Header {
         octets
     }
 
-    /// The header of a frame whose data, without the message code, has `data_size` octets.
+    /// The header of a frame with `data_size` octets of data, not counting the message code.
     fn from_frame(frame: &Frame, code: u16, data_size: usize) -> Self {
         let flags = frame.flags;
         Self::new(&Fields {
@@ -218,7 +218,7 @@ impl Header {
     }
 }
 
-/// Sixteen priorities to four, with the ordinary 6 becoming standard, as Junior maps them.
+/// Maps sixteen priorities to four, with the default 6 becoming standard, as Junior does.
 const fn priority_from_ra(priority: u8) -> Priority {
     match priority {
         0..=5 => Priority::Low,
@@ -233,15 +233,15 @@ const fn priority_to_ra(priority: Priority) -> u8 {
     3 * priority.bits() + 3
 }
 
-/// Reads the message that follows the "JAUS01.0" ending at `offset`, and tells where it ends.
+/// Reads the message after the "JAUS01.0" that ends at `offset`; returns it with its end.
 ///
 /// # Errors
-/// A header or size that does not fit what is there.
+/// The header is incomplete, or its size does not fit the available octets.
 pub fn parse(datagram: &Bytes, offset: usize) -> Result<(Frame, usize), Error> {
     parse_message(datagram, offset, Version::Ra)
 }
 
-/// Reads header and data at `offset` and moves the code in front of the data.
+/// Reads header and data at `offset`, and moves the code to the beginning of the payload.
 pub(super) fn parse_message(
     datagram: &Bytes,
     offset: usize,
@@ -269,10 +269,10 @@ pub(super) fn parse_message(
     Ok((frame, offset + HEADER_LEN + size))
 }
 
-/// Writes header and data behind what `out` holds; on an error nothing is written.
+/// Appends header and data to `out`; on an error nothing is written.
 ///
 /// # Errors
-/// A payload without code, above [`MAX_DATA`], or a frame with a type or compression.
+/// The payload has no code or exceeds [`MAX_DATA`], or the frame has a type or compression.
 pub fn emit(frame: &Frame, out: &mut BytesMut) -> Result<(), EncodeError> {
     let length = frame.payload.len();
     let Some((code, data)) = frame.payload.split_first_chunk() else {

@@ -1,8 +1,8 @@
-//! What one router makes of a frame that it passes on.
+//! How one router forwards single frames.
 
 use super::*;
 
-/// A router with A known on network 0 and C on network 1, fed by hand.
+/// A router that knows A on network 0 and C on network 1; the test injects its input.
 struct Between {
     world: World,
     router: usize,
@@ -56,7 +56,7 @@ fn message(source: JausId, destination: JausId, sequence: u16) -> Frame {
 }
 
 /// As recorded: Junior sends a message for an unknown id to the group, with the flags of a global
-/// broadcast and the wish to be acknowledged, and its relay leaves them so.
+/// broadcast and an acknowledgement request. Its relay does not change them.
 #[test]
 fn flags_ids_and_number_stay_as_they_came() {
     let mut between = Between::new(router_config());
@@ -96,7 +96,7 @@ fn a_repeated_message_is_passed_on_again_and_a_copy_from_elsewhere_is_not() {
     assert_eq!(known.peer, SocketAddr::from(([10, 0, 0, 7], judp::PORT)));
 }
 
-/// In a ring of routers it comes again by the way that it came by at first.
+/// In a ring of routers, the frame returns on the path on which it first arrived.
 #[test]
 fn what_goes_round_between_routers_is_passed_on_only_so_often() {
     for destination in [C, JausId::EVERYONE, JausId::new(9, 9, 9)] {
@@ -188,7 +188,7 @@ fn nothing_goes_back_to_where_it_came_from() {
     let mut between = Between::new(router_config());
     between.hear(0, 7, &message(B, JausId::EVERYONE, 1));
     between.sent();
-    // Both live at one address, or heard each other through the group.
+    // Both share one address, or heard each other through the group.
     between.hear(0, 7, &message(A, B, 2));
     let group = Flags::default().with_broadcast(Broadcast::Global);
     between.hear(
@@ -200,7 +200,7 @@ fn nothing_goes_back_to_where_it_came_from() {
         },
     );
     assert_eq!(between.sent(), []);
-    // Sent to us alone, to be passed on to a neighbour.
+    // Sent to the router alone, to be forwarded to a neighbour.
     between.hear(0, 9, &message(JausId::new(4, 1, 1), A, 4));
     assert_eq!(between.sent().len(), 1);
 }

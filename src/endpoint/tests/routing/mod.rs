@@ -1,5 +1,5 @@
-//! Passing on between links: chains, parallel routers and rings of them. Each world is a few
-//! networks in memory; what is sent arrives 100 µs later.
+//! Forwarding between links: chains, parallel routers and rings. Each world is a few networks in
+//! memory that deliver after 100 µs.
 
 mod forwarded;
 
@@ -12,7 +12,7 @@ const A: JausId = JausId::new(1, 1, 1);
 const B: JausId = JausId::new(2, 1, 1);
 const C: JausId = JausId::new(3, 1, 1);
 
-/// A place where a node is connected to a network.
+/// The connection of a node to a network.
 struct Plug {
     node: usize,
     link: LinkId,
@@ -21,7 +21,7 @@ struct Plug {
     address: SocketAddr,
 }
 
-/// Nodes, and networks between them.
+/// Nodes, and the networks between them.
 struct World {
     now: Instant,
     nodes: Vec<Endpoint>,
@@ -69,7 +69,7 @@ impl World {
         node
     }
 
-    /// Connects a node; its links are numbered like the networks.
+    /// Connects a node; its links have the numbers of the networks.
     fn plug(&mut self, node: usize, network: usize, framing: Framing) {
         let link = LinkId(network as u16);
         let address = SocketAddr::from(([10, 0, network as u8, node as u8 + 1], judp::PORT));
@@ -83,7 +83,7 @@ impl World {
         self.announce(node);
     }
 
-    /// Tells a node its links, as the owner of an endpoint does.
+    /// Announces its links to a node, as the owner of an endpoint does.
     fn announce(&mut self, node: usize) {
         let own = |plug: &&Plug| plug.node == node && plug.framing == Framing::Judp;
         let addresses: Vec<_> = self.plugs.iter().filter(own).map(|p| p.address).collect();
@@ -101,7 +101,7 @@ impl World {
         self.announce(node);
     }
 
-    /// Puts what a node has to send on the networks. Multicast comes back to its sender, too.
+    /// Puts a node's output on the networks. Multicast also comes back to its sender.
     fn collect(&mut self, node: usize) {
         while let Some(transmit) = self.nodes[node].poll_transmit(self.now) {
             let from = self
@@ -130,7 +130,7 @@ impl World {
         handle
     }
 
-    /// Lets all that flies arrive, and what follows from it.
+    /// Delivers everything in transit, and all that follows from it.
     fn settle(&mut self) {
         for _round in 0..1_000_000 {
             let Some((from, to, octets)) = self.flying.pop_front() else {
@@ -138,7 +138,7 @@ impl World {
             };
             self.now += Duration::from_micros(1);
             let (node, path) = (self.plugs[to].node, self.path(from, to));
-            // The same octets, but that a connection hands over frames.
+            // The same octets, except that a connection delivers frames.
             let (now, inbox) = (self.now, &mut self.inboxes[node]);
             match self.plugs[to].framing {
                 Framing::Judp => self.nodes[node].handle_datagram(now, path, octets, inbox),
@@ -160,7 +160,7 @@ impl World {
         }
     }
 
-    /// Lets time pass, with all that happens in it.
+    /// Advances time and handles all events in between.
     fn pass(&mut self, time: Duration) {
         let end = self.now + time;
         while self.now < end {
@@ -178,7 +178,7 @@ impl World {
         std::iter::from_fn(|| self.nodes[node].poll_event()).collect()
     }
 
-    /// The messages that have come to a node.
+    /// The messages that a node has received.
     fn received(&mut self, node: usize) -> Vec<Received> {
         std::mem::take(&mut self.inboxes[node].messages)
     }
@@ -187,7 +187,7 @@ impl World {
         self.nodes[node].counters().get(counter)
     }
 
-    /// Where a node thinks that somebody is.
+    /// The path that a node has learned for an id.
     fn whereabouts(&self, node: usize, id: JausId) -> Option<Path> {
         self.nodes[node]
             .peers()
@@ -317,7 +317,8 @@ fn a_broadcast_reaches_the_routers_components_and_goes_on() {
     assert_eq!(to, [sibling], "a subsystem may span networks");
 }
 
-/// Two routers between the same two networks: 1 datagram of the sender, at most 1 of each router.
+/// Two routers between the same two networks: one datagram from the sender, at most one from each
+/// router.
 #[test]
 fn two_routers_in_parallel_deliver_once_and_make_no_storm() {
     let mut world = World::new();
@@ -337,7 +338,7 @@ fn two_routers_in_parallel_deliver_once_and_make_no_storm() {
     world.send(c, query(C, JausId::EVERYONE));
     world.settle();
     assert_eq!(world.received(a).len(), 1);
-    // The way there is one of the two.
+    // The route is through one of the two.
     world.carried = 0;
     world.send(c, query(C, A));
     world.settle();
@@ -349,8 +350,8 @@ fn two_routers_in_parallel_deliver_once_and_make_no_storm() {
     assert_eq!(world.count(a, Counter::IdConflict), 0);
 }
 
-/// A ring of three networks and three routers: 1 datagram of the sender, and each router passes it
-/// on at most once.
+/// A ring of three networks and three routers: one datagram from the sender, and each router
+/// forwards it at most once.
 #[test]
 fn a_ring_of_three_routers_delivers_once_and_makes_no_storm() {
     let mut world = World::new();
@@ -367,12 +368,12 @@ fn a_ring_of_three_routers_delivers_once_and_makes_no_storm() {
         world.pass(Duration::from_millis(10));
     }
     assert_eq!(world.received(a), []);
-    // Messages for somebody who is nowhere do not circle either.
+    // Messages for an id that does not exist do not circulate either.
     world.carried = 0;
     world.send(a, query(A, JausId::new(9, 9, 9)));
     world.settle();
     assert!(world.carried <= 1 + 3, "{}", world.carried);
-    // And one for somebody who is somewhere comes back acknowledged.
+    // A message for an existing id is acknowledged.
     let handle = world.send(
         b,
         Outgoing {
