@@ -28,7 +28,7 @@ pub const STANDARD_GROUP6: SocketAddrV6 = SocketAddrV6::new(
 );
 
 /// The multicast group of a link: `239.255.0.1`, which means port 3794, `239.255.0.1:3794`, or
-/// `off` for unicast alone.
+/// `off` for unicast only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group<A = SocketAddrV4> {
     /// No multicast.

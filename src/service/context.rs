@@ -89,8 +89,7 @@ impl<'a> Context<'a> {
         self.out.send_octets(destination, payload);
     }
 
-    /// Replies to the sender of a message alone, even if the message was a broadcast, with its
-    /// priority.
+    /// Replies to the sender of a message alone, even to a broadcast, with the message's priority.
     pub fn reply<M: Message>(&mut self, to: &Received, message: &M) {
         self.out.reply(to, message);
     }

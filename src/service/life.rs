@@ -36,7 +36,7 @@ pub enum Rank {
     MovingController,
 }
 
-/// The peers whose life matters to one component.
+/// The peers that one component watches.
 #[derive(Debug)]
 pub struct Life {
     peers: BTreeMap<JausId, Peer>,

@@ -54,8 +54,7 @@ impl Outbox {
         self.push(destination, Broadcast::None, priority, true, message);
     }
 
-    /// Replies to the sender of a message alone, even if the message was a broadcast, with its
-    /// priority.
+    /// Replies to the sender of a message alone, even to a broadcast, with the message's priority.
     pub fn reply<M: Message>(&mut self, to: &Received, message: &M) {
         self.push(to.source, Broadcast::None, to.priority, false, message);
     }

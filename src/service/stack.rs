@@ -263,7 +263,7 @@ impl Stack {
         Handled::Yes
     }
 
-    /// Runs a command whose end a client wants to be notified of.
+    /// Runs a command for a client that requests a command event, unless it must be refused.
     fn carry_out(&mut self, now: Instant, trial: &CommandTrial) {
         let code = trial.code;
         let told = self.services.iter().any(|it| it.tells_end_of(code));

@@ -43,7 +43,7 @@ pub(super) struct Server {
     _closed: SignalClosed,
 }
 
-/// What it takes to attach a component to the node.
+/// The node data needed to attach a component.
 #[derive(Clone, Debug)]
 struct Registrar {
     shared: Arc<Shared>,

@@ -457,9 +457,9 @@ impl Control {
         }
     }
 
-    /// Handles the peer's word that this client no longer controls it. If a release may have
-    /// arrived after the granted request, that release ended it, and control is requested again. If
-    /// another client has control by now, it keeps it, and the answer says so.
+    /// Handles a report that this client no longer controls the peer. If a release may have arrived
+    /// after the granted request, that release ended it, and control is requested again. If another
+    /// client has control by now, it keeps it, and the answer says so.
     fn lose_or_ask_again(
         &mut self,
         now: Instant,

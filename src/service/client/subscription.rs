@@ -157,8 +157,8 @@ impl Subscription {
             && self.event == other.event
     }
 
-    /// Handles a doubt: the peer has given this event's number to another one, or may have
-    /// cancelled it together with another one.
+    /// Requests the event again: the peer has given its number to another event, or may have
+    /// cancelled it together with another event.
     pub(super) fn doubt(&mut self, now: Instant) {
         self.event = None;
         // A peer that gives every event the same number must not cause endless requests.

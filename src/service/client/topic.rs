@@ -91,7 +91,7 @@ pub enum CannotSubscribe {
     /// The wire carries rates up to 1092 Hz in steps of 1/60 Hz.
     #[error("{hz} Hz cannot be asked for: a rate is from 1/60 to 1092 Hz")]
     Rate {
-        /// The wanted rate in hertz.
+        /// The requested rate in hertz.
         hz: f64,
     },
     /// The wire cannot carry the query.

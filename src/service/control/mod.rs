@@ -60,7 +60,7 @@ pub struct AccessControl {
 }
 
 impl AccessControl {
-    /// The default timeout of control in seconds, counted from the client's last request.
+    /// The default of [`timeout`](Self::timeout), in seconds.
     pub const TIMEOUT: u8 = 4;
 
     /// Obeys any client with an authority of at least 1. Control ends when the client has not
@@ -80,10 +80,10 @@ impl AccessControl {
         self
     }
 
-    /// The timeout of control in seconds, counted from the client's last request; 0 disables it. A
-    /// client that has answered Query Heartbeat Pulse before and no longer does loses control after
-    /// 4 s in any case. For a client that never did, 0 means that only standby, release or an
-    /// emergency stops the component.
+    /// The timeout of control in seconds, counted from the client's last request; 0 disables it.
+    /// Control ends a quarter of it late. A client that has answered Query Heartbeat Pulse before
+    /// and no longer does loses control after 4 s in any case. For a client that never did, 0 means
+    /// that only standby, release or an emergency stops the component.
     #[must_use]
     pub const fn timeout(mut self, seconds: u8) -> Self {
         self.timeout = seconds;

@@ -22,7 +22,7 @@ use crate::service::{Identification, Kind, Level, Offer, read};
 const MOST_SERVICES: usize = 128;
 /// … and of the octets of their names together.
 const MOST_URN_OCTETS: usize = 6 * 1024;
-/// Memory of a service beside its name, in octets.
+/// Memory of a service without its name, in octets.
 const OFFER_OCTETS: usize = size_of::<Offer>() + 16;
 
 impl Known {

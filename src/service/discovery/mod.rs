@@ -8,9 +8,9 @@
 //! itself, or sends any other message is queried once, directly, for its name (2B00h) and services
 //! (2B03h). One component of each subsystem, its reporter, is also queried for the subsystem's name
 //! and configuration (2B01h). Components without Discovery appear only in a configuration. They are
-//! listed on the word of their reporter, which is queried for the services of up to 128 of them at
-//! once. Queries are repeated every [`Timing::refresh`], to notice services that come and go. A
-//! component whose own services change notifies its peers at once.
+//! listed on the word of its sender, which is queried for the services of up to 128 of them at once.
+//! Queries are repeated every [`Timing::refresh`], to notice services that come and go. A component
+//! whose own services change notifies its peers at once.
 //!
 //! # Loss of a peer
 //!
@@ -20,7 +20,7 @@
 //! a death is noticed within 12 s. Each further peer adds 2.25 s, up to 33 s in all. A component
 //! that has never answered leaves without probes. One that could not be probed because too many are
 //! silent leaves another 33 s later. A component that was only listed leaves when its subsystem no
-//! longer lists it, or together with its reporter.
+//! longer lists it, or together with the component that listed it.
 //!
 //! # Network load
 //!
@@ -177,7 +177,7 @@ impl Discovery {
         self.known.lock().refused()
     }
 
-    /// Sets the services of the component beside Discovery. Peers are notified of a change.
+    /// Sets the services of the component other than Discovery. Peers are notified of a change.
     pub fn set_offers(&mut self, others: impl IntoIterator<Item = ServiceId>, out: &mut Outbox) {
         let offers = others.into_iter().chain(self.offers()).map(Offer::from);
         let offers = offers.collect();

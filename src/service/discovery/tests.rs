@@ -105,7 +105,7 @@ impl Rig {
         self.discovery.directory().component(id).is_some()
     }
 
-    /// The number of components it knows beside itself.
+    /// The number of other components it knows.
     fn len(&self) -> usize {
         self.discovery.directory().len() - 1
     }
