@@ -1,21 +1,21 @@
-//! A node stack for unmanned systems that speaks SAE JAUS on the wire: AS5669A transport, AS5710
+//! A node stack for unmanned systems that implements SAE JAUS: the AS5669A transport, the AS5710
 //! core services, and services defined in JSIDL (AS5684).
 //!
-//! | you want to | look at |
+//! | task | see |
 //! |---|---|
-//! | offer services, find and ask others | [`component`] |
+//! | offer services, find and query components | [`component`] |
 //! | read and write messages | [`messages`], [`codec`] |
 //! | run a node and see raw messages | [`node`] |
 //! | embed the protocol where there is no tokio | [`endpoint`], [`service`] |
-//! | look into datagrams | [`wire`]; the crate `jaus-view` for captures and JSON |
-//! | know what other implementations do otherwise | [`peer`] |
+//! | inspect datagrams | [`wire`]; the crate `jaus-view` for captures and JSON |
+//! | look up the differences of other implementations | [`peer`] |
 //!
-//! A vehicle with motion control, a world model and missions is the crate `jaus-vehicle`; systems of
-//! the Reference Architecture 3.x are reached through `jaus-ra`; the tool `jaus` is `jaus-cli`.
+//! The crate `jaus-vehicle` adds motion control, a world model and missions. `jaus-ra` reaches
+//! systems of the Reference Architecture 3.x. The command line tool `jaus` is `jaus-cli`.
 //!
-//! Modules know only those below them: `component`, then `service` and `node`, then `link`,
+//! Modules depend only on those below them: `component`, then `service` and `node`, then `link`,
 //! `endpoint`, `peer` and `messages`, then `wire` and `codec`, then `address`. `service` and
-//! `endpoint`, and all below them, open no socket and read no clock.
+//! `endpoint`, and all modules below them, open no socket and read no clock.
 #![forbid(unsafe_code)]
 
 pub mod address;
@@ -37,12 +37,12 @@ pub mod wire;
 #[doc(inline)]
 pub use jaus_codec as codec;
 
-/// The README's programs compile.
+/// Compiles the README's programs.
 #[cfg(all(doctest, feature = "node", feature = "mobility"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-/// So do those of the guide to JSIDL.
+/// Compiles the programs in the guide to JSIDL.
 #[cfg(doctest)]
 #[doc = include_str!("../docs/jsidl.md")]
 struct Jsidl;

@@ -1,4 +1,4 @@
-//! How a component comes to be.
+//! The builder of a component: settings, services, and attachment to a node.
 
 use std::sync::Arc;
 
@@ -16,8 +16,8 @@ use crate::service::{
     Service, Stack, Timing, Transport, UnsafeService,
 };
 
-/// A component that is not attached yet. Transport, Discovery, Liveness and Events are always
-/// offered.
+/// A component that is not attached yet. It always offers Transport, Discovery, Liveness and
+/// Events.
 #[must_use = "a component exists once it is attached to a node"]
 pub struct Builder {
     profile: Profile,
@@ -31,7 +31,7 @@ pub struct Builder {
     services: Vec<Box<dyn Service>>,
 }
 
-/// What stands between a client and a command.
+/// What protects commands from unauthorised clients.
 enum Guard {
     None,
     AccessControl(AccessControl),
@@ -42,16 +42,17 @@ enum Guard {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AttachError {
-    /// The node would not take it.
+    /// The node rejected it.
     #[error(transparent)]
     Node(#[from] node::AttachError),
-    /// A service moves something, or is set up, and what makes that safe is missing.
+    /// A service moves something or can be configured, and the component lacks what makes that
+    /// safe.
     #[error(transparent)]
     Unsafe(#[from] UnsafeService),
     /// Report Identification has one octet for the length of a name.
     #[error("the name \"{name}\" has {length} octets, and at most 255 can be told to others")]
     NameTooLong {
-        /// Its beginning.
+        /// The beginning of the name.
         name: String,
         /// Its length in octets.
         length: usize,
@@ -79,78 +80,78 @@ impl Builder {
         self
     }
 
-    /// What clients may subscribe to at most.
+    /// Sets the limits of events for clients.
     pub const fn event_settings(mut self, settings: EventSettings) -> Self {
         self.events = settings;
         self
     }
 
-    /// Offers Access Control: only the client in control is obeyed. Replaces Management.
+    /// Offers Access Control: only the client in control may command. Replaces Management.
     pub const fn access_control(mut self, settings: AccessControl) -> Self {
         self.guard = Guard::AccessControl(settings);
         self
     }
 
-    /// Offers Management, and Access Control with it: the component acts only while a client
+    /// Offers Management, which includes Access Control: the component acts only while a client
     /// controls it and has made it ready.
     pub const fn management(mut self, settings: Management) -> Self {
         self.guard = Guard::Management(settings);
         self
     }
 
-    /// Names the component itself; without this it has the subsystem's name.
+    /// Names the component itself. The default is the subsystem's name.
     pub fn component_name(mut self, name: impl Into<String>) -> Self {
         self.profile.component = name.into();
         self
     }
 
-    /// Names the node; without this it has the subsystem's name.
+    /// Names the node. The default is the subsystem's name.
     pub fn node_name(mut self, name: impl Into<String>) -> Self {
         self.profile.node = name.into();
         self
     }
 
-    /// Names the system that the subsystem belongs to; without this it has the subsystem's name.
+    /// Names the system that the subsystem belongs to. The default is the subsystem's name.
     pub fn system_name(mut self, name: impl Into<String>) -> Self {
         self.profile.system = name.into();
         self
     }
 
-    /// Whom to look for; everybody without this.
+    /// Sets which components discovery searches for. The default is all.
     pub const fn scope(mut self, scope: Scope) -> Self {
         self.scope = scope;
         self
     }
 
-    /// How often discovery speaks, and when it gives a peer up.
+    /// Sets the pace and the timeouts of discovery.
     pub const fn timing(mut self, timing: Timing) -> Self {
         self.timing = timing;
         self
     }
 
-    /// How long [`Component::query`] waits.
+    /// Sets the timeout and the number of tries of [`Component::query`].
     pub const fn patience(mut self, patience: Patience) -> Self {
         self.patience = patience;
         self
     }
 
-    /// A Liveness service other than the standard one, for instance with a heartbeat.
+    /// Replaces the standard Liveness service, for instance by one with a heartbeat.
     pub fn liveness(mut self, liveness: Liveness) -> Self {
         self.liveness = liveness;
         self
     }
 
-    /// Where the jitter of discovery's times comes from; the id without this.
+    /// Sets the seed of discovery's jitter. The default is the id.
     pub const fn seed(mut self, seed: u64) -> Self {
         self.seed = Some(seed);
         self
     }
 
-    /// Brings the component to life on a node, under a number from 1 to 254.
+    /// Starts the component on a node, under a number from 1 to 254.
     ///
     /// # Errors
-    /// If the number or a name is unusable, the number is taken, or a service is
-    /// [not safe](UnsafeService) by itself.
+    /// If the number or a name is invalid, the number is in use, or the component lacks what a
+    /// service needs to be [safe](UnsafeService).
     ///
     /// # Panics
     /// Outside of a tokio runtime, which a running node has.
@@ -159,11 +160,12 @@ impl Builder {
         self.live_on(node.attach(component)?)
     }
 
-    /// Brings the component to life on a port that is there already, such as one to the node of
-    /// this host, which another process runs ([`Host::attach`](node::Host::attach)).
+    /// Starts the component on an existing port, for instance to the node of this host that another
+    /// process runs ([`Host::attach`](node::Host::attach)).
     ///
     /// # Errors
-    /// If a name is unusable, or a service is [not safe](UnsafeService) by itself.
+    /// If a name is invalid, or the component lacks what a service needs to be
+    /// [safe](UnsafeService).
     ///
     /// # Panics
     /// Outside of a tokio runtime, which a port has.

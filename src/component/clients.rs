@@ -1,5 +1,5 @@
-//! The part of a component's task that serves subscriptions and control: it passes on what becomes
-//! of them to whoever holds them.
+//! The part of a component's task that serves subscriptions and control: it forwards notifications
+//! from the stack to their handles.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -15,9 +15,9 @@ use crate::service::{
     SubscriptionEnd, SubscriptionId, SubscriptionNews, Topic,
 };
 
-/// A wish for something that lasts.
+/// A request for a subscription or for control.
 pub(super) enum Hold {
-    /// Reports, again and again.
+    /// A subscription to reports.
     Subscribe {
         topic: Topic,
         reply: oneshot::Sender<Subscribed>,
@@ -30,58 +30,59 @@ pub(super) enum Hold {
     },
 }
 
-/// A subscription or control that is no longer wanted.
+/// The end of a subscription or of control.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Cancellation {
     Subscription(SubscriptionId),
     Control(ControlId),
 }
 
-/// Sends the cancellation when it is dropped, wherever that happens.
+/// Sends the cancellation when it is dropped, on any thread.
 #[derive(Debug)]
 pub(super) struct Ticket {
     cancellation: Cancellation,
-    /// As long as the bound on what can be held, because each ticket has one word to say.
+    /// The queue cannot outgrow the limits of subscriptions and control, because each ticket sends
+    /// once.
     cancellations: mpsc::UnboundedSender<Cancellation>,
 }
 
 impl Drop for Ticket {
     fn drop(&mut self) {
-        // An error means that the component has stopped, and took leave then.
+        // An error means that the component has stopped, which has ended it.
         let _ = self.cancellations.send(self.cancellation);
     }
 }
 
-/// What has become of a wish for a subscription.
+/// The result of a request for a subscription.
 pub(super) type Subscribed = Result<(Ticket, Arc<Feed>), NotSubscribed>;
 
-/// Why there is none.
+/// Why there is no subscription.
 pub(super) enum NotSubscribed {
     Impossible(CannotSubscribe),
     Ended(SubscriptionEnd),
     NotSent(node::SendError),
 }
 
-/// What has become of a wish for control.
+/// The result of a request for control.
 pub(super) type Controlled = Result<(Ticket, watch::Receiver<Condition>), NotControlled>;
 
-/// Why there is none.
+/// Why there is no control.
 pub(super) enum NotControlled {
     Refused(ControlRefused),
     NotSent(node::SendError),
 }
 
-/// How control is doing.
+/// The state of control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Condition {
-    /// The peer has granted it and reported this status last.
+    /// The peer has granted it. Contains the last reported status.
     Held(Option<u8>),
     Lost(ControlLost),
-    /// The peer has been told, or will never answer.
+    /// The peer has confirmed the release, or will never answer.
     Released,
 }
 
-/// Everything that somebody holds or waits for.
+/// All held and pending subscriptions and control.
 pub(super) struct Clients {
     cancellations: mpsc::UnboundedSender<Cancellation>,
     subscribing: HashMap<SubscriptionId, oneshot::Sender<Subscribed>>,
@@ -91,7 +92,7 @@ pub(super) struct Clients {
 }
 
 impl Clients {
-    /// With the channel on which cancellations come back to [`part`](Self::part).
+    /// Takes the channel on which cancellations return to [`part`](Self::part).
     pub(super) fn new(cancellations: mpsc::UnboundedSender<Cancellation>) -> Self {
         Self {
             cancellations,
@@ -109,7 +110,7 @@ impl Clients {
         }
     }
 
-    /// Begins what is wanted; `transmit` sends what the stack then has to say.
+    /// Starts a request. `transmit` sends the resulting messages of the stack.
     pub(super) fn obey(
         &mut self,
         stack: &mut Stack,
@@ -117,7 +118,7 @@ impl Clients {
         patience: Patience,
         transmit: impl FnOnce(&mut Stack) -> Result<(), node::SendError>,
     ) {
-        // Whoever asked may have gone away: what cannot be told is nobody's loss.
+        // A failed reply is ignored: the caller may have gone.
         match hold {
             Hold::Subscribe { topic, reply } => {
                 match begin_subscription(stack, &topic, patience, transmit) {
@@ -195,7 +196,7 @@ impl Clients {
         }
     }
 
-    /// Gives up what nobody waits for any more.
+    /// Cancels requests whose callers have gone.
     pub(super) fn forget_the_impatient(&mut self, stack: &mut Stack) {
         self.subscribing.retain(|&id, reply| {
             if reply.is_closed() {

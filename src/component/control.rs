@@ -1,4 +1,4 @@
-//! Control over a peer in the hands of an application.
+//! The application's handle for control over a peer.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -17,26 +17,26 @@ use crate::wire::Priority;
 
 /// How long a peer may take to reach a state …
 const STATE_LIMIT: Duration = Duration::from_secs(1);
-/// … and how often it is asked meanwhile.
+/// … and the interval of queries meanwhile.
 const STATE_PAUSE: Duration = Duration::from_millis(100);
 
-/// Exclusive control over a component. Made by [`Component::control`]; it renews itself, and
-/// dropping it gives control back.
+/// Exclusive control over a component. Created by [`Component::control`]. It renews itself;
+/// dropping it releases control.
 ///
-/// Control can be lost at any time: to a client with a greater authority, to an emergency, to a
-/// restart of the peer, to a broken network. It is not requested again automatically, because
-/// another client may have had a reason to take it.
+/// Control can be lost at any time: to a client with a greater authority, in an emergency, after a
+/// restart of the peer, or through a network failure. It is not requested again automatically,
+/// because another client may have had a reason to take it.
 ///
-/// While control is held the peer's status is asked for five times a second. After
-/// [`resume`](Self::resume) commands can be sent as long as the peer says that it is ready.
+/// While control is held, the peer's status is queried five times a second. After
+/// [`resume`](Self::resume), commands can be sent while the peer reports that it is ready.
 #[derive(Debug)]
 pub struct Control {
-    /// Dropped before the component is.
+    /// Dropped before the component.
     ticket: Ticket,
     component: Component,
     peer: JausId,
     condition: watch::Receiver<Condition>,
-    /// Whether the application has made the peer ready, and not put it into standby since.
+    /// Whether the application has resumed the peer, and not put it into standby since.
     expects_ready: AtomicBool,
 }
 
@@ -56,19 +56,19 @@ impl Control {
         }
     }
 
-    /// What is controlled.
+    /// The controlled component.
     #[must_use]
     pub const fn peer(&self) -> JausId {
         self.peer
     }
 
-    /// Whether control is held, as far as is known now.
+    /// Whether control is held, as far as known now.
     #[must_use]
     pub fn is_held(&self) -> bool {
         self.check_held().is_ok()
     }
 
-    /// Waits until control is lost, and says why. Waits for ever while it is held.
+    /// Waits until control is lost, and returns the reason. Waits for ever while it is held.
     pub async fn lost(&mut self) -> ControlError {
         let is_over = |now: &Condition| !matches!(now, Condition::Held(_));
         drop(self.condition.wait_for(is_over).await);
@@ -78,7 +78,7 @@ impl Control {
         }
     }
 
-    /// Sends a command and forgets it.
+    /// Sends a command without acknowledgement.
     ///
     /// # Errors
     /// Those of [`check`](Self::check), or if the message could not be sent.
@@ -87,45 +87,45 @@ impl Control {
         Ok(self.component.send(self.peer, command)?)
     }
 
-    /// Sends a command until the peer acknowledges it. That says that the peer has it, not that it
-    /// has carried it out.
+    /// Sends a command with retransmission until the peer acknowledges it. The acknowledgement
+    /// confirms the arrival, not the execution.
     ///
     /// # Errors
-    /// Those of [`check`](Self::check), or if the message is not known to have arrived.
+    /// Those of [`check`](Self::check), or if delivery is not confirmed.
     pub async fn deliver<M: Message>(&self, command: &M) -> Result<(), ControlError> {
         self.check()?;
         Ok(self.component.deliver(self.peer, command).await?)
     }
 
-    /// Makes the peer act on commands, and waits until it says that it is ready.
+    /// Makes the peer act on commands, and waits until it reports that it is ready.
     ///
     /// # Errors
-    /// If control is lost, or the peer does not say so.
+    /// If control is lost, or the peer does not report the state.
     pub async fn resume(&self) -> Result<(), ManageError> {
         self.manage(&Resume {}, State::Ready).await?;
         self.expects_ready.store(true, Ordering::Relaxed);
         Ok(())
     }
 
-    /// Makes the peer stop and wait, and waits until it says that it does.
+    /// Puts the peer into standby, and waits until it reports that state.
     ///
     /// # Errors
-    /// If control is lost, or the peer does not say so.
+    /// If control is lost, or the peer does not report the state.
     pub async fn standby(&self) -> Result<(), ManageError> {
         self.expects_ready.store(false, Ordering::Relaxed);
         self.manage(&Standby {}, State::Standby).await
     }
 
-    /// Makes the peer begin anew, which ends control.
+    /// Resets the peer, which ends control.
     ///
     /// # Errors
-    /// If control is lost, or the peer does not have it.
+    /// If control is lost, or delivery is not confirmed.
     pub async fn reset(self) -> Result<(), ControlError> {
         self.deliver(&Reset {}).await
     }
 
-    /// Gives control back, and waits until the peer has confirmed that, or has been asked to often
-    /// enough. Dropping does the same without waiting.
+    /// Releases control, and waits until the peer confirms or the release times out. Dropping does
+    /// the same without waiting.
     pub async fn release(self) {
         let Self {
             ticket,
@@ -134,7 +134,7 @@ impl Control {
         } = self;
         drop(ticket);
         let ended = |now: &Condition| *now == Condition::Released;
-        // An error means that the component has stopped, and took leave then.
+        // An error means that the component has stopped, which has released control.
         let _ = condition.wait_for(ended).await;
     }
 
@@ -145,11 +145,11 @@ impl Control {
             .await
     }
 
-    /// Whether commands can be sent.
+    /// Checks that commands can be sent.
     ///
     /// # Errors
-    /// If control is lost: why. [`ControlError::NotReady`] if the peer was made ready and has said
-    /// since that it is in another state; [`resume`](Self::resume) may help.
+    /// The reason if control is lost. [`ControlError::NotReady`] if the peer was resumed and has
+    /// since reported another state; [`resume`](Self::resume) may help.
     pub fn check(&self) -> Result<(), ControlError> {
         self.check_held()?;
         match *self.condition.borrow() {
@@ -178,12 +178,12 @@ impl Control {
 }
 
 impl Component {
-    /// Stops a peer that offers Management, controlled or not, until
-    /// [`clear_emergency`](Self::clear_emergency) from this component; waits until it says that it
-    /// has stopped. Anybody may do that.
+    /// Sets an emergency at a peer that offers Management, which stops it until this component
+    /// calls [`clear_emergency`](Self::clear_emergency). Waits until the peer reports the
+    /// emergency. This needs no control.
     ///
     /// # Errors
-    /// If the peer does not say that it has stopped.
+    /// If the peer does not report the emergency.
     pub async fn set_emergency(&self, peer: JausId) -> Result<(), ManageError> {
         let set = SetEmergency {
             emergency_code: 1.into(),
@@ -192,11 +192,11 @@ impl Component {
             .await
     }
 
-    /// Takes an emergency back that this component has set, and waits until the peer says that it is
-    /// over, or for a second: it is not if another component has set one, too.
+    /// Clears an emergency that this component has set. Waits until the peer reports its end, but
+    /// at most about a second: it continues if another component has set one, too.
     ///
     /// # Errors
-    /// If the peer does not say how it is.
+    /// If the peer does not report its status.
     pub async fn clear_emergency(&self, peer: JausId) -> Result<(), ManageError> {
         let clear = ClearEmergency {
             emergency_code: 1.into(),
@@ -207,7 +207,7 @@ impl Component {
             .map(drop)
     }
 
-    /// Tells a peer to be in a state, until it says that it is.
+    /// Sends a state command until the peer reports that state.
     async fn bring<M: Message>(
         &self,
         priority: Priority,
@@ -226,9 +226,9 @@ impl Component {
         }
     }
 
-    /// Gives a command again and again, for a second at least, until the status is as wanted: what
-    /// is big takes a moment to change, and some peers never acknowledge that they were told. Says
-    /// what the status is in the end.
+    /// Repeats a command for at least a second, until the status is as wanted: a large machine
+    /// takes a moment to change state, and some peers never acknowledge commands. Returns the last
+    /// status.
     async fn tell_until<M: Message>(
         &self,
         priority: Priority,

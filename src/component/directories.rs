@@ -1,4 +1,4 @@
-//! The directories of a node that its components share: one for each scope and timing.
+//! The directories that the components of a node share: one for each scope and timing.
 
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
@@ -16,12 +16,13 @@ struct Shared {
     scope: Scope,
     timing: Timing,
     known: Arc<NodeDirectory>,
-    /// How many changes there were; all members follow it.
+    /// The number of changes so far; all members watch it.
     changes: watch::Sender<u64>,
 }
 
-/// A component's part in a directory. Dropped after its [`Discovery`](crate::service::Discovery), it
-/// tells the others that the component is gone.
+/// A component's membership of a directory. It is dropped after the component's
+/// [`Discovery`](crate::service::Discovery), and then notifies the other members that the component
+/// is gone.
 #[derive(Debug)]
 pub(super) struct Membership {
     shared: Arc<Shared>,
@@ -29,7 +30,7 @@ pub(super) struct Membership {
 }
 
 impl Directories {
-    /// The directory that a component on this port shares. One that looks for nobody, or lives on the
+    /// The directory for a component on this port. A component that searches for none, or is on the
     /// node of another process, has its own.
     pub(super) fn join(port: &Port, scope: Scope, timing: Timing, seed: u64) -> Membership {
         let directories: Arc<Self> = port.common();
@@ -63,7 +64,7 @@ impl Membership {
         self.shared.known.clone()
     }
 
-    /// Tells the other members if there are changes.
+    /// Notifies the other members if there are changes.
     pub(super) fn publish(&self) {
         let now = self.shared.known.change_count();
         let told = &self.shared.changes;
@@ -72,7 +73,7 @@ impl Membership {
 
     /// Waits until another member has changed the directory.
     pub(super) async fn changed(&mut self) {
-        // An error cannot be: the sender is in what we hold.
+        // This cannot fail: `shared` holds the sender.
         let _ = self.changes.changed().await;
     }
 }

@@ -1,5 +1,5 @@
-//! The task of a component: it gives the services messages and the time, and carries out what
-//! they want. However it ends, the services stop what they move.
+//! The task of a component: passes messages and the time to the services, and executes their
+//! output. However it ends, the services stop what they move.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
@@ -21,30 +21,30 @@ use crate::service::{
     Change, Condition, Event, Inquiry, NoAnswer, Patience, Service, Stack, Standing, UnsafeService,
 };
 
-/// What the application wants of its component.
+/// A request of the application to its component's task.
 pub(super) enum Command {
-    /// To have a question answered.
+    /// Send a query and wait for the answer.
     Ask {
         peer: JausId,
         query: Bytes,
         report: u16,
         reply: oneshot::Sender<Answer>,
     },
-    /// To have something that lasts.
+    /// Create a subscription or request control.
     Hold(Hold),
-    /// To offer one more service.
+    /// Add a service.
     Offer(Box<dyn Service>, oneshot::Sender<Result<(), UnsafeService>>),
-    /// To offer one less.
+    /// Withdraw a service.
     Withdraw(&'static str),
-    /// To show how the component is.
+    /// Set the reported condition of the component.
     Condition(Condition),
-    /// To tell subscribers that the answer to the query with this code is another.
+    /// Notify subscribers that the answer to the query with this code has changed.
     Announce(u16),
-    /// To tell that a command with this code has ended, well or not.
+    /// Report the end of the command with this code, and whether it was successful.
     End(u16, bool),
 }
 
-/// What has become of a question.
+/// The result of a query.
 #[derive(Debug)]
 pub(super) enum Answer {
     Report(Bytes),
@@ -52,9 +52,9 @@ pub(super) enum Answer {
     NotSent(node::SendError),
 }
 
-/// What the application may read and listen to.
+/// What the application can read and watch.
 pub(super) struct Publisher {
-    /// Wakes those who wait for a change of the directory.
+    /// Wakes tasks that wait for a change of the directory.
     pub(super) directory: watch::Sender<()>,
     pub(super) standing: watch::Sender<Standing>,
     pub(super) changes: Arc<Outlet<Change>>,
@@ -108,7 +108,7 @@ impl Driver {
         }
     }
 
-    /// How long a component that ends tries to give back what it controls.
+    /// How long a component that ends waits for the release of control.
     const LEAVE: Duration = Duration::from_millis(900);
 
     /// Runs until the node stops or the last handle of the component is dropped.
@@ -145,15 +145,16 @@ impl Driver {
         }
     }
 
-    /// Ends what was dropped before a command was given, so that the command finds it ended.
+    /// Ends everything that was dropped before a command was sent, so that the command finds it
+    /// ended.
     fn part(&mut self) {
         while let Ok(cancellation) = self.cancellations.try_recv() {
             self.clients.part(&mut self.stack, cancellation);
         }
     }
 
-    /// Stops what the services move, gives back what others keep for this component, and waits for a
-    /// moment until they have confirmed that.
+    /// Stops what the services move, ends subscriptions and control of peers, and waits a moment
+    /// for the confirmations.
     async fn leave(mut self) {
         let now = Instant::now();
         self.stack.take_leave(now);
@@ -191,7 +192,7 @@ impl Driver {
                     }
                     Err(error) => {
                         self.stack.cancel(now, inquiry);
-                        // Whoever asked may have gone away.
+                        // The caller may have gone.
                         let _ = reply.send(Answer::NotSent(error));
                     }
                 }
@@ -212,7 +213,7 @@ impl Driver {
         }
     }
 
-    /// Carries out whatever the services want.
+    /// Executes the output of the services.
     fn settle(&mut self) {
         if let Err(error) = self.transmit() {
             tracing::debug!(id = %self.stack.id(), %error, "message not sent");
@@ -230,7 +231,7 @@ impl Driver {
                 Event::Answer(inquiry, answer) => {
                     let answer = answer.map_or_else(Answer::None, Answer::Report);
                     if let Some(reply) = self.waiting.remove(&inquiry) {
-                        // Whoever asked may have gone away.
+                        // The caller may have gone.
                         let _ = reply.send(answer);
                     }
                 }
@@ -262,7 +263,7 @@ impl Driver {
         transmit(&mut self.stack, &self.port, &mut self.probes)
     }
 
-    /// Gives up the questions whose askers have gone away.
+    /// Cancels queries whose callers have gone.
     fn forget_the_impatient(&mut self) {
         let stack = &mut self.stack;
         self.waiting.retain(|&inquiry, reply| {
@@ -275,8 +276,8 @@ impl Driver {
     }
 }
 
-/// Probes that wait to be acknowledged: one for each peer at a time, so that a silent one does not fill
-/// its window.
+/// Probes that wait for an acknowledgement: one per peer at a time, so that a silent peer does not
+/// fill its window.
 #[derive(Default)]
 struct Probes {
     tasks: JoinSet<(JausId, bool)>,
@@ -284,7 +285,7 @@ struct Probes {
 }
 
 impl Probes {
-    /// The most peers; it is more than a component probes within the lifetime of a probe.
+    /// Limit of peers: more than a component probes within the lifetime of a probe.
     const MOST: usize = 512;
 
     /// Sends a probe and waits for its acknowledgement, or sends it without one.
@@ -302,7 +303,8 @@ impl Probes {
         Ok(())
     }
 
-    /// The next peer of which it is known whether it has acknowledged; `None` while there is none.
+    /// The next peer whose probe has ended, and whether it was acknowledged; `None` while there is
+    /// none.
     async fn next(&mut self) -> Option<(JausId, bool)> {
         let (peer, delivered) = self.tasks.join_next().await?.ok()?;
         self.peers.remove(&peer);
@@ -310,7 +312,7 @@ impl Probes {
     }
 }
 
-/// Sends everything; returns the first error.
+/// Sends all queued messages; returns the first error.
 fn transmit(stack: &mut Stack, port: &Port, probes: &mut Probes) -> Result<(), node::SendError> {
     let mut result = Ok(());
     while let Some(message) = stack.poll_transmit() {

@@ -1,4 +1,4 @@
-//! What can go wrong for an application, in sentences that say who did not do what.
+//! The errors of the application interface; each names the peer and the failed operation.
 
 use std::fmt;
 use std::time::Duration;
@@ -17,12 +17,12 @@ pub enum SendError {
     /// The wire cannot carry it.
     #[error(transparent)]
     Encode(#[from] EncodeError),
-    /// The node would not take it.
+    /// The node rejected it.
     #[error(transparent)]
     Node(#[from] node::SendError),
 }
 
-/// Why it is not known that a message has arrived.
+/// Why the delivery of a message is not confirmed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeliverError {
@@ -38,29 +38,29 @@ pub enum DeliverError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum QueryError {
-    /// Nobody answered in time.
+    /// The query timed out.
     #[error(
         "{peer} did not answer {query} with {report}: asked {tries} times in {:.1} s",
         waited.as_secs_f64()
     )]
     NoAnswer {
-        /// Who was asked.
+        /// The queried component.
         peer: JausId,
-        /// What was asked.
+        /// The name of the query.
         query: &'static str,
-        /// What was waited for.
+        /// The name of the expected report.
         report: &'static str,
-        /// How often it was asked.
+        /// How often the query was sent.
         tries: u32,
-        /// How long it was waited for.
+        /// How long the query waited.
         waited: Duration,
     },
-    /// The answer is not what the definition says.
+    /// The answer does not match its definition.
     #[error("{peer} answered {query}, but the answer cannot be read")]
     Unreadable {
-        /// Who answered.
+        /// The component that answered.
         peer: JausId,
-        /// What was asked.
+        /// The name of the query.
         query: &'static str,
         /// What is wrong with the answer.
         source: DecodeError,
@@ -68,11 +68,11 @@ pub enum QueryError {
     /// The query could not be sent.
     #[error("{query} could not be sent to {peer}")]
     NotSent {
-        /// Who was to be asked.
+        /// The component to query.
         peer: JausId,
-        /// What was to be asked.
+        /// The name of the query.
         query: &'static str,
-        /// Why not.
+        /// The reason.
         source: SendError,
     },
     /// The component has stopped, because its node has.
@@ -105,34 +105,34 @@ impl QueryError {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SubscribeError {
-    /// It cannot even be asked for.
+    /// No valid request for it can be made.
     #[error("no subscription to {query} of {peer} is possible: {why}")]
     Impossible {
-        /// Whose reports were wanted.
+        /// The component that would send the reports.
         peer: JausId,
-        /// What was to be answered again and again.
+        /// The name of the query.
         query: &'static str,
-        /// Why not.
+        /// The reason.
         why: CannotSubscribe,
     },
     /// The peer did not confirm it.
     #[error("no subscription to {query} of {peer}: {why}")]
     Ended {
-        /// Whose reports were wanted.
+        /// The component that would send the reports.
         peer: JausId,
-        /// What was to be answered again and again.
+        /// The name of the query.
         query: &'static str,
-        /// Why not.
+        /// The reason.
         why: SubscriptionEnd,
     },
     /// The request could not be sent.
     #[error("CreateEvent for {query} could not be sent to {peer}")]
     NotSent {
-        /// Whose reports were wanted.
+        /// The component that would send the reports.
         peer: JausId,
-        /// What was to be answered again and again.
+        /// The name of the query.
         query: &'static str,
-        /// Why not.
+        /// The reason.
         source: SendError,
     },
     /// The component has stopped, because its node has.
@@ -140,33 +140,34 @@ pub enum SubscribeError {
     Stopped,
 }
 
-/// Why a peer is not, or not any more, under control.
+/// Why a peer is not, or no longer, under control.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ControlError {
     /// It was not granted.
     #[error("no control over {peer}: {why}")]
     Refused {
-        /// Who was to be controlled.
+        /// The component to control.
         peer: JausId,
-        /// Why not.
+        /// The reason.
         why: ControlRefused,
     },
     /// It was granted, and lost.
     #[error("control over {peer} is lost: {why}")]
     Lost {
-        /// Who was controlled.
+        /// The component that was controlled.
         peer: JausId,
-        /// What has happened.
+        /// The reason.
         why: ControlLost,
     },
-    /// Control is held, and the peer acts on no command: it was made ready, and is no longer.
+    /// Control is held, but the peer does not act on commands: it was resumed, and is no longer
+    /// ready.
     #[error(
         "{peer} is not ready any more: it reports the status {state}; `resume` makes it ready, \
          unless it is in an emergency or has failed"
     )]
     NotReady {
-        /// Who is controlled.
+        /// The controlled component.
         peer: JausId,
         /// The code of its state, as in Report Status.
         state: u8,
@@ -174,7 +175,7 @@ pub enum ControlError {
     /// A message could not be sent.
     #[error(transparent)]
     NotSent(#[from] SendError),
-    /// A command is not known to have arrived.
+    /// The delivery of a command is not confirmed.
     #[error(transparent)]
     Undelivered(#[from] DeliverError),
     /// The component has stopped, because its node has.
@@ -182,22 +183,22 @@ pub enum ControlError {
     Stopped,
 }
 
-/// Why a peer is not known to have the wanted state.
+/// Why a peer is not known to be in the wanted state.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ManageError {
-    /// The command could not be given.
+    /// The command could not be sent.
     #[error(transparent)]
     Control(#[from] ControlError),
-    /// The peer does not say how it is.
+    /// The peer does not report its state.
     #[error(transparent)]
     Query(#[from] QueryError),
-    /// It has another state.
+    /// It is in another state.
     #[error("{peer} was told to be in the state {wanted}, and reports the status {found}")]
     State {
-        /// Who was told.
+        /// The commanded component.
         peer: JausId,
-        /// The state that was wanted.
+        /// The wanted state.
         wanted: State,
         /// The status code that it reports instead.
         found: u8,
@@ -208,19 +209,19 @@ pub enum ManageError {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FindError {
-    /// None turned up in time.
+    /// None was found in time.
     #[error(
         "no component that offers {service} was found within {:.1} s ({})",
         waited.as_secs_f64(), Instead(*others, instead)
     )]
     NotFound {
-        /// What was looked for: the URN, and the version if it matters.
+        /// The wanted service: its URN, and the version if it matters.
         service: String,
-        /// For how long.
+        /// How long the search took.
         waited: Duration,
-        /// How many components are known at all, without the one that looked.
+        /// The number of known components, without the searching one.
         others: usize,
-        /// Who offers the service in a version that will not do.
+        /// Components that offer the service in an unsuitable version.
         instead: Vec<(JausId, Offer)>,
     },
     /// The component has stopped, because its node has.
@@ -228,7 +229,7 @@ pub enum FindError {
     Stopped,
 }
 
-/// What was found in place of what was looked for.
+/// What was found instead of the wanted service.
 struct Instead<'a>(usize, &'a [(JausId, Offer)]);
 
 impl fmt::Display for Instead<'_> {

@@ -1,5 +1,5 @@
-//! What a component's task tells the holder of a subscription or of control: a bounded queue and
-//! the state of things, shared by the two.
+//! The feed of a subscription: a bounded queue and the state, shared by the component's task and
+//! the reader.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -16,7 +16,7 @@ pub(super) struct Feed {
     state: Mutex<State>,
 }
 
-/// What waits for the reader.
+/// An item in the queue.
 #[derive(Debug)]
 pub(super) enum Item {
     Report(Bytes),
@@ -29,25 +29,25 @@ struct State {
     queue: VecDeque<Item>,
     condition: Condition,
     end: Option<Option<SubscriptionEnd>>,
-    /// The reader, while it waits: there is one at most.
+    /// The reader's waker while it waits; there is at most one reader.
     reader: Option<Waker>,
 }
 
-/// How a subscription is doing.
+/// The state of a subscription.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Condition {
     pub(super) up: bool,
     pub(super) hz: Option<f64>,
     /// Reports that the network or the peer lost.
     pub(super) lost: u64,
-    /// Reports that were thrown away because the reader was slow.
+    /// Reports that were dropped because the reader was slow.
     pub(super) missed: u64,
-    /// Reports that could not be read.
+    /// Reports that did not decode.
     pub(super) unreadable: u64,
 }
 
 impl Feed {
-    /// What may wait for a slow reader; then the oldest report goes.
+    /// Queue limit. For a slow reader, the oldest report is dropped.
     const CAPACITY: usize = 256;
 
     pub(super) fn new() -> Self {
@@ -56,7 +56,7 @@ impl Feed {
         }
     }
 
-    /// The component's side.
+    /// The component's side: queues a notification.
     pub(super) fn tell(&self, news: SubscriptionNews) {
         let mut state = self.lock();
         match news {
@@ -74,7 +74,8 @@ impl Feed {
         wake(state);
     }
 
-    /// The component has stopped; the reader gets what is left, and then the end.
+    /// Ends the feed because the component has stopped. The reader gets the queued items, and then
+    /// the end.
     pub(super) fn stop(&self) {
         let mut state = self.lock();
         state.condition.up = false;
@@ -99,7 +100,7 @@ impl Feed {
         self.lock().condition
     }
 
-    /// Why nothing comes any more, if the peer is to blame.
+    /// Why the subscription has ended, if the peer caused it.
     pub(super) fn end(&self) -> Option<SubscriptionEnd> {
         self.lock().end.clone().flatten()
     }
@@ -113,7 +114,7 @@ impl Feed {
     }
 }
 
-/// Wakes the reader, if it waits, once it can have the lock.
+/// Releases the lock, then wakes the reader if it waits.
 fn wake(mut state: MutexGuard<'_, State>) {
     let reader = state.reader.take();
     drop(state);
@@ -138,7 +139,7 @@ impl State {
         self.queue.push_back(item);
     }
 
-    /// Reports go before news of ups and downs, the oldest first.
+    /// Drops the oldest report; without any report, the oldest item.
     fn make_room(&mut self) {
         let report = |item: &Item| matches!(item, Item::Report(_));
         match self.queue.iter().position(report) {

@@ -1,4 +1,4 @@
-//! The application's end of a component.
+//! The application's handle to a component.
 
 use std::fmt;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ use crate::service::{
 };
 use crate::wire::Priority;
 
-/// A component that lives on a node. Cheap to clone; it stops when the last clone is dropped.
+/// A component on a node. Cheap to clone; it stops when the last clone is dropped.
 #[derive(Debug, Clone)]
 pub struct Component {
     pub(super) shared: Arc<Shared>,
@@ -41,21 +41,21 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    /// Commands that may wait for the component's task.
+    /// Limit of commands that wait for the component's task.
     pub(super) const COMMANDS: usize = 64;
-    /// Changes that a [`Watch`] may lag behind.
+    /// How many changes a [`Watch`] may lag behind.
     pub(super) const CHANGES: usize = 1024;
-    /// Messages that a [`Messages`] may lag behind.
+    /// How many messages a [`Messages`] may lag behind.
     pub(super) const MESSAGES: usize = 256;
 }
 
 impl Component {
-    /// How long [`find`](Self::find) looks before it gives up.
+    /// The default time limit of [`find`](Self::find).
     pub const FIND_LIMIT: Duration = Duration::from_secs(10);
-    /// How many services of other versions a [`FindError`] names.
+    /// How many services of other versions a [`FindError`] lists.
     const MOST_INSTEAD: usize = 8;
 
-    /// A new component: what the subsystem is, and what it is called.
+    /// A builder for a new component: the kind and the name of its subsystem.
     pub fn builder(kind: Kind, name: impl Into<String>) -> Builder {
         Builder::new(kind, name)
     }
@@ -72,25 +72,25 @@ impl Component {
         self.shared.sender.id()
     }
 
-    /// Everybody who is known now, this component included.
+    /// All known components, including this one.
     #[must_use]
     pub fn directory(&self) -> Arc<Directory> {
         self.shared.known.directory()
     }
 
-    /// The state of this component, and who controls it.
+    /// The state of this component, and the client in control.
     #[must_use]
     pub fn standing(&self) -> Standing {
         *self.shared.standings.borrow()
     }
 
-    /// The same, to wait for changes of it.
+    /// The same, as a channel that reports changes.
     #[must_use]
     pub fn watch_standing(&self) -> watch::Receiver<Standing> {
         self.shared.standings.clone()
     }
 
-    /// Tells how this component is, which Management shows to everybody.
+    /// Sets the condition of this component, which Management reports to clients.
     pub async fn set_condition(&self, condition: Condition) {
         // An error means that the component has stopped.
         let _ = self
@@ -100,15 +100,14 @@ impl Component {
             .await;
     }
 
-    /// Tells whoever subscribed to the query `Q` that its answer is another now.
+    /// Notifies the subscribers of the query `Q` that its answer has changed.
     pub async fn changed<Q: Message>(&self) {
         // As in `set_condition`.
         let _ = self.shared.commands.send(Command::Announce(Q::CODE)).await;
     }
 
-    /// Tells that the command of type `C` which was last carried out has ended, and whether it has
-    /// done what it was to do: for services that [`tell_end_of`](crate::service::Handlers::tell_end_of)
-    /// it.
+    /// Reports that the last accepted command of type `C` has ended, and whether it was successful.
+    /// For services that [`tell_end_of`](crate::service::Handlers::tell_end_of) it.
     pub async fn ended<C: Message>(&self, successful: bool) {
         // As in `set_condition`.
         let _ = self
@@ -130,17 +129,16 @@ impl Component {
         Messages::new(self.shared.messages.listen())
     }
 
-    /// Sends a message and forgets it.
+    /// Sends a message without acknowledgement.
     ///
     /// # Errors
-    /// If the wire cannot carry it or the node would not take it. That it was sent does not mean
-    /// that it arrives.
+    /// If the wire cannot carry it or the node rejects it. Success does not mean that it arrives.
     pub fn send<M: Message>(&self, destination: JausId, message: &M) -> Result<(), SendError> {
         self.send_with(Priority::Standard, destination, message)
     }
 
-    /// The same as [`send`](Self::send), with a priority: more urgent messages overtake others in
-    /// every queue on their way.
+    /// Like [`send`](Self::send), with a priority: messages with a higher priority overtake others
+    /// in every queue.
     ///
     /// # Errors
     /// Those of [`send`](Self::send).
@@ -159,11 +157,11 @@ impl Component {
         Ok(())
     }
 
-    /// Sends a message, again and again if need be, and waits until the receiver acknowledges it.
-    /// Dropping the future forgets the message, which may still arrive.
+    /// Sends a message, with retransmission, and waits until the receiver acknowledges it. Dropping
+    /// the future cancels the retransmission; the message may still arrive.
     ///
     /// # Errors
-    /// [`DeliverError`] says why it is not known to have arrived.
+    /// [`DeliverError`] gives the reason why delivery is not confirmed.
     pub async fn deliver<M: Message>(
         &self,
         destination: JausId,
@@ -173,7 +171,7 @@ impl Component {
             .await
     }
 
-    /// The same as [`deliver`](Self::deliver), with a priority.
+    /// Like [`deliver`](Self::deliver), with a priority.
     ///
     /// # Errors
     /// Those of [`deliver`](Self::deliver).
@@ -191,12 +189,12 @@ impl Component {
         Ok(self.shared.sender.deliver(outgoing).await?)
     }
 
-    /// Asks a component, and waits for its answer; asks again if none comes.
+    /// Sends a query to a component, and waits for its answer; repeats the query on timeout.
     ///
-    /// A `peer` with wildcards stands for whoever answers first.
+    /// If `peer` has wildcards, the first answer of any matching component counts.
     ///
     /// # Errors
-    /// [`QueryError`] says who did not answer what, and how long it was waited for.
+    /// [`QueryError`] names the peer and the query, and how long it waited.
     pub async fn query<R: Message, Q: Message>(
         &self,
         peer: JausId,
@@ -228,14 +226,14 @@ impl Component {
         }
     }
 
-    /// Has a component answer a query again and again, and waits until it confirms that.
+    /// Subscribes to the answers to a query, and waits until the component confirms.
     ///
-    /// The subscription then lasts until it is dropped, whatever becomes of the peer; see
-    /// [`Subscription`]. A peer that answers queries but does not offer the service Events
-    /// cannot be subscribed to.
+    /// The subscription then lasts until it is dropped, even if the peer fails; see
+    /// [`Subscription`]. A peer that answers queries but does not offer the Events service cannot
+    /// be subscribed to.
     ///
     /// # Errors
-    /// [`SubscribeError`] says what the peer has against it, or how long it was silent.
+    /// [`SubscribeError`] gives the peer's reason, or how long it was silent.
     pub async fn subscribe<R: Message, Q: Message>(
         &self,
         peer: JausId,
@@ -256,7 +254,7 @@ impl Component {
         self.subscribe_to(topic, Q::NAME).await
     }
 
-    /// Subscribes to a topic, whose query is called `query`.
+    /// Subscribes to a topic; `query` is the name of its query.
     pub(super) async fn subscribe_to<R: Message>(
         &self,
         topic: Topic,
@@ -278,11 +276,12 @@ impl Component {
         }
     }
 
-    /// Takes control of a component, and waits until it grants that. An `authority` is from 0 to
-    /// 255; the greater one wins.
+    /// Requests control of a component, and waits until it is granted. `authority` is from 0 to
+    /// 255; the higher one wins.
     ///
     /// # Errors
-    /// [`ControlError`] says why control was not granted, or how long the peer was silent.
+    /// [`ControlError`] gives the reason why control was not granted, or how long the peer was
+    /// silent.
     pub async fn control(&self, peer: JausId, authority: u8) -> Result<Control, ControlError> {
         let controlled = self
             .hold(|reply| Hold::Control {
@@ -298,7 +297,7 @@ impl Component {
         }
     }
 
-    /// Has the component's task carry something out; `None` when it has stopped.
+    /// Passes a request to the component's task; `None` when it has stopped.
     async fn hold<T>(&self, hold: impl FnOnce(oneshot::Sender<T>) -> Hold) -> Option<T> {
         let (reply, answer) = oneshot::channel();
         let command = Command::Hold(hold(reply));
@@ -306,20 +305,19 @@ impl Component {
         answer.await.ok()
     }
 
-    /// Waits until another component is known that offers a service, in whatever version, for at
-    /// most [`FIND_LIMIT`](Self::FIND_LIMIT). Which version it is stands in the
-    /// [`directory`](Self::directory).
+    /// Waits until another component is known that offers a service, in any version, for at most
+    /// [`FIND_LIMIT`](Self::FIND_LIMIT). The [`directory`](Self::directory) holds the version.
     ///
     /// # Errors
-    /// [`FindError`] says how long it was looked for.
+    /// [`FindError`] gives the time of the search.
     pub async fn find(&self, urn: &str) -> Result<JausId, FindError> {
         self.find_within(urn, Self::FIND_LIMIT).await
     }
 
-    /// The same as [`find`](Self::find), with another limit.
+    /// Like [`find`](Self::find), with another time limit.
     ///
     /// # Errors
-    /// [`FindError`] says how long it was looked for.
+    /// [`FindError`] gives the time of the search.
     pub async fn find_within(&self, urn: &str, limit: Duration) -> Result<JausId, FindError> {
         self.search(&Sought::Service(urn), limit, |others| {
             who(others, |offer| offer.urn == urn)
@@ -327,16 +325,16 @@ impl Component {
         .await
     }
 
-    /// Waits until another component is known that offers a service in a version that a client
-    /// made for `wanted` can use: the same major version, and no older minor one.
+    /// Waits until another component is known that offers a service in a version that a client made
+    /// for `wanted` can use: the same major version, and at least the same minor one.
     ///
     /// # Errors
-    /// [`FindError`] says how long it was looked for, and who offers other versions.
+    /// [`FindError`] gives the time of the search, and the components with other versions.
     pub async fn find_version(&self, wanted: ServiceId) -> Result<JausId, FindError> {
         self.find_version_within(wanted, Self::FIND_LIMIT).await
     }
 
-    /// The same as [`find_version`](Self::find_version), with another limit.
+    /// Like [`find_version`](Self::find_version), with another time limit.
     ///
     /// # Errors
     /// Those of [`find_version`](Self::find_version).
@@ -351,13 +349,12 @@ impl Component {
         .await
     }
 
-    /// Waits until another component is known that offers exactly one of `versions`, and says which
-    /// of them to speak with it: where versions differ on the wire, the one whose messages it
-    /// understands. The versions that the client knows are given with the one that it likes best
-    /// first; it gets that one if anybody offers it.
+    /// Waits until another component is known that offers exactly one of `versions`, and returns
+    /// the version to use with it. For services whose versions differ on the wire. `versions` lists
+    /// what the client supports, in order of preference; the first one that is offered wins.
     ///
     /// # Errors
-    /// [`FindError`] says how long it was looked for, and who offers other versions.
+    /// [`FindError`] gives the time of the search, and the components with other versions.
     pub async fn find_common_version(
         &self,
         versions: &[ServiceId],
@@ -366,7 +363,7 @@ impl Component {
             .await
     }
 
-    /// The same as [`find_common_version`](Self::find_common_version), with another limit.
+    /// Like [`find_common_version`](Self::find_common_version), with another time limit.
     ///
     /// # Errors
     /// Those of [`find_common_version`](Self::find_common_version).
@@ -384,7 +381,7 @@ impl Component {
         .await
     }
 
-    /// Waits until `found` finds what it wants among the other components.
+    /// Waits until `found` returns a result for the other components.
     async fn search<T>(
         &self,
         sought: &Sought<'_>,
@@ -423,10 +420,10 @@ impl Component {
         }
     }
 
-    /// Offers one more service, and tells the peers. Without effect if the component has stopped.
+    /// Offers another service, and notifies the peers. Has no effect if the component has stopped.
     ///
     /// # Errors
-    /// If the service is [not safe](UnsafeService) by itself.
+    /// If the component lacks what the service needs to be [safe](UnsafeService).
     pub async fn offer(&self, service: impl Service + 'static) -> Result<(), UnsafeService> {
         let (reply, answer) = oneshot::channel();
         let command = Command::Offer(Box::new(service), reply);
@@ -435,23 +432,23 @@ impl Component {
         answer.await.unwrap_or(Ok(()))
     }
 
-    /// Takes a service back, in all its versions, and tells the peers.
+    /// Withdraws a service, in all its versions, and notifies the peers.
     pub async fn withdraw(&self, urn: &'static str) {
         // As in `set_condition`.
         let _ = self.shared.commands.send(Command::Withdraw(urn)).await;
     }
 }
 
-/// What is looked for.
+/// The wanted service.
 enum Sought<'a> {
-    /// A service, in whatever version.
+    /// A service in any version.
     Service(&'a str),
     /// A service in one of several versions.
     OneOf(&'a [ServiceId]),
 }
 
 impl Sought<'_> {
-    /// Whether it is about the service with this URN.
+    /// Whether the service with this URN is wanted.
     fn is_of(&self, urn: &str) -> bool {
         match self {
             Self::Service(wanted) => *wanted == urn,
@@ -475,13 +472,13 @@ impl fmt::Display for Sought<'_> {
     }
 }
 
-/// All known components but the one that looks.
+/// All known components except the searching one.
 struct Others<'a> {
     directory: &'a Directory,
     own: JausId,
 }
 
-/// The first of them with an offer that will do.
+/// The first of them with a suitable service.
 fn who(others: &Others<'_>, will_do: impl Fn(&Offer) -> bool) -> Option<JausId> {
     let mut components = others.directory.components();
     let found = components.find(|it| it.id != others.own && it.offered().any(&will_do));

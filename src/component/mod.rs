@@ -1,6 +1,6 @@
-//! What an application builds: components that offer services, and that find and ask others.
+//! The application interface: components that offer services, and that find and query others.
 //!
-//! A vehicle that tells its speed, and an operator that asks for it:
+//! A vehicle that reports its velocity, and an operator that queries it:
 //!
 //! ```no_run
 //! use jaus::component::{Component, Handlers, Kind};
@@ -29,8 +29,8 @@
 //! # }
 //! ```
 //!
-//! What is to be known again and again is subscribed to, and what is to be commanded is taken under
-//! control. Both look after themselves, and say when they cannot:
+//! An application subscribes to values that it needs repeatedly, and takes control of components
+//! that it commands. Subscriptions and control renew themselves, and report when they cannot:
 //!
 //! ```no_run
 //! # use jaus::component::{Component, Update, When};
@@ -54,8 +54,8 @@
 //! # }
 //! ```
 //!
-//! A component lives in a task of its own on the current tokio runtime until the last clone of
-//! its [`Component`] is dropped. The protocol is in [`service`](crate::service); here are only
+//! A component runs in its own task on the current tokio runtime until the last clone of its
+//! [`Component`] is dropped. The protocol is in [`service`](crate::service); this module adds only
 //! the clock, the channels and the names.
 #![expect(
     clippy::disallowed_methods,

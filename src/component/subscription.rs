@@ -1,4 +1,4 @@
-//! A subscription in the hands of an application: a stream of reports that says when it is down.
+//! The application's handle for a subscription: a stream of reports and outages.
 
 use std::future::poll_fn;
 use std::marker::PhantomData;
@@ -13,36 +13,36 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::service::{Outage, SubscriptionEnd};
 
-/// The reports of one peer, as they come. Made by [`Component::subscribe`]; dropping it ends the
+/// The stream of one peer's reports. Created by [`Component::subscribe`]; dropping it ends the
 /// event at the peer.
 ///
-/// It looks after itself: it renews the event, notices when reports stop, and creates the event
-/// anew until the peer is back, be it a second or a day later. In between, [`next`](Self::next)
-/// says that it is down. Up to 256 updates wait for a slow reader; then the oldest report goes.
+/// It renews the event, detects when reports stop, and creates the event again until the peer is
+/// back, after a second or a day. In the meantime [`next`](Self::next) reports the outage. Up to
+/// 256 updates wait for a slow reader; then the oldest report is dropped.
 #[derive(Debug)]
 pub struct Subscription<R> {
-    /// Dropped before the component is.
+    /// Dropped before the component.
     _ticket: Ticket,
-    /// Keeps it running.
+    /// Keeps the component running.
     _component: Component,
     peer: JausId,
     feed: Arc<Feed>,
     report: PhantomData<fn() -> R>,
 }
 
-/// What a subscription brings.
+/// An item of a subscription's stream.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Update<R> {
     /// A report.
     Report(R),
-    /// Nothing comes at present.
+    /// No reports arrive at present.
     Down {
-        /// When the last sign of the event came.
+        /// Time of the last sign of the event.
         since: Instant,
-        /// What is the matter.
+        /// The cause.
         why: Outage,
     },
-    /// It is up: for the first time, or after it was down.
+    /// The event is up: for the first time, or after an outage.
     Up,
 }
 
@@ -62,15 +62,15 @@ impl<R: Message> Subscription<R> {
         }
     }
 
-    /// Waits for the next update; `None` when nothing will come any more, because the component
-    /// has stopped or for the reason that [`end`](Self::end) gives.
+    /// Waits for the next update. `None` at the end, because the component has stopped or for the
+    /// reason given by [`end`](Self::end).
     ///
-    /// Nothing is lost if the returned future is dropped.
+    /// Cancel safe: dropping the returned future loses nothing.
     pub async fn next(&mut self) -> Option<Update<R>> {
         poll_fn(|cx| self.poll_next(cx)).await
     }
 
-    /// The same as [`next`](Self::next) for who writes futures by hand.
+    /// Like [`next`](Self::next), for hand-written futures.
     pub fn poll_next(&mut self, cx: &mut Context<'_>) -> Poll<Option<Update<R>>> {
         loop {
             let Some(item) = ready!(self.feed.poll_next(cx)) else {
@@ -92,8 +92,7 @@ impl<R: Message> Subscription<R> {
         }
     }
 
-    /// Waits for the next report, whether or not the subscription was down in between; `None` as
-    /// with [`next`](Self::next).
+    /// Waits for the next report, across outages; `None` as for [`next`](Self::next).
     pub async fn report(&mut self) -> Option<R> {
         loop {
             if let Update::Report(report) = self.next().await? {
@@ -104,13 +103,13 @@ impl<R: Message> Subscription<R> {
 }
 
 impl<R> Subscription<R> {
-    /// Whose reports these are.
+    /// The component that sends the reports.
     #[must_use]
     pub const fn peer(&self) -> JausId {
         self.peer
     }
 
-    /// Whether the event is up, as far as is known now.
+    /// Whether the event is up, as far as known now.
     #[must_use]
     pub fn is_up(&self) -> bool {
         self.feed.condition().up
@@ -122,25 +121,25 @@ impl<R> Subscription<R> {
         self.feed.condition().hz
     }
 
-    /// How many reports were lost on the way, told by gaps in their numbers.
+    /// The number of reports lost in transit, from gaps in the sequence numbers.
     #[must_use]
     pub fn lost(&self) -> u64 {
         self.feed.condition().lost
     }
 
-    /// How many reports were thrown away because [`next`](Self::next) was not asked often enough.
+    /// The number of reports dropped because [`next`](Self::next) was not called often enough.
     #[must_use]
     pub fn missed(&self) -> u64 {
         self.feed.condition().missed
     }
 
-    /// How many reports were not what their definition says.
+    /// The number of reports that did not decode.
     #[must_use]
     pub fn unreadable(&self) -> u64 {
         self.feed.condition().unreadable
     }
 
-    /// Why the peer will send nothing any more, if it is over.
+    /// Why the peer ended the subscription, if it did.
     #[must_use]
     pub fn end(&self) -> Option<SubscriptionEnd> {
         self.feed.end()

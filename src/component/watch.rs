@@ -1,5 +1,4 @@
-//! What an application can listen to: changes of the directory, and messages that no service
-//! handles.
+//! Streams for the application: changes of the directory, and messages that no service handles.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -9,16 +8,16 @@ use tokio::sync::broadcast::{Receiver, Sender};
 use crate::endpoint::Received;
 use crate::service::Change;
 
-/// Changes of the directory, from when it was asked for.
+/// Changes of the directory since its creation.
 #[derive(Debug)]
 pub struct Watch(Listener<Change>);
 
-/// Messages that no service of the component handles, from when it was asked for.
+/// Messages since its creation that no service of the component handles.
 #[derive(Debug)]
 pub struct Messages(Listener<Received>);
 
-/// Where listeners get their news. It takes no memory while nobody listens, because most of a
-/// node's components have no listener.
+/// The sender for any number of listeners. It allocates nothing while there is none, because most
+/// of a node's components have no listener.
 #[derive(Debug)]
 pub(super) struct Outlet<T> {
     state: Mutex<State<T>>,
@@ -33,7 +32,7 @@ enum State<T> {
 }
 
 impl<T: Clone> Outlet<T> {
-    /// An outlet that keeps so many news for a slow listener.
+    /// An outlet that keeps up to `capacity` items for a slow listener.
     pub(super) const fn new(capacity: usize) -> Self {
         Self {
             state: Mutex::new(State::Quiet),
@@ -58,7 +57,7 @@ impl<T: Clone> Outlet<T> {
 
     pub(super) fn send(&self, news: T) {
         let mut state = self.lock();
-        // An error means that the last listener has gone.
+        // An error means that the last listener is gone.
         if let State::Heard(sender) = &*state
             && sender.send(news).is_err()
         {
@@ -66,7 +65,7 @@ impl<T: Clone> Outlet<T> {
         }
     }
 
-    /// Nothing more will come: listeners get what is left, and then the end.
+    /// Ends the streams: listeners get the queued items, and then the end.
     pub(super) fn end(&self) {
         *self.lock() = State::Ended;
     }
@@ -76,7 +75,7 @@ impl<T: Clone> Outlet<T> {
     }
 }
 
-/// A receiver that counts what it was too slow for.
+/// A receiver that counts the items it was too slow for.
 #[derive(Debug)]
 pub(super) struct Listener<T> {
     receiver: Option<Receiver<T>>,
@@ -93,8 +92,8 @@ impl Watch {
         self.0.next().await
     }
 
-    /// How many changes were lost because this was not asked often enough. The directory itself
-    /// is always right.
+    /// The number of changes lost because [`next`](Self::next) was not called often enough. The
+    /// directory itself is always complete.
     #[must_use]
     pub const fn missed(&self) -> u64 {
         self.0.missed
@@ -111,7 +110,7 @@ impl Messages {
         self.0.next().await
     }
 
-    /// How many messages were lost because this was not asked often enough.
+    /// The number of messages lost because [`next`](Self::next) was not called often enough.
     #[must_use]
     pub const fn missed(&self) -> u64 {
         self.0.missed

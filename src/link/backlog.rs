@@ -1,19 +1,20 @@
-//! What waits because somebody is slower: bounded, the urgent first, and the stale goes.
+//! A bounded priority queue for a slow receiver: most urgent first, and the stale items are
+//! dropped.
 //!
-//! Both ends of a node need it: a link while the network takes nothing more, and a component's
-//! mailbox while it does not read. **When there is no more room, the oldest item of the least
-//! urgent priority present goes**; if all that wait are more urgent than the new item, the new one.
+//! Both ends of a node use it: a link while the network is busy, and a component's mailbox while it
+//! does not read. **When it is full, it drops the oldest item of the lowest priority present**. If
+//! all waiting items are more urgent than the new one, it drops the new one.
 
 use std::collections::VecDeque;
 
 use crate::wire::Priority;
 
-/// How much may wait.
+/// The limits of a backlog.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Bounds {
     /// Items, at least 1.
     pub(crate) items: usize,
-    /// Octets of all items. A single larger one is taken when nothing else waits.
+    /// Octets of all items. A single larger item is accepted if nothing else waits.
     pub(crate) octets: usize,
 }
 
@@ -24,7 +25,7 @@ pub(crate) struct Backlog<T> {
     levels: [Level<T>; Priority::ALL.len()],
 }
 
-/// What waits of one priority.
+/// The queue of one priority.
 #[derive(Debug)]
 struct Level<T> {
     /// The items, each with its octets.
@@ -53,7 +54,7 @@ impl<T> Level<T> {
 }
 
 /// The memory, in items, that an empty level keeps. A burst may need more, but a node has many
-/// components whose only burst is the discovery at its beginning.
+/// components whose only burst is the discovery at the start.
 const KEPT: usize = 32;
 
 impl<T> Backlog<T> {
@@ -76,13 +77,13 @@ impl<T> Backlog<T> {
         self.len() == 0
     }
 
-    /// Whether so many more items fit, and less than half of the octets wait.
+    /// Whether `items` more fit, and at most half of the octets are in use.
     pub(crate) fn has_room(&self, items: usize) -> bool {
         self.len() + items <= self.bounds.items && self.octets() <= self.bounds.octets / 2
     }
 
-    /// Whether less than half of the room is taken by what is as urgent or more. What is put in
-    /// then does not go because of less urgent items.
+    /// Whether items of this or a higher priority take less than half of the room. If so, a new
+    /// item of this priority is never dropped in favour of less urgent ones.
     pub(crate) fn has_reserve(&self, priority: Priority) -> bool {
         let as_urgent = &self.levels[usize::from(priority.bits())..];
         let items: usize = as_urgent.iter().map(|level| level.items.len()).sum();
@@ -90,7 +91,7 @@ impl<T> Backlog<T> {
         items < self.bounds.items.div_ceil(2) && octets <= self.bounds.octets / 2
     }
 
-    /// Takes an item in; returns how many items went for it.
+    /// Adds an item; returns how many items were dropped for it.
     #[must_use]
     pub(crate) fn push(&mut self, priority: Priority, octets: usize, item: T) -> u64 {
         let level = &mut self.levels[usize::from(priority.bits())];
@@ -103,7 +104,7 @@ impl<T> Backlog<T> {
         dropped
     }
 
-    /// Takes out the oldest of the most urgent items.
+    /// Removes the oldest item of the highest priority.
     pub(crate) fn pop(&mut self) -> Option<T> {
         self.levels.iter_mut().rev().find_map(Level::pop)
     }
@@ -113,7 +114,7 @@ impl<T> Backlog<T> {
         items > 1 && (items > self.bounds.items || self.octets() > self.bounds.octets)
     }
 
-    /// Drops the oldest of the least urgent items; whether there was one.
+    /// Drops the oldest item of the lowest priority; returns whether there was one.
     pub(crate) fn drop_least(&mut self) -> bool {
         self.levels.iter_mut().find_map(Level::pop).is_some()
     }

@@ -1,4 +1,4 @@
-//! What can go wrong when a link is opened, said so that a person can put it right.
+//! Errors when opening a link, each with a remedy for people.
 
 use std::io;
 use std::net::{IpAddr, SocketAddr};
@@ -14,9 +14,9 @@ pub enum Error {
     /// The name or address does not belong to this host.
     #[error("there is no network interface `{wanted}` on this host; there are: {available}")]
     NoSuchInterface {
-        /// As it was given.
+        /// The name or address as given.
         wanted: String,
-        /// What could have been given.
+        /// The existing interfaces.
         available: Available,
     },
     /// The interface exists but is not up.
@@ -26,29 +26,29 @@ pub enum Error {
         name = interface.name
     )]
     InterfaceDown {
-        /// The one that was asked for.
+        /// The requested interface.
         interface: Interface,
-        /// What else there is.
+        /// The existing interfaces.
         available: Available,
     },
-    /// The interface has addresses, but none of the version of IP that is wanted.
+    /// The interface has addresses, but none of the requested IP version.
     #[error(
         "the network interface `{wanted}` has no {} address: give it one, or set `ip` to another \
          version; there are: {available}",
         ip.name()
     )]
     NoAddress {
-        /// As it was given.
+        /// The name or address as given.
         wanted: String,
-        /// What was looked for.
+        /// The requested IP version.
         ip: Ip,
-        /// What could have been given.
+        /// The existing interfaces.
         available: Available,
     },
-    /// No interface is left to open a link on.
+    /// There is no interface to open a link on.
     #[error("no network interface can be used; there are: {0}")]
     NoInterface(Available),
-    /// Multicast was asked for and none of the chosen interfaces carries it, nor broadcasts.
+    /// Multicast is enabled, but no selected interface carries multicast or broadcasts.
     #[error(
         "none of the chosen interfaces carries multicast ({0}), so this node could find nobody: \
          choose another interface, or name peers by address, or turn the group off"
@@ -67,9 +67,9 @@ pub enum Error {
         .address.port(), .address.ip(), holder_hint(holder, *address)
     )]
     PortTaken {
-        /// What could not be bound.
+        /// The address that could not be bound.
         address: SocketAddr,
-        /// Who has it, as far as this host tells.
+        /// Its holder, as far as this host reports it.
         holder: Holder,
     },
     /// Another program has the multicast group's port and does not share it.
@@ -82,38 +82,38 @@ pub enum Error {
     GroupTaken {
         /// The group and its port.
         group: SocketAddr,
-        /// Who has it, as far as this host tells.
+        /// Its holder, as far as this host reports it.
         holder: Holder,
     },
-    /// Another program listens there.
+    /// Another program listens at that address.
     #[error(
         "TCP port {} of {} is taken: choose another, or another address of this host, or end the \
          other program (`sudo ss -ltnp 'sport = :{}'` shows who it is)",
         .address.port(), .address.ip(), .address.port()
     )]
     ListenerTaken {
-        /// What could not be bound.
+        /// The address that could not be bound.
         address: SocketAddr,
     },
-    /// This process may not do it.
+    /// This process lacks a permission.
     #[error("this process lacks the right for {doing} ({source}){}", privileged(*port))]
     Permission {
-        /// What was attempted.
+        /// The attempted operation.
         doing: String,
-        /// The port in question.
+        /// The port.
         port: u16,
-        /// The operating system's words.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// The address went away between listing the interfaces and binding to one.
+    /// The address disappeared between listing the interfaces and binding to it.
     #[error("the address {0} is not (or no longer) an address of this host")]
     AddressGone(IpAddr),
-    /// Anything else the operating system refuses.
+    /// Any other error of the operating system.
     #[error("{doing} failed: {source}")]
     Io {
-        /// What was attempted.
+        /// The attempted operation.
         doing: String,
-        /// The operating system's words.
+        /// The error of the operating system.
         source: io::Error,
     },
 }

@@ -1,5 +1,4 @@
-//! The multicast groups, one of each version of IP, by which nodes that do not know each other
-//! meet.
+//! The multicast groups, one per IP version, with which nodes find each other.
 
 use std::fmt;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, SocketAddrV4, SocketAddrV6};
@@ -14,13 +13,13 @@ pub const STANDARD_PORT: u16 = 3794;
 pub const STANDARD_GROUP: SocketAddrV4 =
     SocketAddrV4::new(Ipv4Addr::new(239, 255, 0, 1), STANDARD_PORT);
 
-/// The multicast group that this implementation uses with IPv6; the standard names none.
+/// The multicast group of this implementation for IPv6; the standard defines none.
 ///
-/// `ff12::efff:1` is temporary, which RFC 4291 wants of a group that IANA has not assigned, and
-/// link-local, so it needs neither routers nor any other address than the one that every
-/// interface has, and it cannot leave the network. Its last 32 bits are those of the IPv4 group
-/// and lie in the range that RFC 3307 leaves to applications. Where routers are to carry it on,
-/// `[ff15::efff:1]` (site) does, and each interface must be named by its global address.
+/// `ff12::efff:1` is a temporary address, as RFC 4291 requires for a group not assigned by IANA. It
+/// is link-local, so it needs no routers and no address beyond the one that every interface has,
+/// and it cannot leave the network. Its last 32 bits are those of the IPv4 group and lie in the
+/// range that RFC 3307 leaves to applications. For use across routers, configure `[ff15::efff:1]`
+/// (site), and name each interface by its global address.
 pub const STANDARD_GROUP6: SocketAddrV6 = SocketAddrV6::new(
     Ipv6Addr::new(0xFF12, 0, 0, 0, 0, 0, 0xEFFF, 1),
     STANDARD_PORT,
@@ -29,7 +28,7 @@ pub const STANDARD_GROUP6: SocketAddrV6 = SocketAddrV6::new(
 );
 
 /// The multicast group of a link: `239.255.0.1`, which means port 3794, `239.255.0.1:3794`, or
-/// `off` for unicast alone.
+/// `off` for unicast only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group<A = SocketAddrV4> {
     /// No multicast.
@@ -53,14 +52,14 @@ pub struct InvalidGroup {
     usual: SocketAddr,
 }
 
-/// The addresses of one version of IP.
+/// The socket addresses of one IP version.
 pub trait GroupAddress: Copy + Into<SocketAddr> + FromStr + fmt::Display {
     /// The range of its multicast addresses, for people.
     const RANGE: &'static str;
-    /// The usual group.
+    /// The default group.
     const USUAL: Self;
 
-    /// Reads an address without a port, which is then 3794.
+    /// Parses an address without a port; the port is then 3794.
     fn of_ip(text: &str) -> Option<Self>;
 }
 
@@ -85,10 +84,10 @@ impl GroupAddress for SocketAddrV6 {
 }
 
 impl<A: GroupAddress> Group<A> {
-    /// Whether the address is a multicast address and the port is not 0.
+    /// Checks that the address is a multicast address and the port is not 0.
     ///
     /// # Errors
-    /// [`InvalidGroup`], with what can be.
+    /// [`InvalidGroup`], with the valid range.
     pub fn validate(self) -> Result<(), InvalidGroup> {
         match self.address() {
             Some(group) if !group.ip().is_multicast() || group.port() == 0 => {
@@ -98,7 +97,7 @@ impl<A: GroupAddress> Group<A> {
         }
     }
 
-    /// The address and port, unless it is off.
+    /// The address and port; `None` if it is off.
     #[must_use]
     pub fn address(self) -> Option<SocketAddr> {
         match self {

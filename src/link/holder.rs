@@ -1,6 +1,7 @@
-//! Who holds a UDP port: asked only when binding failed, to put a name into the error.
+//! Finds the holder of a UDP port. Only used after binding has failed, to name the holder in the
+//! error.
 //!
-//! Linux tells through `/proc`; elsewhere, and for processes of other users, the answer is
+//! Linux reports it in `/proc`. On other systems, and for processes of other users, the result is
 //! [`Holder::Unknown`] or [`Holder::User`].
 
 use std::fmt;
@@ -9,12 +10,12 @@ use std::net::SocketAddr;
 
 use super::socket_table;
 
-/// The owner of a socket, as far as this host tells.
+/// The owner of a socket, as far as this host reports it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Holder {
-    /// This very process: two nodes of one program.
+    /// This process: two nodes of one program.
     Ourselves,
-    /// A process that we may look at.
+    /// A process that this one may inspect.
     Process {
         /// Its process id.
         pid: u32,
@@ -26,7 +27,7 @@ pub enum Holder {
         /// The user's numeric id.
         uid: u32,
     },
-    /// The host does not tell.
+    /// The host does not report it.
     Unknown,
 }
 
@@ -42,15 +43,15 @@ impl fmt::Display for Holder {
 }
 
 impl Holder {
-    /// Whether it is a node manager of Junior or of the JAUS Tool Set. (fkie's passes no broadcasts
-    /// for clients such as ours.)
+    /// Whether it is a node manager of Junior or of the JAUS Tool Set. (fkie's does not pass
+    /// broadcasts for clients of this kind.)
     #[must_use]
     pub fn is_junior(&self) -> bool {
         const NAMES: [&str; 2] = ["JuniorRTE", "NodeManager"];
         matches!(self, Self::Process { name, .. } if NAMES.contains(&name.as_str()))
     }
 
-    /// Finds who keeps us from binding to `address`.
+    /// Finds the socket that prevents binding to `address`.
     pub(super) fn of(address: SocketAddr) -> Self {
         let Some(entry) = socket_table::all()
             .into_iter()

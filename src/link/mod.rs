@@ -1,30 +1,30 @@
-//! Links: sockets, and nothing but sockets. Bytes in, bytes out, with the peer's address.
+//! Links: the sockets of a node. Octets in, octets out, with the peer's address.
 //!
-//! A link knows no JAUS: what the bytes mean is the endpoint's business. There is one
+//! A link knows nothing of JAUS: the endpoint interprets the octets. There is one
 //! [`UdpLink`](udp::UdpLink) per network interface, and one [`TcpLink`](tcp::TcpLink) for all
-//! connections, which reads the frames itself, because only they tell where one ends;
-//! there may be a `SerialLink` (feature `serial`) for each serial line. In the place of UDP there may
-//! be a `JuniorLink` (on Unix), by which the node is a client of a Junior on the same host.
+//! connections. The TCP link decodes the framing itself, because only the frames show where a
+//! message ends. There is one `SerialLink` (feature `serial`) per serial line. A `JuniorLink` (on
+//! Unix) may replace UDP; with it the node is a client of a Junior on the same host.
 //!
 //! # Several nodes on one host
 //!
-//! A link has a socket for each kind of datagram, because they want opposite things:
+//! A link has one socket per kind of datagram, because their requirements conflict:
 //!
-//! * the **unicast socket** is bound to one address of the interface and the node's port, for
-//!   itself alone. Everything leaves through it, so peers answer to it. Were it shared, each
-//!   datagram would reach only one of the sharers, and nobody could say which;
-//! * a **group socket** is bound to the multicast group (or to the network's broadcast address,
+//! * The **unicast socket** is bound exclusively to one address of the interface and the node's
+//!   port. Everything leaves through it, so peers reply to it. If it were shared, each datagram
+//!   would reach only one of the sharers, and it would be undefined which.
+//! * A **group socket** is bound to the multicast group (or to the network's broadcast address,
 //!   where that is used) and the group's port, shared (`SO_REUSEADDR`). Every sharer gets a copy of
 //!   every datagram.
 //!
-//! So the rule is: **all nodes of a host share the group, and each has an address and port of
-//! its own.** The first takes the standard port 3794; a second one on the same address gets
-//! [`Error::PortTaken`] and needs another port (0 for any free one) or another address. No peer
-//! has to be told: AS5669A peers (Junior, JAUS++ and this one) answer to the address and port
-//! that they hear a node from.
+//! So the rule is: **all nodes of a host share the group, and each has its own address and port.**
+//! The first node takes the standard port 3794. A second one on the same address gets
+//! [`Error::PortTaken`] and needs another port (0 for any free one) or another address. Peers need
+//! no configuration: AS5669A peers (Junior, JAUS++ and this one) reply to the source address and
+//! port of a node's datagrams.
 //!
 //! A program that binds port 3794 of *all* addresses without sharing, as Junior does, leaves no
-//! room for either socket: one of the two has to move, or the node becomes its client (`junior`).
+//! room for either socket. One of the two has to move, or the node becomes its client (`junior`).
 #![expect(clippy::disallowed_types, reason = "this is where sockets live")]
 
 pub(crate) mod backlog;

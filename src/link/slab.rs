@@ -1,7 +1,7 @@
-//! Memory that datagrams are received into, and copied out of: what somebody keeps of a datagram
-//! never holds on to more than the datagram.
+//! The shared receive buffer. Datagrams are copied out of it, so that keeping a datagram never
+//! keeps more memory than the datagram.
 
-/// No UDP datagram is longer; with this much room none is ever cut short.
+/// No UDP datagram is longer, so none is ever truncated.
 pub(super) const LONGEST: usize = 65_536;
 
 /// The receive buffer, shared by the sockets of a node.
@@ -11,17 +11,17 @@ pub struct Slab {
 }
 
 impl Slab {
-    /// A slab that holds no memory before the first datagram.
+    /// An empty slab. It allocates at the first datagram.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Room for several datagrams. Memory that nothing was ever written to costs nothing.
+    /// Room for several datagrams. Untouched memory takes no pages.
     pub(super) fn room_for(&mut self, datagrams: usize) -> &mut [u8] {
         let wanted = datagrams * LONGEST;
         if self.free.len() < wanted {
-            // Not resized: fresh zeros come from the system without being written.
+            // Not resized: fresh zeroed pages come from the system without being written.
             self.free = vec![0; wanted];
         }
         self.free.split_at_mut(wanted).0

@@ -1,53 +1,54 @@
-//! Linux's table of UDP sockets, `/proc/net/udp`: who holds a port, and what the kernel dropped.
+//! Linux's table of UDP sockets, `/proc/net/udp`: the holder of a port, and the kernel's drop
+//! counts.
 //!
-//! Elsewhere there is no such table, and nothing is found.
+//! Other systems have no such table, so nothing is found there.
 
 use std::fs;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
-/// One socket, as far as we are concerned.
+/// One socket.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Entry {
     ip: IpAddr,
     port: u16,
-    /// The user it belongs to.
+    /// The user id of its owner.
     pub(super) uid: u32,
-    /// Its number in the kernel.
+    /// Its inode number.
     pub(super) inode: u64,
-    /// Datagrams that found its receive buffer full.
+    /// Datagrams dropped because its receive buffer was full.
     pub(super) drops: u64,
 }
 
 impl Entry {
-    /// Whether this socket is bound to the address, or to its port of all addresses. IPv6's "all"
-    /// keeps IPv4 sockets out too.
+    /// Whether this socket is bound to the address, or to its port on all addresses. A socket on
+    /// all IPv6 addresses blocks IPv4 too.
     pub(super) fn keeps_from(&self, address: SocketAddr) -> bool {
         let all = self.ip.is_unspecified() && (self.ip.is_ipv6() || address.is_ipv4());
         self.port == address.port() && (all || self.ip == address.ip())
     }
 }
 
-/// All sockets that this host shows.
+/// All sockets that this host lists.
 pub(super) fn all() -> Vec<Entry> {
     let tables = ["/proc/net/udp", "/proc/net/udp6"].map(fs::read_to_string);
     once(tables.iter().flatten().flat_map(|table| read(table)))
 }
 
-/// Each socket once: while others open and close theirs, the table may tell of one twice.
+/// Removes duplicates: while other sockets are opened and closed, the table may list one twice.
 fn once(entries: impl Iterator<Item = Entry>) -> Vec<Entry> {
     let mut entries: Vec<_> = entries.collect();
     entries.sort_by_key(|entry| entry.inode);
-    // Sockets that no process holds have no number.
+    // Sockets that no process holds have inode 0.
     entries.dedup_by(|next, before| next.inode != 0 && next.inode == before.inode);
     entries
 }
 
-/// What a file descriptor of the socket with this number links to.
+/// The link target of a file descriptor of the socket with this inode.
 pub(super) fn file_of(inode: u64) -> String {
     format!("socket:[{inode}]")
 }
 
-/// The number in the kernel of one of our own sockets.
+/// The inode of one of this process's sockets.
 #[cfg(unix)]
 pub(super) fn inode_of(socket: &impl std::os::fd::AsRawFd) -> Option<u64> {
     let file = fs::read_link(format!("/proc/self/fd/{}", socket.as_raw_fd())).ok()?;
@@ -74,7 +75,7 @@ fn read(table: &str) -> impl Iterator<Item = Entry> + '_ {
     })
 }
 
-/// The table shows addresses as hexadecimal words in the host's byte order.
+/// The table has addresses as hexadecimal words in the host's byte order.
 fn address(words: &str) -> Option<IpAddr> {
     let word = |at: usize| u32::from_str_radix(words.get(at..at + 8)?, 16).ok();
     if words.len() == 8 {

@@ -1,10 +1,10 @@
-//! Sockets that the runtime watches for one thing only.
+//! Sockets that the runtime watches for reading or writing only.
 //!
-//! Whoever waits for a socket to become writable is woken each time that the kernel has got rid of
-//! something, although there was room all along: a Unix socket's sender when the other side reads,
-//! a UDP socket's when a datagram has been taken in. With sockets that always wait for both (as
-//! tokio's do), each message wakes its sender once more, for nothing: that is half of all wake-ups
-//! of a round trip. So a socket is watched for reading alone, and a copy of it for writing only
+//! A task that waits for a socket to become writable is woken each time the kernel frees buffer
+//! space, even if there was room all along: for a Unix socket when the other side reads, for a UDP
+//! socket when the kernel has sent a datagram. With sockets that are always registered for both (as
+//! tokio's are), each message wakes its sender once more, for nothing: half of all wake-ups of a
+//! round trip. So a socket is watched only for reading, and a duplicate of it for writing only
 //! while it is full.
 
 use std::io;
@@ -13,7 +13,7 @@ use std::os::fd::AsRawFd;
 use tokio::io::Interest;
 use tokio::io::unix::AsyncFd;
 
-/// Has the runtime watch a socket that does not block.
+/// Registers a non-blocking socket with the runtime.
 #[allow(
     deprecated,
     reason = "the successor must be promised that the descriptor stays open as long as it is \

@@ -1,5 +1,5 @@
-//! The way to a component of another process: what its session writes to it, and what others write
-//! of the outcomes of its messages.
+//! The outgoing half of a local session with a component process: replies of the session, and
+//! outcomes of the component's messages.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -16,7 +16,7 @@ impl Answers {
         Self(Mutex::new(writer))
     }
 
-    /// What has become of a message.
+    /// Sends the outcome of a message.
     pub(super) fn send(&self, handle: u64, outcome: Result<(), Undelivered>) {
         let octets = |octets: usize| u32::try_from(octets).unwrap_or(u32::MAX);
         let outcome = match outcome {

@@ -1,4 +1,4 @@
-//! Which components are attached, and from which process; the events about them.
+//! The register of attached components and their processes, and the events about them.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -7,53 +7,53 @@ use super::events::EventSender;
 use crate::address::JausId;
 use crate::link::local::Process;
 
-/// News about the components of a node.
+/// An event about a node's components.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum ComponentEvent {
     /// A component was attached.
     Attached {
-        /// Who.
+        /// Its id.
         id: JausId,
-        /// From where; `None`: from the node's own process.
+        /// Its process; `None` for the node's own process.
         process: Option<Process>,
     },
-    /// A component is not attached any more.
+    /// A component is no longer attached.
     Detached {
-        /// Who.
+        /// Its id.
         id: JausId,
-        /// Where it was.
+        /// Its process; `None` for the node's own process.
         process: Option<Process>,
-        /// Why.
+        /// The reason.
         why: Departure,
     },
-    /// A component was not attached.
+    /// A component was refused.
     Refused {
         /// Its process.
         process: Process,
-        /// The reason that it was given.
+        /// The reason that was sent to it.
         why: String,
     },
-    /// A component process reads nothing. Its messages wait, up to the bounds of its mailbox; those
-    /// of other components are not concerned.
+    /// A component process has stopped reading. Its messages wait, up to the limits of its mailbox.
+    /// Other components are not affected.
     Stuck {
-        /// Who.
+        /// Its id.
         id: JausId,
-        /// Where it is.
+        /// Its process.
         process: Process,
     },
     /// A component process that was stuck reads again.
     Resumed {
-        /// Who.
+        /// Its id.
         id: JausId,
-        /// Messages that it has lost in all.
+        /// The messages that it has lost so far.
         dropped: u64,
     },
 }
 
 impl ComponentEvent {
-    /// What has happened, as a line for people; nothing for components of the node's own process.
+    /// A line of text for people; `None` for components of the node's own process.
     #[must_use]
     pub fn in_words(&self) -> Option<String> {
         match self {
@@ -76,16 +76,16 @@ impl ComponentEvent {
     }
 }
 
-/// Why a component is not attached any more.
+/// Why a component is no longer attached.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub enum Departure {
-    /// It went on purpose.
+    /// It left on purpose.
     Left,
-    /// Its process ended, or dropped the connection, without a word.
+    /// Its process ended, or dropped the connection, without notice.
     Vanished,
-    /// It said something that is not in the protocol, or the connection failed.
+    /// It violated the protocol, or the connection failed.
     Failed(String),
     /// The node has stopped.
     Stopped,
@@ -105,7 +105,7 @@ impl fmt::Display for Departure {
 /// The attached components of other processes.
 #[derive(Debug)]
 pub(super) struct Attendance {
-    /// Of components in other processes.
+    /// The processes of components outside the node's own process.
     processes: BTreeMap<JausId, Process>,
     pub(super) events: EventSender<ComponentEvent>,
 }
@@ -118,7 +118,7 @@ impl Attendance {
         }
     }
 
-    /// The process of a component, unless that is the node's own.
+    /// The process of a component, unless it is the node's own.
     pub(super) fn process(&self, id: JausId) -> Option<&Process> {
         self.processes.get(&id)
     }
@@ -145,7 +145,7 @@ impl Attendance {
             .send(ComponentEvent::Detached { id, process, why });
     }
 
-    /// The node has stopped, and everybody goes.
+    /// Detaches all components because the node has stopped.
     pub(super) fn end(&mut self) {
         for id in std::mem::take(&mut self.processes).into_keys() {
             tracing::debug!(%id, "component detached: the node has stopped");

@@ -10,20 +10,20 @@ use super::error::Undelivered;
 use crate::address::JausId;
 use crate::endpoint::{Event, MessageHandle};
 
-/// The most messages. The endpoint gives up each of them some day, so that this is only reached if it
-/// forgets to say so.
+/// Limit of messages. The endpoint eventually gives up each message, so this is only reached if it
+/// fails to report that.
 const MOST: usize = 65_536;
 
-/// A sender that waits.
+/// A waiting sender.
 #[derive(Debug)]
 pub(super) enum Waiter {
     /// A task of this process.
     Here(oneshot::Sender<Result<(), Undelivered>>),
-    /// A component process, with its own number for the message.
+    /// A component process, with its own handle of the message.
     There { answers: Arc<Answers>, handle: u64 },
 }
 
-/// All that wait.
+/// All waiting senders.
 #[derive(Debug, Default)]
 pub(super) struct Awaiting {
     waiters: HashMap<MessageHandle, (JausId, Waiter)>,
@@ -39,7 +39,7 @@ impl Awaiting {
         }
     }
 
-    /// Tells the sender that waits for it.
+    /// Notifies the waiting sender of an outcome.
     pub(super) fn handle_event(&mut self, event: &Event) {
         let (message, outcome) = match *event {
             Event::Acknowledged { message, .. } => (message, Ok(())),
@@ -62,7 +62,7 @@ impl Awaiting {
         };
         match self.waiters.remove(&message) {
             Some((_, Waiter::Here(sender))) => {
-                // An error means that the sender waits no more.
+                // An error means that the sender no longer waits.
                 let _ = sender.send(outcome);
             }
             Some((_, Waiter::There { answers, handle })) => answers.send(handle, outcome),
@@ -70,12 +70,12 @@ impl Awaiting {
         }
     }
 
-    /// A component is gone, and with it its interest.
+    /// Drops the waiters of a component that is gone.
     pub(super) fn forget_source(&mut self, source: JausId) {
         self.waiters.retain(|_, (of, _)| *of != source);
     }
 
-    /// No outcome of any message will be known.
+    /// Drops all waiters: no more outcomes will be known.
     pub(super) fn clear(&mut self) {
         self.waiters.clear();
     }

@@ -1,8 +1,8 @@
 //! The state of a running node: endpoint, links and mailboxes behind one lock.
 //!
-//! The lock is held for single steps and never across an `await`. So a component that sends runs
-//! the endpoint in its own task, up to the socket, and is told at once what is wrong; nothing is
-//! queued in between. Receiving and waiting is the [driver](super::driver)'s.
+//! The lock is held for single steps and never across an `await`. So a sending component runs the
+//! endpoint in its own task, down to the socket, and gets errors at once; there is no queue in
+//! between. The [driver](super::driver) receives and waits.
 
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -36,12 +36,13 @@ use crate::link::udp::UdpLink;
 use crate::link::{Interface, Slab};
 use crate::wire::Priority;
 
-/// Messages of one burst that are gathered to leave together.
+/// Limit of messages in a burst that leave together.
 const BURST: usize = 64;
-/// How long a node that shuts down tries to send what waits.
+/// How long a node that shuts down tries to send queued messages.
 pub(super) const LAST_WORDS: Duration = Duration::from_millis(250);
 
-/// The node's clock. Tokio's, so that a paused test clock holds for timers and endpoint alike.
+/// The node's clock. It is tokio's, so that a paused test clock applies to timers and endpoint
+/// alike.
 #[expect(
     clippy::disallowed_methods,
     reason = "the node is the owner that has the clock"
@@ -50,15 +51,15 @@ pub(super) fn now() -> Instant {
     tokio::time::Instant::now().into_std()
 }
 
-/// What handles, ports and the driver have in common.
+/// The state that handles, ports and the driver share.
 #[derive(Debug)]
 pub(super) struct Shared {
     core: Mutex<Core>,
-    /// Where components are clients of Junior's node manager, if they are.
+    /// The folder of Junior's sockets if components are clients of its node manager.
     #[cfg(unix)]
     junior: Option<PathBuf>,
     pub(super) stopped: watch::Sender<bool>,
-    /// Whether no component process can come in (any more).
+    /// Whether component processes can no longer attach, or never could.
     pub(super) closed: watch::Sender<bool>,
     pub(super) residents: Arc<Residents>,
     commons: Mutex<Vec<Arc<dyn Any + Send + Sync>>>,
@@ -67,7 +68,7 @@ pub(super) struct Shared {
 impl Shared {
     pub(super) fn new(config: &Config, links: Links) -> Self {
         let endpoint = Endpoint::new(endpoint::Config {
-            // Its keys come from the operating system.
+            // The keys of `RandomState` come from the operating system.
             challenge_key: RandomState::new().hash_one(0),
             ..config.endpoint(first_sequence())
         });
@@ -83,7 +84,7 @@ impl Shared {
         }
     }
 
-    /// What the components of this process have in common on the node: one of each type.
+    /// Data that the components of this process share on the node: one value of each type.
     pub(super) fn common<T: Any + Send + Sync + Default>(&self) -> Arc<T> {
         let mut commons = self.commons.lock().unwrap_or_else(PoisonError::into_inner);
         let known = commons.iter().find_map(|it| it.clone().downcast().ok());
@@ -94,8 +95,8 @@ impl Shared {
         })
     }
 
-    /// Takes in a component; `process` is where it lives, if not here. What the file system is
-    /// asked for happens without the lock.
+    /// Attaches a component; `process` is its process if it is not this one. File system access
+    /// happens without the lock.
     pub(super) fn attach(
         &self,
         id: JausId,
@@ -123,14 +124,14 @@ impl Shared {
     }
 }
 
-/// Where the sequence numbers begin.
+/// The first sequence number.
 #[expect(
     clippy::disallowed_methods,
     reason = "the node is the owner that has the clock"
 )]
 fn first_sequence() -> u16 {
     let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    // A clock that stands before 1970 was never set: then all starts are the same to it.
+    // A clock before 1970 was never set; then every start uses the same number.
     first_sequence_at(since_1970.unwrap_or_default())
 }
 
@@ -173,8 +174,8 @@ impl Core {
         core
     }
 
-    /// Tells the endpoint which links there are. A node's own multicast may come back to it on
-    /// any of them, so each is told all addresses.
+    /// Registers the links at the endpoint. A node's own multicast may return on any link, so each
+    /// gets the addresses of all.
     fn announce_links(&mut self) {
         for (id, link) in self.links.iter() {
             let own = self.links.udp().map(|(_, link)| link.local());
@@ -183,8 +184,8 @@ impl Core {
         self.endpoint.set_static_peers(self.links.static_peers());
     }
 
-    /// Removes the links whose interfaces are gone; they, and the interfaces that want a link. None
-    /// of both after the node has stopped.
+    /// Removes the links whose interfaces are gone. Returns those links, and the interfaces that
+    /// need a link. Both are empty after the node has stopped.
     pub(super) fn retire_links(&mut self, survey: &Survey) -> (Vec<UdpLink>, Vec<Interface>) {
         if self.stopped {
             return (Vec::new(), Vec::new());
@@ -205,7 +206,7 @@ impl Core {
         }
     }
 
-    /// Takes in a component, but for what [`Shared::attach`] does besides.
+    /// The part of [`Shared::attach`] that needs the lock.
     fn attach(
         &mut self,
         id: JausId,
@@ -221,7 +222,7 @@ impl Core {
         Ok(mailbox)
     }
 
-    /// Lets a component go, unless somebody else has its id by now.
+    /// Detaches a component, unless its id belongs to another mailbox by now.
     pub(super) fn detach(&mut self, id: JausId, mailbox: &Arc<Mailbox>, why: Departure) {
         let is_it = |there: &Arc<Mailbox>| Arc::ptr_eq(there, mailbox);
         if self.mailboxes.get(&id).is_some_and(is_it) {
@@ -237,7 +238,7 @@ impl Core {
         self.stop_at.is_some()
     }
 
-    /// Sends a message; `waiter` is told what becomes of it, if it wants an acknowledgement.
+    /// Sends a message. If it requests an acknowledgement, `waiter` gets the outcome.
     pub(super) fn send(
         &mut self,
         message: Outgoing,
@@ -248,20 +249,20 @@ impl Core {
         let now = now();
         let mut result = self.hand_in(now, message.clone());
         if let Err(endpoint::SendError::QueueFull { .. }) = result {
-            // What was gathered so far may be all that is in the way.
+            // Perhaps only the gathered messages fill the queue.
             self.pump(now);
             result = self.hand_in(now, message);
         }
         if let (Ok(handle), Some(waiter)) = (&result, waiter) {
             self.awaiting.insert(*handle, source, waiter);
         }
-        // The first of a burst leaves at once, and so does what is urgent. The others leave
-        // together when the driver has its turn, for which it was woken by the first.
+        // The first message of a burst leaves at once, and so do urgent ones. The others leave
+        // together in the driver's next turn, for which the first one woke it.
         if self.driver.is_none() && !urgent && self.gathered < BURST {
             self.gathered += 1;
             return Ok(result?);
         }
-        // What stays among the node's components is none of the driver's business.
+        // Messages between components of this node do not concern the driver.
         if self.pump(now) || self.deadline() != deadline {
             self.wake_driver();
         }
@@ -278,13 +279,14 @@ impl Core {
         self.endpoint.send(now, message, &mut receivers)
     }
 
-    /// Begins to shut down; the driver finishes.
+    /// Starts to shut down; the driver completes it.
     pub(super) fn stop(&mut self) {
         self.stop_at.get_or_insert_with(|| now() + LAST_WORDS);
         self.wake_driver();
     }
 
-    /// One turn of the driver. Ready when the node has stopped; `true` while there is more to do.
+    /// One turn of the driver. Ready when the node has stopped. Wakes itself while there is more to
+    /// receive.
     pub(super) fn turn(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         self.driver = Some(cx.waker().clone());
         let now = now();
@@ -311,7 +313,7 @@ impl Core {
         Poll::Pending
     }
 
-    /// When the driver wants its next turn, if nothing else happens.
+    /// When the driver needs its next turn if nothing else happens.
     pub(super) fn deadline(&self) -> Option<Instant> {
         [
             self.endpoint.poll_timeout(),
@@ -323,7 +325,7 @@ impl Core {
         .min()
     }
 
-    /// Sends queued datagrams and publishes events; returns whether anything went to a link.
+    /// Sends queued datagrams and publishes events; returns whether any went to a link.
     fn pump(&mut self, now: Instant) -> bool {
         let mut transmitted = false;
         self.gathered = 0;
@@ -343,7 +345,7 @@ impl Core {
         transmitted
     }
 
-    /// Hands on news to those who wait for them.
+    /// Publishes the endpoint's events.
     fn announce(&mut self) {
         while let Some(event) = self.endpoint.poll_event() {
             self.awaiting.handle_event(&event);
@@ -351,7 +353,7 @@ impl Core {
         }
     }
 
-    /// Takes in what has arrived; whether a link had more than its share.
+    /// Receives datagrams; returns whether a link had more than its share.
     fn receive(&mut self, now: Instant, cx: &mut Context<'_>) -> bool {
         let mut more = false;
         let links: Vec<_> = self.links.iter().map(|(id, _)| id).collect();
@@ -362,13 +364,14 @@ impl Core {
                 let into = (&mut self.endpoint, &mut receivers);
                 more |= link.receive(cx, now, id, &mut self.slab, into);
             }
-            // Before the next: all of them together may bring more than waits at a time.
+            // Before the next link: all links together may produce more events than the queue
+            // holds.
             self.announce();
         }
         more
     }
 
-    /// Sends what waits for the network; whether nothing waits any more.
+    /// Sends what waits for the network; returns whether nothing is left.
     fn flush(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
         let mut flushed = true;
         for (_, link) in self.links.iter_mut() {
@@ -377,7 +380,7 @@ impl Core {
         flushed
     }
 
-    /// Takes leave; whether the others have done so too.
+    /// Closes connections properly; returns whether the peers have done so too.
     fn hang_up(&mut self) -> bool {
         let mut hung_up = true;
         for (_, link) in self.links.iter_mut() {
@@ -386,7 +389,7 @@ impl Core {
         hung_up
     }
 
-    /// Closes everything; harmless when repeated.
+    /// Closes everything. Idempotent.
     pub(super) fn finish(&mut self) {
         self.stopped = true;
         for (id, mailbox) in std::mem::take(&mut self.mailboxes) {

@@ -1,5 +1,4 @@
-//! The one task of a node: it waits for datagrams, timers and the end, and gives the core its
-//! turns.
+//! The main task of a node: waits for datagrams, timers and shutdown, and gives the core its turns.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -42,14 +41,14 @@ impl Future for Driver {
             self.timer.as_mut().reset(deadline);
         }
         ready!(self.timer.as_mut().poll(cx));
-        // Due already: another turn, but not before the other tasks had theirs.
+        // Already due: take another turn, but let other tasks run first.
         cx.waker().wake_by_ref();
         Poll::Pending
     }
 }
 
 impl Drop for Driver {
-    /// Also when the runtime is shut down under the node: nobody may wait for it in vain.
+    /// Also runs when the runtime is shut down under the node, so that no task waits for ever.
     fn drop(&mut self) {
         self.shared.lock().finish();
         self.shared.stopped.send_replace(true);

@@ -1,4 +1,4 @@
-//! What can go wrong with a node: at its start, when sending, when attaching from elsewhere.
+//! The errors of a node: at start, when sending, and when attaching from another process.
 
 use std::net::IpAddr;
 
@@ -8,7 +8,7 @@ use crate::endpoint::{self, Unacknowledged};
 use crate::link;
 use crate::link::local::record::Reason;
 
-/// Why a node was not started. Nothing of it runs.
+/// Why a node was not started. Nothing is left running.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StartError {
@@ -22,14 +22,14 @@ pub enum StartError {
     #[cfg(unix)]
     #[error(transparent)]
     Junior(#[from] link::junior::Error),
-    /// The component processes of this host cannot be served.
+    /// Component processes of this host cannot be served.
     #[error(transparent)]
     Local(#[from] link::local::Error),
     /// A serial port cannot be used.
     #[cfg(feature = "serial")]
     #[error(transparent)]
     Serial(#[from] link::serial::SerialError),
-    /// A peer lies behind an interface that was not chosen.
+    /// A peer lies behind an interface that is not selected.
     #[error(
         "the peer {peer} is reached from {local}, and that is none of the chosen interfaces \
          ({chosen}): add `{local}` to them, or leave the peer out"
@@ -37,9 +37,9 @@ pub enum StartError {
     PeerOutOfReach {
         /// The peer.
         peer: Peer,
-        /// The address of this host that leads to it.
+        /// The address of this host on the route to it.
         local: IpAddr,
-        /// The interfaces that were chosen.
+        /// The selected interfaces.
         chosen: link::Available,
     },
     /// There is no tokio runtime to run on.
@@ -50,14 +50,14 @@ pub enum StartError {
     NoRuntime,
 }
 
-/// Why a message was not sent. Nothing of it was.
+/// Why a message was not sent. No part of it was.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SendError {
-    /// The node's endpoint says what is wrong with it.
+    /// The node's endpoint rejected it.
     #[error(transparent)]
     Endpoint(#[from] endpoint::SendError),
-    /// The component is attached to the host's node, and that is gone just now.
+    /// The component is attached to the host's node, and the connection is down at present.
     #[error(
         "{0} has no connection to the node of this host just now; it is made again as soon as the \
          node is back"
@@ -66,34 +66,34 @@ pub enum SendError {
     /// The host's node takes messages more slowly than the component sends them.
     #[error("{octets} octets wait for the node of this host already: send more slowly")]
     Busy {
-        /// How much waits.
+        /// The waiting octets.
         octets: usize,
     },
 }
 
-/// Why it is not known that a message has arrived.
+/// Why the delivery of a message is not confirmed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Undelivered {
     /// It was not sent.
     #[error(transparent)]
     NotSent(#[from] SendError),
-    /// The host's node would not send it, and says why in its own words.
+    /// The host's node rejected it, with this text as the reason.
     #[error("the node of this host did not send it: {0}")]
     Rejected(String),
-    /// It was sent, and not or not wholly acknowledged.
+    /// It was sent, but not or not completely acknowledged.
     #[error("{destination} has acknowledged {acknowledged} of {length} octets: {reason}")]
     NotAcknowledged {
-        /// For whom it was.
+        /// Its destination.
         destination: JausId,
-        /// Why no more.
+        /// Why the rest was not.
         reason: Unacknowledged,
         /// Octets that were acknowledged.
         acknowledged: usize,
         /// Octets of the message.
         length: usize,
     },
-    /// The component or its node went away before an answer came. The message may have arrived.
+    /// The component or its node ended before the outcome was known. The message may have arrived.
     #[error("the node was lost before it could tell whether the message arrived")]
     Lost,
 }
@@ -105,12 +105,12 @@ pub enum HostError {
     /// The node cannot be reached.
     #[error(transparent)]
     Link(#[from] link::local::Error),
-    /// The node would not have the component, and says why in its own words.
+    /// The node refused the component.
     #[error("the node of this host refuses: {words}")]
     Refused {
-        /// Why, for programs.
+        /// The reason, for programs.
         reason: Reason,
-        /// Why, for people.
+        /// The reason, for people.
         words: String,
     },
 }

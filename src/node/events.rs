@@ -1,5 +1,5 @@
-//! Events of a node, its components, and their connections: any number of listeners, none of which
-//! holds up the sender.
+//! Event streams of a node, its components and connections: any number of listeners, none of which
+//! can block the sender.
 
 use tokio::sync::broadcast;
 use tokio::sync::broadcast::error::RecvError;
@@ -7,7 +7,7 @@ use tokio::sync::broadcast::error::RecvError;
 /// Events kept for a slow listener.
 const KEPT: usize = 256;
 
-/// A listener to events from now on. One that falls behind by more than 256 misses the oldest.
+/// A stream of events from now on. A listener that lags by more than 256 events misses the oldest.
 #[derive(Debug)]
 pub struct EventStream<T> {
     receiver: broadcast::Receiver<T>,
@@ -15,7 +15,7 @@ pub struct EventStream<T> {
 }
 
 impl<T: Clone> EventStream<T> {
-    /// Waits for the next event; `None` when no more will come.
+    /// Waits for the next event; `None` at the end of the stream.
     pub async fn recv(&mut self) -> Option<T> {
         loop {
             match self.receiver.recv().await {
@@ -26,14 +26,14 @@ impl<T: Clone> EventStream<T> {
         }
     }
 
-    /// How many events this listener has missed.
+    /// The number of missed events.
     #[must_use]
     pub const fn missed(&self) -> u64 {
         self.missed
     }
 }
 
-/// Where events come from, until it is [ended](Self::end) or dropped.
+/// The sender of events, until it is [ended](Self::end) or dropped.
 #[derive(Debug)]
 pub(super) struct EventSender<T>(Option<broadcast::Sender<T>>);
 
@@ -44,7 +44,7 @@ impl<T: Clone> EventSender<T> {
 
     pub(super) fn send(&self, event: T) {
         if let Some(sender) = &self.0 {
-            // No listener is no error.
+            // It is no error to have no listeners.
             let _ = sender.send(event);
         }
     }
@@ -58,7 +58,7 @@ impl<T: Clone> EventSender<T> {
         }
     }
 
-    /// No more events will come, which ends the listeners' streams.
+    /// Ends the listeners' streams.
     pub(super) fn end(&mut self) {
         self.0 = None;
     }

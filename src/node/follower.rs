@@ -1,9 +1,8 @@
-//! Follows the host's interfaces: opens links on those that come and closes those of interfaces
-//! that go.
+//! Follows changes of the host's interfaces: opens links on new ones, and closes the links of those
+//! that are gone.
 //!
-//! The operating system says when something has changed, where it can; besides, the follower looks
-//! now and then. Whatever asks the operating system happens on a thread for blocking work and
-//! without the node's lock.
+//! Where possible the operating system reports changes; the follower also polls from time to time.
+//! System calls run on a blocking thread and without the node's lock.
 
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
@@ -17,12 +16,12 @@ use crate::link::interface::Changes;
 use crate::link::udp::UdpLink;
 use crate::link::{Interface, udp};
 
-/// The time between two looks where the operating system does not say what changes, or where an
-/// interface could not be used yet.
+/// Poll interval where the operating system does not report changes, or where an interface could
+/// not be used yet.
 const POLL: Duration = Duration::from_secs(2);
-/// The time between two looks besides, in case that word of a change was lost.
+/// Poll interval otherwise, in case a report was lost.
 const FALLBACK: Duration = Duration::from_secs(60);
-/// How long changes are collected before the next look: an interface that comes up causes several.
+/// How long changes are collected before a poll: an interface that comes up causes several.
 const SETTLE: Duration = Duration::from_millis(50);
 
 /// The task that follows the interfaces.
@@ -31,7 +30,7 @@ pub(super) struct Follower {
     shared: Arc<Shared>,
     config: Arc<Config>,
     changes: Changes,
-    /// Addresses where a link could not be opened; warned about once.
+    /// Addresses where a link could not be opened. The warning is logged once.
     refused: BTreeSet<SocketAddr>,
 }
 
@@ -85,7 +84,7 @@ impl Follower {
         }
     }
 
-    /// The links that could be opened; warns about the others.
+    /// The links that could be opened. Warns about the others.
     fn sort_out(&mut self, opened: Vec<Opened>) -> Vec<UdpLink> {
         let mut links = Vec::new();
         let before = std::mem::take(&mut self.refused);
@@ -106,7 +105,7 @@ impl Follower {
 
 type Opened = (Interface, Result<UdpLink, crate::link::Error>);
 
-/// Closes links and opens others, which may want their addresses.
+/// Closes links and opens others, which may need the same addresses.
 fn open(gone: Vec<UdpLink>, came: Vec<Interface>, settings: &udp::Settings) -> Vec<Opened> {
     drop(gone);
     let open = |interface: Interface| {

@@ -1,4 +1,4 @@
-//! One open link of a node, of whichever kind.
+//! One open link of a node, of any kind.
 
 use std::net::SocketAddr;
 use std::task::{Context, Poll};
@@ -16,7 +16,7 @@ use crate::link::tcp::{Arrival, TcpLink};
 use crate::link::udp::UdpLink;
 use crate::wire::Framing;
 
-/// Datagrams taken from one link before the others have their turn.
+/// Limit of datagrams from one link before the others have their turn.
 const BATCH: usize = 64;
 
 #[derive(Debug)]
@@ -60,7 +60,7 @@ impl Link {
         }
     }
 
-    /// What the endpoint is to know; `own` are the addresses that UDP is sent from.
+    /// The profile for the endpoint; `own` are the source addresses of all UDP links.
     pub(super) fn profile(&self, own: impl IntoIterator<Item = SocketAddr>) -> LinkProfile {
         match self {
             Self::Udp(link) => LinkProfile {
@@ -84,7 +84,7 @@ impl Link {
         }
     }
 
-    /// How it frames messages.
+    /// Its message framing.
     pub(super) const fn framing(&self) -> Framing {
         match self {
             Self::Udp(_) => Framing::Judp,
@@ -96,7 +96,7 @@ impl Link {
         }
     }
 
-    /// What people call it: an interface's or a device's name.
+    /// Its name for people: that of the interface or device.
     pub(super) fn name(&self) -> String {
         match self {
             Self::Udp(link) => link.interface().name.clone(),
@@ -108,7 +108,8 @@ impl Link {
         }
     }
 
-    /// Queues what the endpoint gives out; [`send_waiting`](Self::send_waiting) comes after the last.
+    /// Queues a datagram from the endpoint. Call [`send_waiting`](Self::send_waiting) after the
+    /// last one.
     pub(super) fn transmit(&mut self, transmit: &Transmit) {
         match self {
             Self::Udp(link) => link.transmit(transmit),
@@ -120,14 +121,14 @@ impl Link {
         }
     }
 
-    /// Sends at once what does not gain by waiting for the driver's turn, which sends the rest.
+    /// Sends what would gain nothing by waiting for the driver's turn, which sends the rest.
     pub(super) fn send_waiting(&mut self) {
         if let Self::Udp(link) = self {
             link.flush();
         }
     }
 
-    /// Sends what waits for the network; ready when nothing waits any more.
+    /// Sends what waits for the network; ready when nothing is left.
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>, now: Instant) -> Poll<()> {
         match self {
             Self::Udp(link) => link.poll_flush(cx),
@@ -139,7 +140,7 @@ impl Link {
         }
     }
 
-    /// Takes leave of those who are at the other end, where that means anything to them.
+    /// Notifies the other ends of the shutdown, where the protocol can.
     pub(super) fn hang_up(&mut self) -> Poll<()> {
         match self {
             #[cfg(unix)]
@@ -149,7 +150,7 @@ impl Link {
         }
     }
 
-    /// A component has gone.
+    /// Notes that a component is gone.
     pub(super) fn release(&mut self, id: JausId) {
         match self {
             #[cfg(unix)]
@@ -158,7 +159,7 @@ impl Link {
         }
     }
 
-    /// When the link wants a turn, if nothing arrives before.
+    /// When the link needs a turn if nothing arrives before.
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         match self {
             Self::Udp(_) => None,
@@ -170,7 +171,8 @@ impl Link {
         }
     }
 
-    /// Gives the endpoint, and who looks on, what has arrived; whether there was more than the link's share.
+    /// Passes received data to the endpoint and the taps; returns whether there was more than the
+    /// link's share.
     pub(super) fn receive(
         &mut self,
         cx: &mut Context<'_>,
@@ -211,7 +213,7 @@ impl Link {
                 } => {
                     let path = from(Remote::Socket(remote));
                     receivers.taps.frame(path, &frame);
-                    // First, for it decides where this one is answered.
+                    // First, because it decides how this frame is answered.
                     if version_again {
                         endpoint.handle_repeated_version(frame.source);
                     }

@@ -1,9 +1,9 @@
-//! The links of a node: one for UDP on each chosen interface, also when interfaces come and go, and
-//! one for all TCP connections, and one for each serial line.
+//! The links of a node: one UDP link per selected interface, even as interfaces come and go, one
+//! link for all TCP connections, one for Junior, and one per serial line.
 //!
-//! A board may start its node before its network is up, and Wi-Fi comes back with another
-//! address. So a [`Follower`](super::follower::Follower) makes a [`Survey`] of the host when something
-//! has changed, without the node's lock, and gives it to the links.
+//! A board may start its node before its network is up, and Wi-Fi may return with another address.
+//! So on each change a [`Follower`](super::follower::Follower) makes a [`Survey`] of the host,
+//! without the node's lock, and passes it to the links.
 
 use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
@@ -30,11 +30,11 @@ pub(super) struct Links {
     routes: Routes,
 }
 
-/// The local address from which each configured peer is reached.
+/// The local address on the route to each configured peer.
 type Routes = BTreeMap<SocketAddr, IpAddr>;
 
-/// What the host's interfaces and routes ask of a node's UDP links. It takes system calls to find
-/// out, and none to use it.
+/// The UDP links that a node needs for the host's interfaces and routes. Making it takes system
+/// calls, using it does not.
 #[derive(Debug)]
 pub(super) struct Survey {
     wanted: Vec<Interface>,
@@ -42,12 +42,12 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    /// Looks at the host; `None` if it does not say which interfaces it has.
+    /// Surveys the host; `None` if it does not list its interfaces.
     pub(super) fn make(config: &Config) -> Option<Self> {
         let available = interface::list().ok()?;
         let mut wanted = config.interfaces.present(&available, config.ip);
         for &peer in &config.peers {
-            // Out of reach just now; it was not when the node started.
+            // Unreachable at present. It was reachable when the node started.
             let _ = lead_to(peer, &config.interfaces, &mut wanted);
         }
         let routes = routes(config, &wanted);
@@ -56,8 +56,8 @@ impl Survey {
 }
 
 impl Links {
-    /// Opens a link on every chosen interface, and those for streams. Nothing stays open if one
-    /// fails.
+    /// Opens a link on every selected interface, and the links for streams. If one fails, none
+    /// stays open.
     pub(super) fn open(config: &Config) -> Result<Self, StartError> {
         let mut links = Self {
             config: config.clone(),
@@ -92,7 +92,7 @@ impl Links {
         }
         let udp = config.udp();
         let deaf = chosen.iter().all(|interface| udp.is_deaf_on(interface));
-        // The network of a board that has just started may come yet.
+        // The network of a board that has just booted may still come up.
         let alone = chosen.iter().all(Interface::is_loopback);
         let waits = alone && config.interfaces == Interfaces::All;
         if deaf && !waits && config.peers.is_empty() && !config.has_streams() {
@@ -138,7 +138,7 @@ impl Links {
         }
     }
 
-    /// A component has gone.
+    /// Notes that a component is gone.
     pub(super) fn release(&mut self, id: JausId) {
         for link in self.open.values_mut() {
             link.release(id);
@@ -151,7 +151,7 @@ impl Links {
             .filter_map(|(id, link)| Some((id, link.serial()?)))
     }
 
-    /// When one of them wants a turn, if nothing arrives before.
+    /// When a link needs a turn if nothing arrives before.
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         self.open.values().filter_map(Link::poll_timeout).min()
     }
@@ -164,12 +164,13 @@ impl Links {
         self.open.clear();
     }
 
-    /// Whether interfaces that come and go matter to this node.
+    /// Whether changes of interfaces matter to this node.
     pub(super) fn follows(&self) -> bool {
         self.config.uses_udp() && self.config.interfaces != Interfaces::Loopback
     }
 
-    /// Removes the links whose interfaces are gone; they, and the interfaces that have no link yet.
+    /// Removes the links whose interfaces are gone. Returns them, and the interfaces without a
+    /// link.
     pub(super) fn retire(&mut self, survey: &Survey) -> (Vec<(LinkId, UdpLink)>, Vec<Interface>) {
         let is_gone = |link: &UdpLink| !survey.wanted.contains(link.interface());
         let ids: Vec<_> = self
@@ -189,7 +190,7 @@ impl Links {
         (gone, came)
     }
 
-    /// Adds links, and finds out again through which one each peer is reached.
+    /// Adds links, and assigns each configured peer to a link again.
     pub(super) fn adopt(&mut self, links: Vec<UdpLink>, survey: Survey) {
         for link in links {
             self.insert(Link::Udp(link));
@@ -198,7 +199,7 @@ impl Links {
         self.distribute_peers();
     }
 
-    /// Which peers with an id live where.
+    /// The routes to peers with a configured id.
     pub(super) fn static_peers(&self) -> Vec<StaticPeer> {
         let named = |&peer: &Peer| {
             let path = Path {
@@ -216,7 +217,7 @@ impl Links {
                 link: self.tcp()?.0,
                 peer: peer.address().into(),
             };
-            // What is for everyone goes to all connections anyway.
+            // Broadcasts go to all connections anyway.
             Some(StaticPeer {
                 id: peer.id()?,
                 path,
@@ -237,7 +238,7 @@ impl Links {
         self.next = LinkId(self.next.0.wrapping_add(1));
     }
 
-    /// Gives each link the peers without id that are reached through it.
+    /// Assigns the peers without an id to the links that reach them.
     fn distribute_peers(&mut self) {
         let nameless = self.config.peers.iter().filter(|peer| peer.id().is_none());
         let placed: Vec<_> = nameless
@@ -257,7 +258,7 @@ impl Links {
         }
     }
 
-    /// The link that leads to a configured peer; any if there is no way there just now.
+    /// The link that leads to a configured peer; any link if there is no route at present.
     fn link_to(&self, peer: SocketAddr) -> Option<LinkId> {
         let local = self.routes.get(&peer);
         let leads = |link: &UdpLink| Some(&link.interface().address) == local;
@@ -269,7 +270,7 @@ impl Links {
     }
 }
 
-/// Through which of the interfaces each configured peer is reached.
+/// The local address on the route to each configured peer.
 fn routes(config: &Config, interfaces: &[Interface]) -> Routes {
     let route = |peer: &Peer| {
         let address = peer.address();
@@ -278,8 +279,8 @@ fn routes(config: &Config, interfaces: &[Interface]) -> Routes {
     config.peers.iter().filter_map(route).collect()
 }
 
-/// The local address from which a peer is reached: that of the interface whose network it is in,
-/// else the one that the operating system would use.
+/// The local address on the route to a peer: that of the interface on its network, or else the one
+/// that the operating system selects.
 fn way_to<'a>(
     peer: SocketAddr,
     mut interfaces: impl Iterator<Item = &'a Interface>,
@@ -289,7 +290,7 @@ fn way_to<'a>(
     near.or_else(|| interface::local_address_for(peer))
 }
 
-/// Makes sure that an interface that leads to the peer is among the chosen ones.
+/// Ensures that an interface on the route to the peer is selected.
 fn lead_to(peer: Peer, wanted: &Interfaces, chosen: &mut Vec<Interface>) -> Result<(), StartError> {
     let Some(local) = way_to(peer.address(), chosen.iter()) else {
         tracing::debug!(%peer, "no way there just now");

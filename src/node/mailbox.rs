@@ -1,8 +1,8 @@
-//! What has arrived for one component and was not read yet: bounded, the urgent first.
+//! The mailbox of a component: a bounded queue of unread messages, most urgent first.
 //!
-//! A component that does not read must not stop the node, so a full mailbox drops. **What goes is
-//! the oldest message of the least urgent priority present**, and if all that wait are more
-//! urgent than the new message, the new one. Every drop is counted.
+//! A component that does not read must not block the node, so a full mailbox drops messages. **It
+//! drops the oldest message of the lowest priority present**. If all waiting messages are more
+//! urgent than the new one, it drops the new one. Every drop is counted.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
@@ -13,18 +13,17 @@ use crate::endpoint::Received;
 use crate::link::backlog::{Backlog, Bounds};
 use crate::wire::Priority;
 
-/// Who waits for room is woken when the number of messages is a multiple of this.
+/// A writer that waits for room is woken when the number of messages is a multiple of this.
 const WAKE_WRITER: usize = 128;
 
-/// How much a mailbox holds.
+/// The limits of a mailbox.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct MailboxLimits {
-    /// Messages that may wait, at least 1.
+    /// Limit of waiting messages, at least 1.
     pub messages: usize,
-    /// Octets of payload that may wait. A single larger message is accepted when nothing else
-    /// waits.
+    /// Limit of waiting octets of payload. A single larger message is accepted if no other waits.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub octets: usize,
 }
@@ -38,19 +37,19 @@ impl Default for MailboxLimits {
     }
 }
 
-/// What has become of a component's messages.
+/// Counts of a component's messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct MailboxCounters {
-    /// Messages put in.
+    /// Messages received.
     pub delivered: u64,
     /// Messages dropped because the component did not read in time.
     pub dropped: u64,
-    /// Messages that wait now.
+    /// Messages waiting now.
     pub waiting: usize,
 }
 
-/// One writer (the node), one reader (the component's port).
+/// A queue with one writer (the node) and one reader (the component's port).
 #[derive(Debug)]
 pub(super) struct Mailbox {
     inner: Mutex<Inner>,
@@ -63,7 +62,7 @@ struct Inner {
     dropped: u64,
     closed: bool,
     reader: Option<Waker>,
-    /// Who fills the mailbox, if it waits for room.
+    /// The writer's waker while it waits for room.
     writer: Option<Waker>,
 }
 
@@ -85,7 +84,7 @@ impl Mailbox {
         }
     }
 
-    /// Puts a message in.
+    /// Queues a message.
     pub(super) fn push(&self, message: Received) {
         let mut inner = self.lock();
         inner.delivered += 1;
@@ -95,7 +94,7 @@ impl Mailbox {
         inner.wake();
     }
 
-    /// The most urgent message, the oldest of these; `None` when the mailbox is closed and empty.
+    /// The oldest message of the highest priority; `None` when the mailbox is closed and empty.
     pub(super) fn poll_pop(&self, cx: &mut Context<'_>) -> Poll<Option<Received>> {
         let mut inner = self.lock();
         if let Some(message) = inner.pop() {
@@ -112,8 +111,8 @@ impl Mailbox {
         self.lock().pop()
     }
 
-    /// Gives messages to `each` as long as that wants more, in the order of [`poll_pop`]. Ready
-    /// when the mailbox is closed and empty.
+    /// Passes messages to `each` while it returns `true`, in the order of [`poll_pop`]. Ready when
+    /// the mailbox is closed and empty.
     ///
     /// [`poll_pop`]: Self::poll_pop
     pub(super) fn poll_drain(
@@ -134,7 +133,7 @@ impl Mailbox {
         Poll::Pending
     }
 
-    /// Waits until so many more messages fit, or none waits.
+    /// Waits until `messages` more fit, or the mailbox is empty.
     pub(super) fn poll_room(&self, cx: &mut Context<'_>, messages: usize) -> Poll<()> {
         let mut inner = self.lock();
         if inner.has_room(messages) {
@@ -147,24 +146,24 @@ impl Mailbox {
         Poll::Pending
     }
 
-    /// Whether so many more messages fit, or none waits.
+    /// Whether `messages` more fit, or the mailbox is empty.
     pub(super) fn has_room(&self, messages: usize) -> bool {
         self.lock().has_room(messages)
     }
 
-    /// Whether a message that is acknowledged stays until it is read: the other half of the room is
-    /// for what cannot be refused.
+    /// Whether a message that is acknowledged now is sure to stay until it is read: the other half
+    /// of the room is for messages that cannot be refused.
     pub(super) fn has_reserve(&self, priority: Priority) -> bool {
         self.lock().messages.has_reserve(priority)
     }
 
-    /// Messages taken out until now.
+    /// The number of messages read so far.
     pub(super) fn taken(&self) -> u64 {
         let inner = self.lock();
         inner.delivered - inner.dropped - inner.messages.len() as u64
     }
 
-    /// Nothing more will come; what waits can still be read.
+    /// Closes the mailbox. Waiting messages can still be read.
     pub(super) fn close(&self) {
         let mut inner = self.lock();
         inner.closed = true;

@@ -1,8 +1,8 @@
 //! A running node: links, endpoint and attached components on tokio.
 //!
-//! A node lives in one task. On a current-thread runtime components, endpoint and sockets share one
-//! thread, which is the fastest way there is. Only what may block, a look at the host's interfaces
-//! and opening sockets and serial ports again, runs on a thread for blocking work, and rarely.
+//! A node runs in one task. On a current-thread runtime, components, endpoint and sockets share one
+//! thread, which is the fastest setup. Only rare operations that may block run on a blocking
+//! thread: listing the host's interfaces, and reopening sockets and serial ports.
 //!
 //! ```
 //! use bytes::Bytes;
@@ -98,7 +98,7 @@ pub struct Node {
     guard: Arc<Guard>,
 }
 
-/// Stops the node when nobody is left who could use it.
+/// Stops the node when the last handle and the last port are gone.
 #[derive(Debug)]
 struct Guard(Arc<Shared>);
 
@@ -112,7 +112,7 @@ impl Node {
     /// Opens the links and starts the node's task on the current tokio runtime.
     ///
     /// # Errors
-    /// [`StartError`] says what is wrong and what to do; then nothing runs.
+    /// [`StartError`] gives the reason and the remedy. Nothing is left running.
     pub fn start(config: Config) -> Result<Self, StartError> {
         config.validate()?;
         let runtime = tokio::runtime::Handle::try_current().map_err(|_| StartError::NoRuntime)?;
@@ -142,40 +142,40 @@ impl Node {
         })
     }
 
-    /// What it was started with.
+    /// The configuration that it was started with.
     #[must_use]
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// Where component processes of this host may attach, if they may.
+    /// The local address where component processes of this host may attach, if enabled.
     #[must_use]
     pub fn local_place(&self) -> Option<&str> {
         self.local_place.as_deref()
     }
 
-    /// Takes in a component, by its number within the node, 1 to 254.
+    /// Attaches a component, by its number within the node, 1 to 254.
     ///
     /// # Errors
-    /// A number that names no single component, or is attached already.
+    /// If the number does not name a single component, or is already attached.
     pub fn attach(&self, component: u8) -> Result<Port, AttachError> {
         let id = JausId::new(self.config.subsystem, self.config.node, component);
         self.attach_as(id)
     }
 
-    /// Takes in a component under any id, also of another subsystem or node: for gateways, which
-    /// stand in for components that are elsewhere.
+    /// Attaches a component under any id, including one of another subsystem or node: for gateways,
+    /// which represent components elsewhere.
     ///
     /// # Errors
-    /// An id that names no single component, or is attached already, here or (with
+    /// If the id does not name a single component, or is already attached, here or (with
     /// [`Config::junior`]) as another client of Junior.
     pub fn attach_as(&self, id: JausId) -> Result<Port, AttachError> {
         let mailbox = self.shared().attach(id, None)?;
         Ok(Port::new(id, mailbox, self.guard.clone()))
     }
 
-    /// The open UDP links; none after the node has stopped. Reads the host's table of sockets:
-    /// nothing to ask many times a second.
+    /// The open UDP links; none after the node has stopped. Reads the host's socket table, so do
+    /// not call it many times a second.
     #[must_use]
     pub fn links(&self) -> Vec<LinkReport> {
         let report = |(id, link): (LinkId, &udp::UdpLink)| LinkReport {
@@ -193,7 +193,7 @@ impl Node {
                 .map(|(id, link)| (report((id, link)), link.inodes().to_vec()))
                 .unzip()
         };
-        // Without the lock, which nothing may hold that asks the operating system.
+        // Without the lock, which must not be held during system calls for information.
         let drops = udp::kernel_drops(inodes.iter().map(Vec::as_slice));
         for (report, drops) in reports.iter_mut().zip(drops) {
             report.kernel_drops = drops;
@@ -201,7 +201,7 @@ impl Node {
         reports
     }
 
-    /// The TCP connections, if they are configured and the node has not stopped.
+    /// The TCP connections, if configured and the node has not stopped.
     #[must_use]
     pub fn tcp(&self) -> Option<TcpReport> {
         let core = self.shared().lock();
@@ -214,7 +214,7 @@ impl Node {
         })
     }
 
-    /// The link through Junior's node manager, if it is configured and the node has not stopped.
+    /// The link through Junior's node manager, if configured and the node has not stopped.
     #[cfg(unix)]
     #[must_use]
     pub fn junior(&self) -> Option<JuniorReport> {
@@ -228,8 +228,7 @@ impl Node {
         })
     }
 
-    /// The serial lines, in the order in which they are configured; none after the node has
-    /// stopped.
+    /// The serial lines, in the order of the configuration; none after the node has stopped.
     #[cfg(feature = "serial")]
     #[must_use]
     pub fn serial_lines(&self) -> Vec<SerialReport> {
@@ -249,7 +248,7 @@ impl Node {
         self.shared().lock().endpoint.peers().collect()
     }
 
-    /// What the endpoint has received, sent and dropped, and why.
+    /// What the endpoint has received, sent and dropped, with the reasons.
     #[must_use]
     pub fn counters(&self) -> endpoint::Counters {
         self.shared().lock().endpoint.counters().clone()
@@ -267,21 +266,21 @@ impl Node {
         core.mailboxes.iter().map(report).collect()
     }
 
-    /// Events from now on about components that attach, leave, or read nothing.
+    /// Events from now on about components that attach, leave, or stop reading.
     #[must_use]
     pub fn component_events(&self) -> ComponentEvents {
         self.shared().lock().attendance.events.subscribe()
     }
 
-    /// A look at everything that passes the node from now on, and from which `limit` passages may
-    /// wait to be read (at least 1, and 16 MiB at most); then the oldest go, and are counted.
+    /// A tap on all traffic of the node from now on. It holds up to `limit` unread passages (at
+    /// least 1, and at most 16 MiB). Beyond that the oldest are dropped and counted.
     #[must_use]
     pub fn tap(&self, limit: usize) -> Tap {
         self.shared().lock().taps.open(limit)
     }
 
-    /// What a link is called: its interface, its serial device, or `tcp` for the connections.
-    /// `None` if it has gone.
+    /// The name of a link: its interface, its serial device, or `tcp` for the connections. `None`
+    /// if the link is gone.
     #[must_use]
     pub fn link_name(&self, link: LinkId) -> Option<String> {
         let core = self.shared().lock();
@@ -296,14 +295,15 @@ impl Node {
         self.shared().lock().events.subscribe()
     }
 
-    /// Stops the node: lets the components of this process stop what they move and release what they
-    /// control (for a second at most), sends what waits, takes leave on its connections (both for a quarter of a
-    /// second at most), closes the links, and lets every [`Port::recv`] end once its mailbox is read.
+    /// Stops the node. First the components of this process stop what they move and release what
+    /// they control (1 s at most). Then the node sends queued messages and closes its connections
+    /// properly (0.25 s at most for both), and closes the links. Every [`Port::recv`] ends once its
+    /// mailbox is read.
     pub async fn shutdown(self) {
         self.shared().residents.close().await;
         let mut stopped = self.shared().stopped.subscribe();
         self.shared().lock().stop();
-        // An error would mean that the node is gone, and that is what is waited for.
+        // An error would mean that the node is gone, which is what this waits for.
         let _ = stopped.wait_for(|stopped| *stopped).await;
         let mut closed = self.shared().closed.subscribe();
         // As above.
@@ -315,78 +315,79 @@ impl Node {
     }
 }
 
-/// One component of a node, as it is now.
+/// The current state of one component of a node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ComponentReport {
-    /// Who.
+    /// Its id.
     pub id: JausId,
-    /// Where it lives; `None`: in the node's own process.
+    /// Its process; `None` for the node's own process.
     pub process: Option<Process>,
-    /// What has become of its messages.
+    /// Counts of its messages.
     pub mailbox: MailboxCounters,
 }
 
-/// The TCP connections of a node, as they are now.
+/// The current state of a node's TCP connections.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TcpReport {
     /// Their number in [`Path`](endpoint::Path).
     pub link: LinkId,
-    /// Where others may connect to.
+    /// The address that accepts connections, if any.
     pub listening: Option<SocketAddr>,
-    /// Those that stand, in order of their remote addresses.
+    /// The established connections, in order of their remote addresses.
     pub connections: Vec<tcp::ConnectionReport>,
-    /// What has become of connections and messages.
+    /// Counts of connections and messages.
     pub counters: tcp::Counters,
 }
 
-/// The link of a node through Junior's node manager, as it is now.
+/// The current state of a node's link through Junior's node manager.
 #[cfg(unix)]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JuniorReport {
     /// Its number in [`Path`](endpoint::Path).
     pub link: LinkId,
-    /// Where Junior's sockets are.
+    /// The folder of Junior's sockets.
     pub folder: PathBuf,
-    /// Whether the node manager is there and has accepted all components.
+    /// Whether the node manager is present and has accepted all components.
     pub is_registered: bool,
-    /// What has come and gone.
+    /// Counts of traffic.
     pub counters: junior::Counters,
 }
 
-/// One serial line of a node, as it is now.
+/// The current state of one serial line of a node.
 #[cfg(feature = "serial")]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SerialReport {
     /// Its number in [`Path`](endpoint::Path).
     pub link: LinkId,
-    /// How it is set up.
+    /// Its settings.
     pub settings: serial::Settings,
-    /// Whether the port is there just now.
+    /// Whether the port is open at present.
     pub is_open: bool,
-    /// What has come and gone.
+    /// Counts of traffic.
     pub counters: serial::Counters,
 }
 
-/// One UDP link of a node, as it is now.
+/// The current state of one UDP link of a node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LinkReport {
     /// Its number in [`Path`](endpoint::Path).
     pub link: LinkId,
-    /// The interface that it is on.
+    /// Its interface.
     pub interface: Interface,
-    /// The address that it sends from and peers answer to.
+    /// The address that it sends from, and that peers reply to.
     pub local: SocketAddr,
     /// The multicast group that it has joined.
     pub group: Option<SocketAddr>,
-    /// What it has done.
+    /// Counts of traffic.
     pub counters: udp::Counters,
-    /// Datagrams that the kernel dropped because the node did not read them in time, if it tells.
+    /// Datagrams that the kernel dropped because the node did not read them in time, if it reports
+    /// them.
     pub kernel_drops: Option<u64>,
 }
 
-/// A listener to a node's [`Event`]s, until the node is gone.
+/// A stream of a node's [`Event`]s, until the node is gone.
 pub type Events = EventStream<Event>;
 
-/// A listener to the events of a node's components, until the node is gone.
+/// A stream of the events of a node's components, until the node is gone.
 pub type ComponentEvents = EventStream<ComponentEvent>;

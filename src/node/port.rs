@@ -1,5 +1,5 @@
-//! A component's port to the node: it sends here and reads its mailbox. The node is in the same
-//! process, or in another one of the same host.
+//! A component's port to the node: it sends messages through it and reads its mailbox. The node is
+//! in the same process, or in another process of the same host.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -20,8 +20,8 @@ use crate::endpoint::{self, MessageHandle, Outgoing, Received};
 
 /// An attached component, until it is dropped.
 ///
-/// Sending never waits. What arrives waits in a bounded mailbox, the urgent first; what a full
-/// one drops is said at [`MailboxLimits`](super::MailboxLimits).
+/// Sending never waits. Received messages wait in a bounded mailbox, most urgent first; a full
+/// mailbox drops messages, see [`MailboxLimits`](super::MailboxLimits).
 #[derive(Debug)]
 pub struct Port {
     sender: Sender,
@@ -72,16 +72,16 @@ impl Port {
         self.sender.deliver(message).await
     }
 
-    /// A way to send that can be given to other tasks.
+    /// A sender that can be moved to other tasks.
     #[must_use]
     pub fn sender(&self) -> Sender {
         self.sender.clone()
     }
 
-    /// Waits for the next message; `None` when the node has stopped. A component that is attached
-    /// to the node of its host waits for that to come back instead.
+    /// Waits for the next message; `None` when the node has stopped. A component on the node of its
+    /// host waits for the node to come back instead.
     ///
-    /// Nothing is lost if the returned future is dropped.
+    /// Cancel safe: dropping the returned future loses nothing.
     pub async fn recv(&mut self) -> Option<Received> {
         std::future::poll_fn(|cx| self.poll_recv(cx)).await
     }
@@ -91,13 +91,13 @@ impl Port {
         self.mailbox.pop()
     }
 
-    /// The same as [`recv`](Self::recv) for who writes futures by hand.
+    /// Like [`recv`](Self::recv), for hand-written futures.
     pub fn poll_recv(&mut self, cx: &mut Context<'_>) -> Poll<Option<Received>> {
         self.mailbox.poll_pop(cx)
     }
 
-    /// Makes a stopping node of the same process wait for a moment, so that the component can
-    /// release what it holds.
+    /// Makes a stopping node of the same process wait a moment, so that the component can release
+    /// what it holds.
     #[must_use]
     pub fn reside(&self) -> Resident {
         match &self.sender.way {
@@ -106,8 +106,8 @@ impl Port {
         }
     }
 
-    /// What the components of this process have in common on this node: one of each type. On the node
-    /// of another process they have nothing in common.
+    /// Data that the components of this process share on this node: one value of each type. On the
+    /// node of another process they share nothing.
     pub(crate) fn common<T: Any + Send + Sync + Default>(&self) -> Arc<T> {
         match &self.sender.way {
             Attachment::Here(shared) => shared.common(),
@@ -115,19 +115,20 @@ impl Port {
         }
     }
 
-    /// What has become of the messages for this component.
+    /// Counts of the messages for this component.
     #[must_use]
     pub fn counters(&self) -> MailboxCounters {
         self.mailbox.counters()
     }
 
-    /// Whether the node is there; see [`Sender::is_connected`].
+    /// Whether the node is reachable; see [`Sender::is_connected`].
     #[must_use]
     pub fn is_connected(&self) -> bool {
         self.sender.is_connected()
     }
 
-    /// News from now on about the connection to the host's node; none for a node in the same process.
+    /// Events from now on of the connection to the host's node; none for a node in the same
+    /// process.
     #[must_use]
     pub fn host_events(&self) -> HostEvents {
         match &self.sender.way {
@@ -149,14 +150,14 @@ impl Drop for Port {
     }
 }
 
-/// Sends for a component. Does not keep the node running, nor the component attached.
+/// Sends for a component. Keeps neither the node running nor the component attached.
 #[derive(Clone, Debug)]
 pub struct Sender {
     id: JausId,
     way: Attachment,
 }
 
-/// Where the node is.
+/// The location of the node.
 #[derive(Clone, Debug)]
 enum Attachment {
     Here(Arc<Shared>),
@@ -170,17 +171,17 @@ impl Sender {
         self.id
     }
 
-    /// Sends a message: when this returns, the datagram is with the operating system, or a local
-    /// receiver has it in its mailbox. Of a burst that holds for the first message; the others leave
-    /// together, as soon as the sender lets the node's task have a turn; those above standard
-    /// priority never wait. To the node of another process, the message is on its way when this
-    /// returns; what that node finds wrong with it comes as
+    /// Sends a message. When this returns, the operating system has the datagram, or a local
+    /// receiver has it in its mailbox. In a burst this holds for the first message; the others
+    /// leave together, as soon as the sender yields to the node's task. Messages above standard
+    /// priority never wait. For the node of another process, the message is in transit when this
+    /// returns; an error of that node arrives as
     /// [`HostEvent::Rejected`](super::HostEvent::Rejected).
     ///
     /// # Errors
-    /// What the endpoint says is wrong with the message; also when its source is not this
-    /// component, or the node has stopped. [`SendError::NotConnected`] while the host's node is
-    /// gone: nothing is kept for later, because commands that come late do harm.
+    /// The endpoint's error for this message; also if its source is not this component, or the node
+    /// has stopped. [`SendError::NotConnected`] while the host's node is gone: nothing is queued,
+    /// because late commands do harm.
     pub fn send(&self, message: Outgoing) -> Result<MessageHandle, SendError> {
         self.check_source(&message)?;
         match &self.way {
@@ -189,11 +190,11 @@ impl Sender {
         }
     }
 
-    /// Sends a message that wants an acknowledgement, and waits for that. Dropping the future
-    /// forgets the message, which may still arrive.
+    /// Sends a message with acknowledgement, and waits for it. Dropping the future cancels the
+    /// wait; the message may still arrive.
     ///
     /// # Errors
-    /// [`Undelivered`] says what was not acknowledged, and why.
+    /// [`Undelivered`] tells what was not acknowledged, and why.
     pub async fn deliver(&self, mut message: Outgoing) -> Result<(), Undelivered> {
         self.check_source(&message)?;
         message.acknowledge = true;
@@ -205,15 +206,16 @@ impl Sender {
         told.await.unwrap_or(Err(Undelivered::Lost))
     }
 
-    /// Waits until the host's node has taken all that was sent. A node of the same process takes
-    /// everything at once.
+    /// Waits until the host's node has taken all messages sent so far. A node of the same process
+    /// takes them at once.
     pub async fn flushed(&self) {
         if let Attachment::Host(client) = &self.way {
             client.flushed().await;
         }
     }
 
-    /// Whether the host's node is there. One of the same process always is, until it is stopped.
+    /// Whether the host's node is reachable. A node of the same process always is, until it is
+    /// stopped.
     #[must_use]
     pub fn is_connected(&self) -> bool {
         match &self.way {
@@ -222,13 +224,13 @@ impl Sender {
         }
     }
 
-    /// Waits until there is no connection to the node: it has stopped or is lost, or the component
-    /// is detached and its last words to the host's node are written.
+    /// Waits until there is no connection to the node: the node has stopped or is lost, or the
+    /// component is detached and its last records to the host's node are written.
     pub async fn disconnected(&self) {
         match &self.way {
             Attachment::Here(shared) => {
                 let mut stopped = shared.stopped.subscribe();
-                // An error cannot be: the sender is in what we hold.
+                // This cannot fail: `shared` holds the sender.
                 let _ = stopped.wait_for(|stopped| *stopped).await;
             }
             Attachment::Host(client) => client.disconnected().await,

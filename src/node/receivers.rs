@@ -1,4 +1,4 @@
-//! Where the endpoint's messages go.
+//! The receivers of the endpoint's messages: mailboxes and taps.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use crate::address::JausId;
 use crate::endpoint::{Received, Sink};
 use crate::wire::Priority;
 
-/// The components' mailboxes, with those who look on.
+/// The components' mailboxes, and the taps.
 pub(super) struct Receivers<'a> {
     pub(super) mailboxes: &'a BTreeMap<JausId, Arc<Mailbox>>,
     pub(super) taps: &'a mut Taps,

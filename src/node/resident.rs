@@ -1,5 +1,5 @@
-//! The orderly end of a node: components of its own process stop and release what they hold before
-//! it closes its links.
+//! The orderly shutdown of a node: components of its own process stop and release what they hold
+//! before it closes its links.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,7 +9,7 @@ use tokio::sync::watch;
 /// How long a stopping node waits for its residents.
 pub(super) const LIMIT: Duration = Duration::from_secs(1);
 
-/// Who lives on a node, and whether it is about to stop.
+/// The number of residents of a node, and whether it is about to stop.
 #[derive(Debug)]
 pub(super) struct Residents {
     closing: watch::Sender<bool>,
@@ -34,7 +34,7 @@ impl Residents {
     pub(super) async fn close(&self) {
         self.closing.send_replace(true);
         let mut count = self.count.subscribe();
-        // An elapsed limit is logged by nobody but the peers: their own timeouts end what was held.
+        // On timeout the peers' own timeouts release what the residents held.
         let _ = tokio::time::timeout(LIMIT, count.wait_for(|count| *count == 0)).await;
     }
 }
@@ -49,7 +49,7 @@ impl Resident {
         Self(Some(Arc::clone(residents)))
     }
 
-    /// On the node of another process, which does not wait.
+    /// For the node of another process, which does not wait.
     pub(super) const fn elsewhere() -> Self {
         Self(None)
     }
@@ -59,7 +59,7 @@ impl Resident {
         match &self.0 {
             Some(residents) => {
                 let mut closing = residents.closing.subscribe();
-                // An error cannot be: the sender is in what we hold.
+                // This cannot fail: `residents` holds the sender.
                 let _ = closing.wait_for(|closing| *closing).await;
             }
             None => std::future::pending().await,

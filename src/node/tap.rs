@@ -1,13 +1,13 @@
-//! Looking on: what passes a node, for people and logs.
+//! Taps: the traffic of a node, for people and logs.
 //!
-//! A [`Tap`] is told of everything that comes from a link, goes to a link, or goes from one of the
-//! node's components to another. It sees what is on the links and not what the endpoint makes of it:
-//! fragments, repetitions and acknowledgements too, and what is dropped afterwards. To make whole
-//! messages of that is the viewer's business, and so is reading the octets at all.
+//! A [`Tap`] sees everything that arrives on a link, leaves on a link, or passes between components
+//! of the node. It sees the raw traffic and not the endpoint's output: including fragments,
+//! retransmissions, acknowledgements, and messages that are dropped later. The viewer decodes the
+//! octets and reassembles messages.
 //!
-//! The traffic never waits for a tap. What passes is put into the tap's own bounded queue as shared
-//! octets; when that is full the oldest goes and is counted. While nobody taps, all this is one test
-//! of an empty list.
+//! Traffic never waits for a tap. Each passage is put into the tap's own bounded queue as shared
+//! octets. A full queue drops the oldest, and counts it. Without taps the cost is one test of an
+//! empty list.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -23,61 +23,61 @@ use crate::endpoint::{LinkId, Path, Received, To, Transmit};
 use crate::link::backlog::{Backlog, Bounds};
 use crate::wire::{Flags, Frame, Framing, Priority, jserial, jtcp, judp};
 
-/// Octets that may wait for one tap, whatever the number of messages.
+/// Limit of octets that wait for one tap, whatever the number of messages.
 const OCTETS: usize = 16 << 20;
 
-/// Something that passed a node.
+/// One passage of traffic through a node.
 #[derive(Clone, Debug)]
 pub struct Passage {
-    /// When, by the clock on the wall.
+    /// The time of day.
     pub time: SystemTime,
-    /// From where, or whereto.
+    /// Its direction.
     pub way: Way,
-    /// What.
+    /// Its content.
     pub content: Content,
 }
 
-/// Which way something passed.
+/// The direction of a passage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// It came from there.
+    /// Received on this path.
     In(Path),
-    /// It went through this link; what others have sent is passed on so, too.
+    /// Sent on this link, including forwarded messages.
     Out(LinkId, To),
-    /// From one component of the node to another, which is named: a message to several passes
-    /// several times.
+    /// From one component of the node to this one. A message to several components passes several
+    /// times.
     Local(JausId),
 }
 
-/// What passed: octets as they were on the link, shared with whoever else has them.
+/// The content of a passage: octets as on the link, shared with other owners.
 #[derive(Clone, Debug)]
 pub enum Content {
-    /// A datagram that came, or what a link was given to send.
+    /// A received datagram, or data for a link to send.
     Octets {
-        /// What they are framed as.
+        /// Their framing.
         framing: Framing,
         /// The octets themselves.
         octets: Bytes,
-        /// If set, they are several datagrams of so many octets each, the last perhaps shorter.
+        /// If set, they are several datagrams of this many octets each; the last may be shorter.
         segment: Option<usize>,
     },
-    /// A message from a link that finds the messages itself: TCP, serial lines.
+    /// A message from a link that decodes the framing itself: TCP, serial lines.
     Frame(Frame),
     /// A message between components of the node.
     Message(Received),
 }
 
-/// What a [`Tap`] gives.
+/// An item of a [`Tap`].
 #[derive(Clone, Debug)]
 pub enum Tapped {
-    /// Something passed.
+    /// A passage.
     Passage(Passage),
-    /// So many passed that this tap was too slow for, here.
+    /// This many passages were lost here, because the tap was too slow.
     Lost(u64),
 }
 
 impl Passage {
-    /// The messages in it. What cannot be read gives none.
+    /// The messages in it. Undecodable octets yield none.
     #[must_use]
     pub fn frames(&self) -> Vec<Frame> {
         match &self.content {
@@ -115,7 +115,7 @@ impl Passage {
         }
     }
 
-    /// The datagrams in it, if it passed as such.
+    /// The datagrams in it, if it passed as datagrams.
     #[must_use]
     pub fn datagrams(&self) -> Vec<Bytes> {
         let Content::Octets {
@@ -133,7 +133,7 @@ impl Passage {
             .collect()
     }
 
-    /// Octets that it holds on to.
+    /// The octets that it keeps alive.
     fn len(&self) -> usize {
         match &self.content {
             Content::Octets { octets, .. } => octets.len(),
@@ -143,8 +143,8 @@ impl Passage {
     }
 }
 
-/// A look at everything that passes a node: what comes from a link, what goes to one, and what goes
-/// from one of the node's components to another, before the endpoint makes anything of it.
+/// A stream of all traffic of a node: what arrives on a link, what leaves on one, and what passes
+/// between components of the node, before the endpoint processes it.
 ///
 /// Dropping it ends it.
 pub struct Tap(Arc<Queue>);
@@ -157,18 +157,18 @@ impl fmt::Debug for Tap {
 }
 
 impl Tap {
-    /// Waits for what passes next; `None` when the node has stopped and everything was read.
+    /// Waits for the next passage; `None` when the node has stopped and the queue is empty.
     pub async fn next(&mut self) -> Option<Tapped> {
         poll_fn(|cx| self.0.poll_pop(cx)).await
     }
 
-    /// What passed and was not read yet, if there is anything.
+    /// The next unread passage, if any.
     pub fn try_next(&mut self) -> Option<Tapped> {
         self.0.lock().pop()
     }
 }
 
-/// What waits for one tap.
+/// The queue of one tap.
 #[derive(Debug)]
 struct Queue(Mutex<Inner>);
 
@@ -182,7 +182,7 @@ struct Inner {
 
 impl Inner {
     fn pop(&mut self) -> Option<Tapped> {
-        // The oldest go, so what was lost stood before all that waits.
+        // The oldest are dropped, so the lost ones came before all that wait.
         match std::mem::take(&mut self.lost) {
             0 => self.waiting.pop().map(Tapped::Passage),
             lost => Some(Tapped::Lost(lost)),
@@ -194,7 +194,7 @@ impl Queue {
     fn push(&self, passage: Passage) {
         let mut inner = self.lock();
         let length = passage.len();
-        // All alike: a tap is to see things in the order in which they passed.
+        // Same priority for all, so that a tap sees the passages in their order.
         inner.lost += inner.waiting.push(Priority::Standard, length, passage);
         if let Some(reader) = inner.reader.take() {
             reader.wake();
@@ -234,7 +234,7 @@ pub(super) struct Taps {
 }
 
 impl Taps {
-    /// One more, for which `limit` passages may wait.
+    /// Opens a tap that holds up to `limit` passages.
     pub(super) fn open(&mut self, limit: usize) -> Tap {
         let bounds = Bounds {
             items: limit.max(1),
@@ -252,7 +252,7 @@ impl Taps {
         Tap(queue)
     }
 
-    /// Tells of a datagram that came.
+    /// Records a received datagram.
     pub(super) fn datagram(&mut self, path: Path, octets: &Bytes) {
         self.tell(Way::In(path), || Content::Octets {
             framing: Framing::Judp,
@@ -261,12 +261,12 @@ impl Taps {
         });
     }
 
-    /// Tells of a message that came.
+    /// Records a received message.
     pub(super) fn frame(&mut self, path: Path, frame: &Frame) {
         self.tell(Way::In(path), || Content::Frame(frame.clone()));
     }
 
-    /// Tells of what goes to a link.
+    /// Records data for a link.
     pub(super) fn transmit(&mut self, framing: Framing, transmit: &Transmit) {
         self.tell(Way::Out(transmit.link, transmit.to), || Content::Octets {
             framing,
@@ -275,14 +275,14 @@ impl Taps {
         });
     }
 
-    /// Tells of a message for one of our components, if it is from another one of them.
+    /// Records a message from one component of this node to another.
     pub(super) fn message(&mut self, message: &Received) {
         if message.path.is_none() {
             self.tell(Way::Local(message.to), || Content::Message(message.clone()));
         }
     }
 
-    /// Nothing more will pass.
+    /// Ends all taps.
     pub(super) fn end(&mut self) {
         self.ended = true;
         for queue in self.queues.drain(..).filter_map(|queue| queue.upgrade()) {
@@ -290,7 +290,7 @@ impl Taps {
         }
     }
 
-    /// The one branch that there is while nobody taps.
+    /// The only branch taken without taps.
     #[inline]
     fn tell(&mut self, way: Way, content: impl FnOnce() -> Content) {
         if !self.queues.is_empty() {

@@ -1,4 +1,4 @@
-//! Dates and numbers of days, both ways: messages tell dates, clocks count.
+//! Converts between calendar dates (in messages) and day counts (in clocks).
 
 /// A day of the Gregorian calendar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,15 +11,15 @@ pub struct Date {
     pub day: u64,
 }
 
-/// From the first of March of the year 0 to the first of January 1970.
+/// Days from 1 March of year 0 to 1 January 1970.
 const DAYS_BEFORE_1970: u64 = 719_468;
-/// The calendar repeats itself after 400 years.
+/// Days in 400 years, after which the calendar repeats.
 const DAYS_OF_ERA: u64 = 146_097;
 
 impl Date {
-    /// The date so many days after the first of January 1970.
+    /// The date `days` days after 1 January 1970.
     ///
-    /// Counted in years that begin in March, so that the leap day is the last one.
+    /// Years are counted from March, so that the leap day is the last day of a year.
     pub const fn after_1970(days: u64) -> Self {
         let days = days + DAYS_BEFORE_1970;
         let of_era = days % DAYS_OF_ERA;
@@ -35,8 +35,7 @@ impl Date {
         }
     }
 
-    /// How many days after the first of January 1970 this is; `None` if there is no such day, or
-    /// it is earlier.
+    /// Days from 1 January 1970 to this date. `None` if the date does not exist or is earlier.
     pub fn days_after_1970(self) -> Option<u64> {
         if !(1..=12).contains(&self.month) || !(1..=31).contains(&self.day) || self.year > 9999 {
             return None;
@@ -49,7 +48,7 @@ impl Date {
         let of_year = (153 * month + 2) / 5 + self.day - 1;
         let days = 365 * year + year / 4 - year / 100 + year / 400 + of_year;
         let days = days.checked_sub(DAYS_BEFORE_1970)?;
-        // The thirtieth of February would be the first or second of March.
+        // 30 February would become 1 or 2 March.
         (Self::after_1970(days) == self).then_some(days)
     }
 }

@@ -1,5 +1,5 @@
-//! The requests of the public contests' judging tool to the core services (IOP Challenge, steps 3
-//! to 26), octet for octet, and what they are to be answered with.
+//! Replays the requests of the public competitions' judging tool to the core services (IOP
+//! Challenge, steps 3 to 26), octet for octet, and checks the answers.
 #![allow(
     clippy::disallowed_methods,
     reason = "a test begins at some time, and all that follows is virtual"
@@ -18,13 +18,13 @@ use crate::wire::{Broadcast, Priority};
 
 const VEHICLE: JausId = JausId::new(105, 1, 1);
 const JUDGE: JausId = JausId::new(42, 1, 1);
-/// The judge's components that fight for control.
+/// The judge's components that compete for control.
 const A: JausId = JausId::new(42, 2, 1);
 const B: JausId = JausId::new(42, 2, 2);
 const C: JausId = JausId::new(42, 2, 3);
 const D: JausId = JausId::new(42, 2, 4);
 
-/// Step, who asks, what, and who is told what.
+/// Step, client, request, and the expected messages with their destinations.
 type Row = (u8, JausId, &'static str, &'static [(JausId, &'static str)]);
 
 const EVENTS: [Row; 8] = [
@@ -38,7 +38,7 @@ const EVENTS: [Row; 8] = [
     ),
     (5, JUDGE, "f0210201", &[(JUDGE, "f041010001020000000222")]),
     (6, JUDGE, "0222", &[(JUDGE, "0242")]),
-    // A report in place of a query.
+    // A report instead of a query.
     (
         7,
         JUDGE,
@@ -83,20 +83,20 @@ const CONTROL: [Row; 31] = [
     (23, A, "0220", &[(A, READY)]),
     (24, A, "0300", &[]),
     (24, A, "0220", &[(A, STANDBY)]),
-    // Control is lost, and who had it is told.
+    // Control is lost, and its holder is notified.
     (25, A, "0500", &[(A, "100000")]),
     (25, A, "0220", &[(A, STANDBY)]),
     (26, D, "06000100", &[]),
     (26, A, "0220", &[(A, EMERGENCY)]),
     (26, A, "0e00", &[(A, "100001")]),
-    // Only who has set it clears it.
+    // Only the client that has set it can clear it.
     (26, A, "07000100", &[]),
     (26, A, "0220", &[(A, EMERGENCY)]),
     (26, D, "07000100", &[]),
     (26, A, "0220", &[(A, STANDBY)]),
 ];
 
-/// The code 5, and 80 octets that say "nobody here answers this query".
+/// The code 5, and 80 octets of text: "nobody here answers this query".
 const NOBODY_ANSWERS: &str = concat!(
     "f401030305",
     "6e6f626f6479206865726520616e73776572732074686973207175657279",
@@ -115,7 +115,7 @@ fn octets(hex: &str) -> Bytes {
         .collect()
 }
 
-/// Each request goes to all components of the node, as the tool sends it.
+/// Each request goes to all components of the node, as from the tool.
 fn request(source: JausId, hex: &str) -> Received {
     Received {
         source,
@@ -128,7 +128,7 @@ fn request(source: JausId, hex: &str) -> Received {
     }
 }
 
-/// Asks row after row, 10 ms apart, so that no periodic report comes between.
+/// Sends row after row, 10 ms apart, so that no periodic report comes between.
 fn ask(rows: &[Row]) {
     let profile = Profile::new(Kind::Vehicle, "Rover");
     let discovery = Discovery::new(VEHICLE, profile, Scope::Nobody, Timing::default(), 1);

@@ -1,5 +1,5 @@
-//! What a service is given beside a message or the time: who may command, where its answers go,
-//! and how it says that something has changed or is done.
+//! The context of a service call: who may command, where replies go, and how a service reports
+//! changes and finished commands.
 
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -12,18 +12,18 @@ use crate::address::JausId;
 use crate::codec::Message;
 use crate::endpoint::Received;
 
-/// What services have said for whoever wants to know.
+/// What services have reported since the stack last looked.
 #[derive(Debug, Default)]
 pub(crate) struct News {
-    /// The codes of queries whose answers are others now.
+    /// The codes of queries whose answers have changed.
     pub(crate) changed: BTreeSet<u16>,
-    /// The codes of commands that have come to an end, and whether to the wanted one.
+    /// The codes of commands that have ended, and whether successfully.
     pub(crate) ended: Vec<(u16, bool)>,
-    /// What services have found broken, and how many have recovered, in this order.
+    /// Faults (`Err`) and recoveries (`Ok`), in the order of their reports.
     pub(crate) faults: Vec<Result<(), StopCause>>,
 }
 
-/// One service's view of its component while it handles something.
+/// A service's view of its component during one call.
 #[derive(Debug)]
 pub struct Context<'a> {
     out: &'a mut Outbox,
@@ -59,22 +59,22 @@ impl<'a> Context<'a> {
         self.standing
     }
 
-    /// When a client showed its last sign of life, if it is in control, or if a service
-    /// [depends](super::Service::depends_on) on it.
+    /// The last sign of life of a client that is in control, or that a service
+    /// [depends](super::Service::depends_on) on.
     #[must_use]
     pub fn last_sign(&self, client: JausId) -> Option<Instant> {
         self.life.last_sign(client)
     }
 
-    /// Reports that something is broken: a component with Management goes to
-    /// [`State::Failure`](super::State::Failure), which ends control, until each
-    /// service that has failed has [recovered](Self::recover) as often.
+    /// Reports a fault. A component with Management goes to
+    /// [`State::Failure`](super::State::Failure), which ends control. It stays there until every
+    /// fault has been followed by a [recovery](Self::recover).
     pub fn fail(&mut self, cause: StopCause) {
         self.news.faults.push(Err(cause));
     }
 
-    /// Reports that what led to one [`fail`](Self::fail) is no more. The component goes to standby when
-    /// nothing is broken any more.
+    /// Reports that the cause of one [`fail`](Self::fail) is gone. After the last recovery the
+    /// component goes to standby.
     pub fn recover(&mut self) {
         self.news.faults.push(Ok(()));
     }
@@ -89,25 +89,25 @@ impl<'a> Context<'a> {
         self.out.send_octets(destination, payload);
     }
 
-    /// Answers a message: to its sender alone, however many it went to, with its priority.
+    /// Replies to the sender of a message alone, even to a broadcast, with the message's priority.
     pub fn reply<M: Message>(&mut self, to: &Received, message: &M) {
         self.out.reply(to, message);
     }
 
-    /// The same, until the receiver has acknowledged it: for answers of many datagrams, of which one
-    /// that is lost would cost all.
+    /// Like [`reply`](Self::reply), with retransmission until the receiver acknowledges. For
+    /// replies of many datagrams: the loss of one datagram would lose the whole reply.
     pub fn reply_until_acknowledged<M: Message>(&mut self, to: &Received, message: &M) {
         self.out.reply_until_acknowledged(to, message);
     }
 
-    /// Says that the answer to the query `Q` is another now: whoever subscribed to it hears of it.
+    /// Reports that the answer to the query `Q` has changed, which notifies its subscribers.
     pub fn changed<Q: Message>(&mut self) {
         self.news.changed.insert(Q::CODE);
     }
 
-    /// Says that the command with this code which was last carried out has come to its end, and
-    /// whether that is the wanted one: whoever asked for a command event hears of it. Only commands
-    /// whose end a service [tells](super::Service::tells_end_of) can be asked for so.
+    /// Reports that the last accepted command with this code has ended, and whether successfully.
+    /// Clients that requested a command event are notified. Command events exist only for commands
+    /// whose end a service [reports](super::Service::tells_end_of).
     pub fn ended(&mut self, command: u16, successful: bool) {
         self.news.ended.push((command, successful));
     }

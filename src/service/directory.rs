@@ -1,5 +1,5 @@
-//! What is known about the others: subsystems, their nodes, their components, and what those
-//! offer. [`Discovery`](super::Discovery) keeps it; applications read it.
+//! The directory: known subsystems, their nodes, their components, and the services of those.
+//! [`Discovery`](super::Discovery) maintains it; applications read it.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,16 +8,16 @@ use std::sync::Arc;
 use crate::address::JausId;
 use crate::codec::ServiceId;
 
-/// The tree of everything that discovery has found, the own component included.
+/// The tree of everything that discovery has found, including the own component.
 ///
-/// What it holds is small, and it is cheap to clone, so that applications can keep a copy: copies
-/// share what has not changed since.
+/// It is small and cheap to clone, so that applications can keep a copy. Copies share unchanged
+/// parts.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Directory {
     subsystems: BTreeMap<u16, Arc<Subsystem>>,
 }
 
-/// A vehicle, an operator station, or another thing with a number of its own.
+/// A vehicle, an operator station, or any other system with its own subsystem number.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Subsystem {
     identification: Option<Identification>,
@@ -36,18 +36,19 @@ pub struct Node {
 pub struct Component {
     /// Its id.
     pub id: JausId,
-    /// Kind and name, once it told.
+    /// Kind and name, once reported.
     pub identification: Option<Identification>,
-    /// What it offers, once it or its subsystem told. Components that offer the same share a list.
+    /// Its services, once reported by it or its subsystem. Components with the same services share
+    /// a list.
     pub services: Option<Arc<[Offer]>>,
 }
 
-/// Kind and name, as Report Identification (4B00h) tells them.
+/// Kind and name, as in Report Identification (4B00h).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Identification {
     /// What kind of thing it is.
     pub kind: Kind,
-    /// Its name for people; may be empty.
+    /// Its name for people. May be empty.
     pub name: String,
 }
 
@@ -66,22 +67,22 @@ pub enum Kind {
     Payload,
     /// A component: 60001.
     Component,
-    /// A number without a meaning in the standard.
+    /// A number that the standard does not define.
     Unknown(u16),
 }
 
-/// A service that a component says it offers.
+/// A service that a component advertises.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Offer {
     /// For example `urn:jaus:jss:core:Discovery`.
     pub urn: String,
-    /// Raised by incompatible changes.
+    /// Incremented by incompatible changes.
     pub major: u8,
-    /// Raised by additions.
+    /// Incremented by additions.
     pub minor: u8,
 }
 
-/// The three levels that have a name of their own.
+/// The three levels that have an identification of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     /// The subsystem.
@@ -121,13 +122,13 @@ impl Directory {
             .component(id.component())
     }
 
-    /// The components that offer a service, whatever its version.
+    /// The components that offer a service, in any version.
     pub fn offering<'d>(&'d self, urn: &'d str) -> impl Iterator<Item = &'d Component> {
         self.components()
             .filter(move |component| component.offers(urn))
     }
 
-    /// What a subsystem, a node or a component is called; `id` may be any component in it.
+    /// The identification of a subsystem, a node or a component. `id` may be any component in it.
     #[must_use]
     pub fn identification(&self, level: Level, id: JausId) -> Option<&Identification> {
         let subsystem = self.subsystem(id.subsystem())?;
@@ -138,19 +139,19 @@ impl Directory {
         }
     }
 
-    /// How many components there are.
+    /// The number of components.
     #[must_use]
     pub fn len(&self) -> usize {
         self.components().count()
     }
 
-    /// Whether there is no component at all.
+    /// Whether the directory holds no component.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.subsystems.is_empty()
     }
 
-    /// Adds a component of which nothing but the id is known. Says whether it is new.
+    /// Adds a component of which only the id is known. Returns whether it is new.
     pub(super) fn insert(&mut self, id: JausId) -> bool {
         if self.component(id).is_some() {
             return false;
@@ -166,7 +167,7 @@ impl Directory {
         true
     }
 
-    /// Removes a component, and its node and subsystem if they are empty then.
+    /// Removes a component, and its node and subsystem if they become empty.
     pub(super) fn remove(&mut self, id: JausId) {
         if self.component(id).is_none() {
             return;
@@ -185,7 +186,7 @@ impl Directory {
         }
     }
 
-    /// Names a level of a component that is in the tree. Says whether that is news.
+    /// Sets the identification at one level of a known component. Returns whether it has changed.
     pub(super) fn identify(&mut self, level: Level, id: JausId, told: Identification) -> bool {
         if self.identification(level, id) == Some(&told) {
             return false;
@@ -202,7 +203,7 @@ impl Directory {
         true
     }
 
-    /// Sets the services of a component that is in the tree. Says whether that is news.
+    /// Sets the services of a known component. Returns whether they have changed.
     pub(super) fn set_services(&mut self, id: JausId, mut services: Vec<Offer>) -> bool {
         services.sort_unstable();
         services.dedup();
@@ -218,14 +219,15 @@ impl Directory {
         true
     }
 
-    /// The list of a component that offers just these services, in order: a node's components mostly
-    /// offer the same.
+    /// An existing list with exactly these services, in order. The components of a node mostly
+    /// offer the same services.
     pub(super) fn list(&self, services: &[Offer]) -> Option<&Arc<[Offer]>> {
         let mut lists = self.components().filter_map(|it| it.services.as_ref());
         lists.find(|list| ***list == *services)
     }
 
-    /// The subsystem of `id`, for changes; copied first if a copy of the directory shares it.
+    /// The subsystem of `id`, for changes. It is copied first if a clone of the directory shares
+    /// it.
     fn subsystem_mut(&mut self, id: JausId) -> Option<&mut Subsystem> {
         self.subsystems.get_mut(&id.subsystem()).map(Arc::make_mut)
     }
@@ -240,7 +242,7 @@ impl Directory {
 }
 
 impl Subsystem {
-    /// Kind and name, once told.
+    /// Kind and name, once reported.
     #[must_use]
     pub fn identification(&self) -> Option<&Identification> {
         self.identification.as_ref()
@@ -264,7 +266,7 @@ impl Subsystem {
 }
 
 impl Node {
-    /// Kind and name, once told.
+    /// Kind and name, once reported.
     #[must_use]
     pub fn identification(&self) -> Option<&Identification> {
         self.identification.as_ref()
@@ -283,12 +285,12 @@ impl Node {
 }
 
 impl Component {
-    /// What it offers; nothing as long as it has not told.
+    /// Its services. Empty until it has reported them.
     pub fn offered(&self) -> impl Iterator<Item = &Offer> {
         self.services.iter().flat_map(|services| services.iter())
     }
 
-    /// Whether it says that it offers a service, whatever the version.
+    /// Whether it advertises a service, in any version.
     #[must_use]
     pub fn offers(&self, urn: &str) -> bool {
         self.offered().any(|offer| offer.urn == urn)
@@ -296,8 +298,8 @@ impl Component {
 }
 
 impl Offer {
-    /// Whether a client made for `wanted` can use it: the same service and major version, and no
-    /// older minor version.
+    /// Whether it serves a client made for `wanted`: the same service and major version, and at
+    /// least the same minor version.
     #[must_use]
     pub fn serves(&self, wanted: ServiceId) -> bool {
         self.urn == wanted.urn && self.major == wanted.major && self.minor >= wanted.minor

@@ -1,18 +1,17 @@
-//! The motion guard: stands between every command and whatever moves.
+//! The motion guard: decides how long a command may keep something moving.
 //!
-//! A command is a setpoint with an owner and a [`Validity`]. While the setpoint is in force the
-//! vehicle may move; when it ends, the vehicle stops, and only another command moves it again.
+//! A command is a setpoint with an owner and a [`Validity`]. The vehicle may move while the
+//! setpoint is in force. When it ends, the vehicle stops, and only a new command moves it again.
 //!
 //! | command | in force until |
 //! |---|---|
-//! | effort, velocity ([`Validity::Brief`]) | 500 ms have passed; under [`MotionPolicy::Hold`] as vectors |
+//! | effort, velocity ([`Validity::Brief`]) | 500 ms have passed; like a vector under [`MotionPolicy::Hold`] |
 //! | vector ([`Validity::WhileAlive`]) | its owner has shown no life for 1 s |
 //! | goal ([`Validity::UntilDone`]) | it is reached |
 //!
-//! Every setpoint also ends when another one replaces it, and with everything that
-//! [`StopCause`] names. The mobility services ([`Vehicle`](super::mobility::Vehicle)) and
-//! [`Handlers`](super::Handlers) have a guard each; the [`Stack`](super::Stack) tells it of changes of
-//! the component's state and control.
+//! A setpoint also ends when another one replaces it, and on every [`StopCause`].
+//! [`Handlers`](super::Handlers) and the vehicle services of the crate `jaus-vehicle` have a guard
+//! each. The [`Stack`](super::Stack) reports changes of the component's state and control to it.
 
 use std::fmt;
 use std::time::{Duration, Instant};
@@ -20,20 +19,20 @@ use std::time::{Duration, Instant};
 use super::{Standing, State};
 use crate::address::JausId;
 
-/// How long a command may keep something moving.
+/// How long a command stays in force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Validity {
-    /// A moment, as [`MotionPolicy`] says: effort and velocity.
+    /// Briefly, as set by [`MotionPolicy`]: effort and velocity.
     Brief,
     /// As long as its owner shows life within [`MotionGuard::LIFE`]: a speed and a heading.
     WhileAlive,
-    /// Until it is done, bounded by control: waypoints, lists, path segments.
+    /// Until it is done, as long as control lasts: waypoints, lists, path segments.
     UntilDone,
 }
 
 impl Validity {
-    /// The validity of a command of the mobility services (AS6009) by its message code. Anything
-    /// else is brief, because that is safe.
+    /// The validity of a command of the mobility services (AS6009) by message code. Any other
+    /// command is brief, which is the safe choice.
     #[must_use]
     pub const fn of(code: u16) -> Self {
         match code {
@@ -48,18 +47,18 @@ impl Validity {
     }
 }
 
-/// What becomes of efforts and velocities that their client does not repeat.
+/// How long efforts and velocities last if the client does not repeat them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MotionPolicy {
     /// They end after this time.
     Expire(Duration),
-    /// They last as long as their client shows life within [`MotionGuard::LIFE`]: for clients that
-    /// send once or slowly, such as the public contests' and those behind the gateway.
+    /// They last while their client shows life within [`MotionGuard::LIFE`]. For clients that send
+    /// once or slowly, such as those of the public competitions and those behind the gateway.
     Hold,
 }
 
 impl MotionPolicy {
-    /// How long an effort or a velocity is valid by default.
+    /// The default validity of an effort or a velocity.
     pub const BRIEF: Duration = Duration::from_millis(500);
 }
 
@@ -79,7 +78,7 @@ pub enum StopCause {
     ControllerSilent(JausId),
     /// Control was released, lost, or taken over.
     ControlChanged,
-    /// The component is in standby, or begins anew.
+    /// The component is in standby, or restarts.
     Standby,
     /// The application has stopped it.
     Requested,
@@ -91,18 +90,18 @@ pub enum StopCause {
     Shutdown,
     /// An actuator or a sensor reports a fault.
     Fault(String),
-    /// The pose is older than may be steered by.
+    /// The pose is too old to steer by.
     PoseStale(Duration),
-    /// The pose is not known.
+    /// The pose is unknown.
     PoseUnknown,
-    /// The component's task was held up for so long.
+    /// The component's task did not run for this time.
     Hung(Duration),
     /// The component or its node has ended, or has panicked.
     Ended,
 }
 
 impl StopCause {
-    /// Why a change of the component's state or control stops it, if it does.
+    /// The cause of the stop that a change of the component's state or control requires, if any.
     pub(super) fn of(before: &Standing, after: &Standing) -> Option<Self> {
         after.stops(before).then_some(match after.state {
             State::Emergency => Self::Emergency,
@@ -143,12 +142,12 @@ impl fmt::Display for StopCause {
     }
 }
 
-/// Keeps the setpoint in force, and says when it ends.
+/// Keeps the setpoint in force and its end.
 #[derive(Debug, Default)]
 pub struct MotionGuard {
     policy: MotionPolicy,
     setpoint: Option<Setpoint>,
-    /// The last brief command and its owner, to tell how often a client repeats.
+    /// Owner and time of the last brief command, to measure how often a client repeats.
     last: Option<(JausId, Instant)>,
     /// The client whose first expiry has been logged.
     logged: Option<JausId>,
@@ -162,13 +161,13 @@ struct Setpoint {
     since: Instant,
     /// The last known sign of life of the owner.
     alive: Instant,
-    /// Between the last two brief commands of the owner.
+    /// Time between the owner's last two brief commands.
     interval: Option<Duration>,
 }
 
 impl MotionGuard {
-    /// A vector, and an effort under [`MotionPolicy::Hold`], ends when its owner has been silent
-    /// for so long.
+    /// A vector, or an effort under [`MotionPolicy::Hold`], ends when its owner has been silent for
+    /// this time.
     pub const LIFE: Duration = Duration::from_secs(1);
 
     /// A guard with nothing in force.
@@ -180,12 +179,12 @@ impl MotionGuard {
         }
     }
 
-    /// What becomes of efforts and velocities that are not repeated.
+    /// Sets how long efforts and velocities last if they are not repeated.
     pub const fn set_policy(&mut self, policy: MotionPolicy) {
         self.policy = policy;
     }
 
-    /// A command of `owner` is in force from now on, in place of any earlier one.
+    /// Puts a command of `owner` in force, in place of any earlier one.
     pub fn accept(&mut self, now: Instant, owner: JausId, validity: Validity) {
         let before = self.last.filter(|(id, _)| *id == owner);
         self.last = (validity == Validity::Brief).then_some((owner, now));
@@ -199,7 +198,7 @@ impl MotionGuard {
         });
     }
 
-    /// Notes the last sign of life of the owner of the setpoint, if it is known.
+    /// Notes the owner's last sign of life, if known.
     pub fn note_life(&mut self, last_sign: impl FnOnce(JausId) -> Option<Instant>) {
         if let Some(setpoint) = &mut self.setpoint
             && let Some(sign) = last_sign(setpoint.owner)
@@ -208,13 +207,13 @@ impl MotionGuard {
         }
     }
 
-    /// When the setpoint in force ends, as far as is known now.
+    /// When the setpoint in force ends, as far as known now.
     #[must_use]
     pub fn expires_at(&self) -> Option<Instant> {
         let setpoint = self.setpoint?;
         match (setpoint.validity, self.policy) {
             (Validity::UntilDone, _) => None,
-            // A duration that cannot be added never ends, as one that is meant to.
+            // A sum that overflows never expires: such a duration means "forever".
             (Validity::Brief, MotionPolicy::Expire(brief)) => setpoint.since.checked_add(brief),
             (Validity::Brief, MotionPolicy::Hold) | (Validity::WhileAlive, _) => {
                 Some(setpoint.alive + Self::LIFE)
@@ -222,7 +221,7 @@ impl MotionGuard {
         }
     }
 
-    /// Ends the setpoint if its time has come; says why whatever moves must stop.
+    /// Ends the setpoint if it has expired, and returns the cause of the stop.
     #[must_use]
     pub fn expire(&mut self, now: Instant) -> Option<StopCause> {
         if self.expires_at().is_none_or(|end| end > now) {
@@ -240,8 +239,8 @@ impl MotionGuard {
         Some(cause)
     }
 
-    /// The first expiry of a client that repeats its commands too slowly is worth a warning; the
-    /// others are the usual end of driving.
+    /// Warns about the first expiry of a client that repeats its commands too slowly. Other
+    /// expiries are the normal end of driving.
     fn log_expiry(&mut self, setpoint: &Setpoint) {
         let client = setpoint.owner;
         let MotionPolicy::Expire(brief) = self.policy else {
@@ -265,14 +264,14 @@ impl MotionGuard {
         );
     }
 
-    /// Ends the setpoint, whatever it is.
+    /// Ends the setpoint, if there is one.
     pub fn stop(&mut self, cause: StopCause) {
         if self.setpoint.take().is_some() {
             self.last_stop = Some(cause);
         }
     }
 
-    /// The goal in force is reached.
+    /// Ends the setpoint because its goal is reached.
     pub const fn finish(&mut self) {
         self.setpoint = None;
     }
@@ -283,14 +282,14 @@ impl MotionGuard {
         self.setpoint.is_some()
     }
 
-    /// The client on whose life the motion depends now.
+    /// The client whose liveness the motion depends on now.
     #[must_use]
     pub fn depends_on(&self) -> Option<JausId> {
         let setpoint = self.setpoint.filter(|_| self.life_matters());
         setpoint.map(|setpoint| setpoint.owner)
     }
 
-    /// What ended the last setpoint, unless that was its own goal or another command.
+    /// What ended the last setpoint, unless it reached its goal or another command replaced it.
     #[must_use]
     pub const fn last_stop(&self) -> Option<&StopCause> {
         self.last_stop.as_ref()

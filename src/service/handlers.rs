@@ -1,4 +1,4 @@
-//! A service made of functions, one per message: what an application offers.
+//! An application's own service, made of one function per message.
 
 use std::any::TypeId;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,19 +14,19 @@ use crate::codec::{DecodeError, Message, ServiceId};
 use crate::endpoint::Received;
 
 type Stop = Box<dyn FnMut(&mut Context<'_>) + Send>;
-/// Handles a message, or says why its octets are no message of its type.
+/// Handles a message, or fails if its octets are no message of its type.
 type Handler = Box<dyn FnMut(&Received, &mut Context<'_>) -> Result<Taken, DecodeError> + Send>;
 
-/// What became of a message.
+/// Result of a handler.
 #[derive(Clone, Copy)]
 enum Taken {
-    /// It moves nothing, or its sender may not give it.
+    /// It moves nothing, or its sender may not command.
     Message,
-    /// It is a command, carried out and valid for a while.
+    /// A command that was carried out and is in force for this validity.
     Command(Validity),
 }
 
-/// A service whose messages are answered by functions of the application.
+/// A service whose messages are handled by functions of the application.
 ///
 /// ```
 /// use jaus::messages::mobility::{self, QueryVelocityState, ReportVelocityState};
@@ -38,18 +38,18 @@ enum Taken {
 ///
 /// # Commands
 ///
-/// | method | for | obeys |
+/// | method | for messages that | accepted from |
 /// |---|---|---|
-/// | [`command`](Self::command) | what makes something act | the client in control while the component is ready |
-/// | [`configure`](Self::configure) | what sets something up | the client in control |
-/// | [`receive`](Self::receive) | everything else | anyone |
+/// | [`command`](Self::command) | move something | the client in control while the component is ready |
+/// | [`configure`](Self::configure) | configure something | the client in control |
+/// | [`receive`](Self::receive) | do neither | anyone |
 ///
-/// A command that moves something needs a stop action, [`on_stop`](Self::on_stop). It is called when
-/// the command is not repeated within 500 ms (or as [`Validity`] and [`MotionPolicy`] say), when
-/// control or readiness is lost, in an emergency, and when the component ends. A component without
-/// Management, or handlers without a stop action, cannot be attached with a command.
+/// A command that moves something needs a stop action, [`on_stop`](Self::on_stop). It is called
+/// when the command is not repeated within 500 ms (or as set by [`Validity`] and [`MotionPolicy`]),
+/// when control or readiness is lost, in an emergency, and when the component ends. Attaching a
+/// command fails if the component has no Management or the handlers have no stop action.
 ///
-/// A command of a service that inherits Access Control cannot be taken from anyone by mistake:
+/// A command of a service that inherits Access Control cannot be accepted from anyone by mistake:
 ///
 /// ```compile_fail
 /// use jaus::messages::mobility::{SetWrenchEffort, primitive_driver};
@@ -60,10 +60,10 @@ enum Taken {
 ///
 /// # Several versions
 ///
-/// A component can offer a service at several versions. Where they lay a message out differently
-/// under the same code, each layout is a type with a handler of its own; nothing in a message says
-/// its version, so the layouts are tried in the order in which they were given, the newest first,
-/// and the first that fits the octets exactly has the message.
+/// A component can offer several versions of a service. If versions lay out a message differently
+/// under the same code, each layout is a type with its own handler. A message does not carry its
+/// version. So the layouts are tried in the order in which they were added, newest first; the first
+/// that fits the octets exactly handles the message.
 ///
 /// ```
 /// use jaus::messages::mobility::{self, v1_0};
@@ -84,7 +84,7 @@ pub struct Handlers {
 }
 
 impl Handlers {
-    /// A service that handles nothing yet.
+    /// A service without handlers.
     #[must_use]
     pub fn new(id: ServiceId) -> Self {
         Self {
@@ -97,14 +97,14 @@ impl Handlers {
         }
     }
 
-    /// Also offers an older version, whose clients it understands as well.
+    /// Also offers another version, usually an older one whose clients it understands.
     #[must_use]
     pub fn and_version(mut self, id: ServiceId) -> Self {
         self.offers.push(id);
         self
     }
 
-    /// Answers every query of type `Q`; the answer goes to whoever asked.
+    /// Answers every query of type `Q`. The answer goes to the sender of the query.
     #[must_use]
     pub fn answer<Q: Message, R: Message>(
         mut self,
@@ -125,7 +125,7 @@ impl Handlers {
         self
     }
 
-    /// Takes every message of type `M` from any sender; the context sends answers.
+    /// Handles every message of type `M` from any sender. Replies go through the context.
     ///
     /// Does not compile for a [command that needs control](Message::NEEDS_CONTROL).
     #[must_use]
@@ -143,8 +143,8 @@ impl Handlers {
         self.receive_unguarded(function)
     }
 
-    /// The same for any message, also for a command that needs control: anyone may give it at any
-    /// time, and nothing stops it.
+    /// Like [`receive`](Self::receive), but also for a command that needs control: anyone may send
+    /// it at any time, and nothing stops it.
     #[must_use]
     pub fn receive_unguarded<M: Message>(
         self,
@@ -153,9 +153,10 @@ impl Handlers {
         self.receive_if(|_, _| true, Taken::Message, function)
     }
 
-    /// Takes messages of type `M` from the client in control, and ignores all others: what sets
-    /// something up. The component must offer Access Control or Management. It is not for what moves
-    /// something: the command is obeyed in every state, and nothing stops it.
+    /// Handles messages of type `M` from the client in control, and ignores all others: for
+    /// commands that configure something. The component must offer Access Control or Management.
+    /// Not for commands that move something: the command is obeyed in every state, and nothing
+    /// stops it.
     #[must_use]
     pub fn configure<M: Message>(
         mut self,
@@ -165,11 +166,11 @@ impl Handlers {
         self.receive_if(Standing::obeys, Taken::Message, function)
     }
 
-    /// Takes messages of type `M` from the client in control while the component is ready, and
-    /// ignores all others: what makes something act. The component must offer Management, and there
-    /// must be a stop action, [`on_stop`](Self::on_stop).
+    /// Handles messages of type `M` from the client in control while the component is ready, and
+    /// ignores all others: for commands that move something. The component must offer Management,
+    /// and there must be a stop action, [`on_stop`](Self::on_stop).
     ///
-    /// The command is valid for as long as [`Validity::of`] its code says: 500 ms unless it is one of
+    /// The command is valid as given by [`Validity::of`] for its code: 500 ms unless it is one of
     /// the standard's vectors or goals.
     #[must_use]
     pub fn command<M: Message>(
@@ -179,7 +180,7 @@ impl Handlers {
         self.command_valid(Validity::of(M::CODE), function)
     }
 
-    /// The same as [`command`](Self::command), with a validity of one's own choice.
+    /// Like [`command`](Self::command), with an explicit validity.
     #[must_use]
     pub fn command_valid<M: Message>(
         mut self,
@@ -190,16 +191,16 @@ impl Handlers {
         self.receive_if(Standing::acts_for, Taken::Command(validity), function)
     }
 
-    /// How long brief commands are valid; 500 ms without this.
+    /// Sets how long brief commands are valid; the default is 500 ms.
     #[must_use]
     pub const fn motion_policy(mut self, policy: MotionPolicy) -> Self {
         self.guard.set_policy(policy);
         self
     }
 
-    /// Calls a function whenever what the commands have set in motion must stop: at the end of a
-    /// command's validity, when control or readiness is lost, in an emergency, and when the component
-    /// ends. It may be called when nothing moves.
+    /// Calls a function whenever the motion that commands have started must stop: at the end of a
+    /// command's validity, when control or readiness is lost, in an emergency, and when the
+    /// component ends. It is also called when nothing moves.
     #[must_use]
     pub fn on_stop(mut self, stop: impl FnMut(&mut Context<'_>) + Send + 'static) -> Self {
         self.hazards.stops = true;
@@ -207,8 +208,8 @@ impl Handlers {
         self
     }
 
-    /// Lets clients have commands of type `M` carried out as command events (AS5710 1.1). The
-    /// application promises to say when one has ended, by [`Context::ended`] or
+    /// Allows clients to run commands of type `M` as command events (AS5710 1.1). The application
+    /// must report the end of each command with [`Context::ended`] or
     /// [`Stack::end_command`](super::Stack::end_command).
     #[must_use]
     pub fn tell_end_of<M: Message>(mut self) -> Self {
@@ -239,7 +240,7 @@ impl Handlers {
         }
     }
 
-    /// Sets the handler of a layout, behind those of other layouts with the same code.
+    /// Sets the handler of a layout, after those of other layouts with the same code.
     fn handle<M: Message>(
         &mut self,
         handler: impl FnMut(&Received, &mut Context<'_>) -> Result<Taken, DecodeError> + Send + 'static,
@@ -335,7 +336,7 @@ mod tests {
     use crate::service::State;
     use crate::service::rig::{CLIENT, Rig, STRANGER};
 
-    /// Handlers that count: what anyone may say, what sets up, what acts, and stops.
+    /// Handlers that count unguarded messages, configuration, commands and stops.
     fn counting() -> (Rig, [Arc<AtomicU32>; 4]) {
         let counts: [Arc<AtomicU32>; 4] = Default::default();
         let [heard, set_up, acted, stopped] = counts.clone();

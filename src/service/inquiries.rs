@@ -1,5 +1,5 @@
-//! Questions of the application to other components: asked again if no answer comes, given up in
-//! the end, and one at a time where answers could not be told apart.
+//! The application's queries to other components: repeated on timeout, failed after the last try,
+//! and sent one at a time where answers would be ambiguous.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
@@ -10,14 +10,14 @@ use super::{Outbox, code_of};
 use crate::address::JausId;
 use crate::endpoint::Received;
 
-/// Names one question until its answer comes.
+/// Identifies one query until it ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Inquiry(u64);
 
 /// How long to wait for an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Patience {
-    /// How often to ask; at least once.
+    /// How often to send the query; at least once.
     pub tries: u32,
     /// How long to wait after each try.
     pub interval: Duration,
@@ -34,34 +34,34 @@ impl Default for Patience {
     }
 }
 
-/// A question that nobody answered.
+/// A query that timed out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NoAnswer {
-    /// Who was asked.
+    /// The queried component.
     pub peer: JausId,
-    /// How often.
+    /// How often the query was sent.
     pub tries: u32,
-    /// From the first try until now.
+    /// Time since the first try.
     pub waited: Duration,
 }
 
-/// The questions of one component that wait for an answer.
+/// The pending queries of one component.
 ///
-/// JAUS answers do not say which question they answer. So of several questions to the same peer
-/// for the same report only the oldest is asked, and the next when that one has ended.
+/// JAUS answers do not say which query they answer. So of several queries to the same peer for the
+/// same report only the oldest is sent; the next follows when that one has ended.
 #[derive(Debug, Default)]
 pub(super) struct Inquiries {
     last: u64,
     waiting: BTreeMap<Inquiry, Waiting>,
-    /// Those for the same report of the same peer, of which the first is being asked.
+    /// The queries to one peer for one report, in order. The first is the one that was sent.
     turns: BTreeMap<Turn, VecDeque<Inquiry>>,
-    /// The turns whose peer has wildcards.
+    /// The turns whose peer id has wildcards.
     open: BTreeSet<Turn>,
     due: BTreeSet<(Instant, Inquiry)>,
     failed: VecDeque<(Inquiry, NoAnswer)>,
 }
 
-/// The code of a report, and whose it is.
+/// The code of a report, and the peer that sends it.
 type Turn = (u16, JausId);
 
 #[derive(Debug)]
@@ -80,7 +80,7 @@ struct Asked {
 }
 
 impl Inquiries {
-    /// The most that may wait; one more fails at once.
+    /// The limit of pending queries; the next one fails at once.
     const MOST: usize = 4096;
 
     pub(super) fn ask(
@@ -119,12 +119,12 @@ impl Inquiries {
         inquiry
     }
 
-    /// Forgets a question whose answer nobody waits for any more.
+    /// Cancels a query.
     pub(super) fn cancel(&mut self, now: Instant, inquiry: Inquiry, out: &mut Outbox) {
         self.end(now, inquiry, out);
     }
 
-    /// The question that this message answers, if any.
+    /// The query that this message answers, if any.
     pub(super) fn handle_message(
         &mut self,
         now: Instant,
@@ -178,7 +178,7 @@ impl Inquiries {
         self.due.first().map(|&(due, _)| due)
     }
 
-    /// Takes a question out, and asks the one whose turn comes then.
+    /// Ends a query, and sends the next one of its turn.
     fn end(&mut self, now: Instant, inquiry: Inquiry, out: &mut Outbox) {
         let Some(ended) = self.waiting.remove(&inquiry) else {
             return;
@@ -200,7 +200,7 @@ impl Inquiries {
         self.proceed(now, ended.turn, out);
     }
 
-    /// Asks the question whose turn it is.
+    /// Sends the first query of a turn unless it was already sent.
     fn proceed(&mut self, now: Instant, turn: Turn, out: &mut Outbox) {
         let first = self.turns.get(&turn).and_then(VecDeque::front);
         let Some((&inquiry, waiting)) = first.and_then(|it| Some((it, self.waiting.get_mut(it)?)))

@@ -1,17 +1,17 @@
-//! Signs of life of the peers that matter: the client in control, clients that have set an
-//! emergency, and holders of subscriptions.
+//! Liveness of the peers that matter: the client in control, clients that have set an emergency,
+//! and subscribers.
 //!
-//! Discovery also notices that a peer has died, but it looks at everything it has ever heard of, so
-//! its bound grows with the number of peers. Here the bound depends on nothing but the peer itself.
+//! Discovery also detects dead peers, but it checks every peer it knows, so its detection time
+//! grows with their number. Here the detection time depends only on the peer itself.
 //!
 //! | silent for | what happens |
 //! |---|---|
-//! | [`Life::MOVING`] | while something moves on its word: Query Heartbeat Pulse, four times a second |
-//! | [`Life::SILENCE`] | Query Heartbeat Pulse, once a second, acknowledgement wanted |
-//! | [`Life::DEATH`] | dead, if it ever answered or acknowledged a probe; a peer that never did is left to the timeout of control |
+//! | [`Life::MOVING`] | while motion depends on the peer: Query Heartbeat Pulse, four times a second |
+//! | [`Life::SILENCE`] | Query Heartbeat Pulse, once a second, with acknowledgement |
+//! | [`Life::DEATH`] | dead, if it has ever answered or acknowledged a probe; otherwise the timeout of control applies |
 //!
 //! Any message is a sign of life. A transport acknowledgement counts only for peers that have never
-//! answered a probe by a message: a node acknowledges on behalf of a component that hangs.
+//! answered a probe with a message, because a node also acknowledges for a component that hangs.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::{Duration, Instant};
@@ -23,7 +23,7 @@ use crate::codec::Message;
 use crate::messages::core::{QueryHeartbeatPulse, ReportHeartbeatPulse};
 use crate::wire::Priority;
 
-/// Why a peer is watched. The client in control is probed always, the others within a budget.
+/// Why a peer is watched. The client in control is always probed, the others within a budget.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Rank {
     /// It holds subscriptions.
@@ -32,15 +32,15 @@ pub enum Rank {
     EmergencySetter,
     /// It is in control.
     Controller,
-    /// It is in control, and something moves only as long as it is alive.
+    /// It is in control, and motion continues only while it is alive.
     MovingController,
 }
 
-/// The peers whose life matters to one component.
+/// The peers that one component watches.
 #[derive(Debug)]
 pub struct Life {
     peers: BTreeMap<JausId, Peer>,
-    /// One entry for each peer: when to look at it again.
+    /// One entry per peer: when to check it next.
     due: BTreeSet<(Instant, JausId)>,
     subscriber_probes: Budget,
     setter_probes: Budget,
@@ -49,15 +49,15 @@ pub struct Life {
 
 #[derive(Debug)]
 struct Peer {
-    /// When the last sign of life came.
+    /// Time of the last sign of life.
     alive: Instant,
-    /// Whether it has ever answered a probe by a message, and whether it acknowledges.
+    /// Whether it has ever answered a probe with a message, and whether it acknowledges probes.
     answers: bool,
     acknowledges: bool,
     /// Probes since the last sign of life.
     probes: u32,
-    /// Whether it has ever been probed. A client in control is, however busy it is: only who answers
-    /// by a message is known to do so.
+    /// Whether it has ever been probed. A client in control is probed once even if it is never
+    /// silent, because only a probe shows whether it answers with messages.
     is_known: bool,
     look: Instant,
 }
@@ -75,19 +75,19 @@ impl Default for Life {
 }
 
 impl Life {
-    /// A peer that has been silent for so long is probed, and again in such intervals.
+    /// A peer that has been silent for this time is probed, and again at this interval.
     pub const SILENCE: Duration = Duration::from_secs(1);
-    /// The same while something moves on its word.
+    /// The same while motion depends on the peer.
     pub const MOVING: Duration = Duration::from_millis(250);
-    /// A peer that answers probes and has been silent for so long is dead.
+    /// A peer that answers probes and has been silent for this time is dead.
     pub const DEATH: Duration = Duration::from_secs(4);
-    /// Probes to subscribers, and those to setters of emergencies: a burst of so many, then one in this
-    /// time. Their ids may be forged.
+    /// Budget for probes to subscribers, and another for those to setters of emergencies: a burst
+    /// of `BURST`, then one per `REFILL`. Their ids may be forged.
     const BURST: u32 = 32;
     const REFILL: Duration = Duration::from_millis(50);
 
-    /// Watches a peer that has just been heard. One that is watched already is looked at no later
-    /// than its rank demands.
+    /// Watches a peer that has just sent a message. A peer that is already watched is checked no
+    /// later than its rank demands.
     pub fn watch(&mut self, now: Instant, id: JausId, rank: Rank) {
         let peer = self.peers.entry(id).or_insert_with(|| {
             self.due.insert((now + rank.patience(), id));
@@ -108,7 +108,7 @@ impl Life {
         }
     }
 
-    /// A message with this code has come from a peer.
+    /// Notes a message with this code from a peer.
     pub fn hear(&mut self, now: Instant, id: JausId, code: Option<u16>) {
         if let Some(peer) = self.peers.get_mut(&id) {
             peer.alive = now;
@@ -117,7 +117,7 @@ impl Life {
         }
     }
 
-    /// A peer's transport has acknowledged a probe.
+    /// Notes that a peer's transport has acknowledged a probe.
     pub fn acknowledged(&mut self, now: Instant, id: JausId) {
         if let Some(peer) = self.peers.get_mut(&id).filter(|peer| !peer.answers) {
             peer.acknowledges = true;
@@ -126,7 +126,7 @@ impl Life {
         }
     }
 
-    /// When the last sign of life of a watched peer came.
+    /// The last sign of life of a watched peer.
     pub fn last_sign(&self, id: JausId) -> Option<Instant> {
         self.peers.get(&id).map(|peer| peer.alive)
     }
@@ -138,13 +138,13 @@ impl Life {
     }
 
     /// Whether a peer was probed until [`DEATH`](Self::DEATH) and has never answered a probe, so
-    /// that its death would go unnoticed.
+    /// that its death would go undetected.
     pub fn is_mute(&self, now: Instant, id: JausId) -> bool {
         let peer = self.peers.get(&id);
         peer.is_some_and(|peer| !peer.answers && !peer.acknowledges) && !self.is_alive(now, id)
     }
 
-    /// Probes the silent. `rank` says why a peer is still watched; `None` ends that.
+    /// Probes silent peers. `rank` returns why a peer is still watched; `None` ends the watch.
     pub fn handle_timeout(
         &mut self,
         now: Instant,
@@ -187,7 +187,7 @@ impl Life {
         self.due.first().map(|&(look, _)| look)
     }
 
-    /// The next peer that has died. It is watched no more.
+    /// The next peer that has died. It is no longer watched.
     pub fn poll_dead(&mut self) -> Option<JausId> {
         self.dead.pop_front()
     }
@@ -204,13 +204,13 @@ impl Rank {
 }
 
 impl Peer {
-    /// Whether its silence says something: it can answer, and has been asked to. A component that was
-    /// itself held up has not asked.
+    /// Whether its silence counts: it can answer, and was probed at least twice. A component that
+    /// was itself held up has not probed.
     const fn is_probed(&self) -> bool {
         (self.answers || self.acknowledges) && self.probes >= 2
     }
 
-    /// The next probe, or the moment of death if that comes first.
+    /// The next probe, or the time of death if that is earlier.
     fn next_look(&self, now: Instant, rank: Rank) -> Instant {
         let probe = if self.probes == 0 {
             (self.alive + rank.patience()).max(now + rank.patience() / 5)
@@ -242,12 +242,12 @@ mod tests {
     enum Client {
         /// Sends, and answers probes.
         Lively,
-        /// Sends, and does not answer.
+        /// Sends, but does not answer.
         Mute,
         Suspended,
     }
 
-    /// Lets time pass for a client on whose life a motion depends; counts the probes.
+    /// Advances the time for a client that a motion depends on; counts the probes.
     fn pass(life: &mut Life, now: &mut Instant, time: Duration, client: Client) -> usize {
         let mut out = Outbox::new(US);
         let mut probes = 0;

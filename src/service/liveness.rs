@@ -1,4 +1,4 @@
-//! The Liveness service: a sign of life when asked, and if wanted without being asked.
+//! The Liveness service: answers heartbeat queries, and sends a periodic heartbeat if configured.
 
 use std::time::{Duration, Instant};
 
@@ -18,22 +18,22 @@ pub struct Liveness {
 struct Heartbeat {
     to: JausId,
     every: Duration,
-    /// `None` until the first wake-up has told the time.
+    /// `None` until the first wake-up has supplied the time.
     next: Option<Instant>,
 }
 
 impl Liveness {
-    /// The shortest interval between two heartbeats that nobody asked for.
+    /// The shortest interval between two unsolicited heartbeats.
     pub const SHORTEST_INTERVAL: Duration = Duration::from_millis(10);
 
-    /// Answers and sends nothing else.
+    /// Answers queries and sends nothing else.
     #[must_use]
     pub const fn new() -> Self {
         Self { heartbeat: None }
     }
 
-    /// Sends a Report Heartbeat Pulse to `to` again and again, beginning with the
-    /// first [`Stack::start`](super::Stack::start). An interval below
+    /// Sends a Report Heartbeat Pulse to `to` periodically, from the first
+    /// [`Stack::start`](super::Stack::start). An interval below
     /// [`SHORTEST_INTERVAL`](Self::SHORTEST_INTERVAL) is raised to it.
     #[must_use]
     pub fn with_heartbeat(to: JausId, every: Duration) -> Self {

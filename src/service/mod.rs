@@ -1,23 +1,24 @@
 //! Services as state machines that do no I/O and read no clock.
 //!
-//! A component is a [`Stack`] of services. The stack is fed with what arrives and with the time;
-//! it says what to send, what the application should know, and when to wake it. So the same code
-//! runs on a node, in a simulation of a hundred nodes, and in a test of one message.
+//! A component is a [`Stack`] of services. Its driver passes in received messages and the current
+//! time. The stack returns outgoing messages, events for the application and the time of the next
+//! wake-up. So the same code runs on a node, in a simulation of a hundred nodes, and in a test of
+//! one message.
 //!
 //! | service | what it does here |
 //! |---|---|
-//! | [`Transport`] | is listed; the endpoint does its work |
-//! | [`Liveness`] | answers Query Heartbeat Pulse, sends a heartbeat if asked to |
-//! | [`Time`] | tells the time, and lets the client in control set it |
-//! | [`ListManager`] | keeps a list of elements that drivers work off |
-//! | [`Discovery`] | says who we are, finds out who the others are, keeps the [`Directory`] |
-//! | Events ([`EventSettings`]) | sends the answer to any query of the component, at a rate or on every change |
-//! | [`AccessControl`], [`Management`] | say who may command, and stop everything in an emergency |
-//! | [`Handlers`] | whatever an application offers, one function per message |
+//! | [`Transport`] | is only listed; the endpoint does its work |
+//! | [`Liveness`] | answers Query Heartbeat Pulse, and sends a heartbeat if configured |
+//! | [`Time`] | reports the time; the client in control may set it |
+//! | [`ListManager`] | keeps a list of elements for drivers to execute |
+//! | [`Discovery`] | announces this component, finds other components, keeps the [`Directory`] |
+//! | Events ([`EventSettings`]) | sends the report of any query of the component, periodically or on every change |
+//! | [`AccessControl`], [`Management`] | decide which client may command, and stop everything in an emergency |
+//! | [`Handlers`] | the application's own messages, one function per message |
 //!
-//! Beside its services a stack is a client of others: it [asks](Stack::ask),
-//! [subscribes](Stack::subscribe) and [takes control](Stack::request_control), and keeps what it has
-//! been given until it is not wanted any more.
+//! A stack is also a client of other components: it [queries](Stack::ask),
+//! [subscribes](Stack::subscribe) and [takes control](Stack::request_control). It keeps
+//! subscriptions and control until the application cancels them.
 
 mod calendar;
 mod client;
@@ -79,11 +80,11 @@ pub use transport::Transport;
 
 /// One service of a component.
 pub trait Service: Send {
-    /// What the component says that it offers, the newest version first.
+    /// The services that the component advertises, newest version first.
     fn offers(&self) -> Vec<ServiceId>;
 
-    /// A message for this component has arrived. The first service that says
-    /// [`Handled::Yes`] gets it; the others do not see it.
+    /// Handles a message to this component. The first service that returns [`Handled::Yes`]
+    /// consumes the message; later services do not see it.
     fn handle_message(
         &mut self,
         now: Instant,
@@ -91,27 +92,26 @@ pub trait Service: Send {
         context: &mut Context<'_>,
     ) -> Handled;
 
-    /// The time of [`poll_timeout`](Self::poll_timeout) has come.
+    /// Called when the time of [`poll_timeout`](Self::poll_timeout) has come.
     fn handle_timeout(&mut self, now: Instant, context: &mut Context<'_>) {
         let _ = (now, context);
     }
 
-    /// The one stop: whatever this service moves must stand still, and must not move again without
-    /// a new command. Called when control or readiness is lost, in an emergency, on a fault, and
-    /// when the component ends or panics; also when nothing moves.
+    /// The one stop: everything that this service moves must stand still, and must not move again
+    /// without a new command. Called when control or readiness is lost, in an emergency, on a
+    /// fault, and when the component ends or panics. It is also called when nothing moves.
     fn handle_stop(&mut self, cause: &StopCause, context: &mut Context<'_>) {
         let _ = (cause, context);
     }
 
-    /// The component's [`Standing`] was `before` until now, and is the context's from now on:
-    /// control was taken or lost, or the state changed. What had to stop has
-    /// [stopped](Self::handle_stop).
+    /// Called after the component's [`Standing`] has changed from `before` to that of the context:
+    /// control was taken or lost, or the state changed. If the change requires a stop,
+    /// [`handle_stop`](Self::handle_stop) was called first.
     fn handle_standing(&mut self, now: Instant, before: &Standing, context: &mut Context<'_>) {
         let _ = (now, before, context);
     }
 
-    /// The client on whose life a motion depends now: it is asked for signs of life four times a
-    /// second.
+    /// The client whose liveness the current motion depends on. It is probed four times a second.
     fn depends_on(&self) -> Option<JausId> {
         None
     }
@@ -121,30 +121,31 @@ pub trait Service: Send {
         false
     }
 
-    /// Which commands this service takes, and how it stops: what it needs beside it to be safe.
+    /// The commands of this service and whether it can stop, for the check that it is safe to
+    /// offer.
     fn hazards(&self) -> Hazards {
         Hazards::default()
     }
 
-    /// Whether this service tells the end of the commands with this code, with [`Context::ended`]:
-    /// clients may have them carried out as command events (AS5710 1.1).
+    /// Whether this service reports the end of commands with this code, with [`Context::ended`]. If
+    /// so, clients may run them as command events (AS5710 1.1).
     fn tells_end_of(&self, command: u16) -> bool {
         let _ = command;
         false
     }
 
-    /// When this service wants to be woken.
+    /// When this service must be woken.
     fn poll_timeout(&self) -> Option<Instant> {
         None
     }
 }
 
-/// Whether a message was a service's business.
+/// Whether a service consumed a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Handled {
-    /// It was, be it well-formed or not.
+    /// Consumed, whether well-formed or not.
     Yes,
-    /// It was not.
+    /// Not a message of this service.
     No,
 }
 
@@ -154,8 +155,8 @@ pub fn code_of(payload: &[u8]) -> Option<u16> {
     payload.first_chunk().map(|&code| u16::from_le_bytes(code))
 }
 
-/// Decodes a message that has the right code, and traces what cannot be read: a peer's mistake is
-/// no error of ours.
+/// Decodes a message whose code is already known. A message that does not decode is a peer's
+/// mistake, not an error: it is traced.
 #[must_use]
 pub fn read<M: crate::codec::Message>(received: &Received) -> Option<M> {
     M::decode(&received.payload)

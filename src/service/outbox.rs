@@ -1,4 +1,4 @@
-//! What services want to say, until somebody sends it.
+//! The outgoing messages of one component, queued until its driver sends them.
 
 use std::collections::VecDeque;
 
@@ -9,7 +9,7 @@ use crate::codec::Message;
 use crate::endpoint::{Outgoing, Received};
 use crate::wire::{Broadcast, Priority};
 
-/// Messages of one component on their way out.
+/// Outgoing messages of one component.
 #[derive(Debug)]
 pub struct Outbox {
     source: JausId,
@@ -26,7 +26,7 @@ impl Outbox {
         }
     }
 
-    /// The component whose messages these are.
+    /// The component that sends these messages.
     #[must_use]
     pub const fn source(&self) -> JausId {
         self.source
@@ -43,7 +43,8 @@ impl Outbox {
         );
     }
 
-    /// Sends a message to one component with a priority, until its node acknowledges it.
+    /// Sends a message with a priority to one component, with retransmission until its node
+    /// acknowledges.
     pub fn send_acknowledged<M: Message>(
         &mut self,
         destination: JausId,
@@ -53,13 +54,13 @@ impl Outbox {
         self.push(destination, Broadcast::None, priority, true, message);
     }
 
-    /// Answers a message: to its sender alone, however many it went to, with its priority.
+    /// Replies to the sender of a message alone, even to a broadcast, with the message's priority.
     pub fn reply<M: Message>(&mut self, to: &Received, message: &M) {
         self.push(to.source, Broadcast::None, to.priority, false, message);
     }
 
-    /// The same, until the receiver has acknowledged it: for answers of many datagrams, of which one
-    /// that is lost would cost all.
+    /// Like [`reply`](Self::reply), with retransmission until the receiver acknowledges. For
+    /// replies of many datagrams: the loss of one datagram would lose the whole reply.
     pub fn reply_until_acknowledged<M: Message>(&mut self, to: &Received, message: &M) {
         self.push(to.source, Broadcast::None, to.priority, true, message);
     }
@@ -120,7 +121,7 @@ impl Outbox {
                 acknowledge,
                 payload,
             }),
-            // A service built a message with more elements than its count can say.
+            // A service built a message with more elements than its count field can hold.
             Err(error) => tracing::error!(%destination, %error, "message cannot be sent"),
         }
     }

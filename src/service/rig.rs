@@ -1,4 +1,4 @@
-//! For tests: services without a stack, whose standing and time are set by hand.
+//! A test rig for services without a stack: the test sets their standing and the time.
 #![allow(
     clippy::missing_panics_doc,
     clippy::unwrap_used,
@@ -16,14 +16,14 @@ use crate::codec::Message;
 use crate::endpoint::Received;
 use crate::wire::{Broadcast, Priority};
 
-/// The client that is in control from the beginning.
+/// The client that is in control from the start.
 pub const CLIENT: JausId = JausId::new(42, 1, 1);
-/// Somebody else.
+/// Another client.
 pub const STRANGER: JausId = JausId::new(42, 2, 1);
 
-/// Services, and what a stack would know.
+/// Services, and the state that a stack would hold for them.
 pub struct Rig {
-    /// The services, in the order in which they are offered messages.
+    /// The services, in the order in which they get messages.
     pub services: Vec<Box<dyn Service>>,
     /// The virtual time.
     pub now: Instant,
@@ -56,7 +56,7 @@ impl Rig {
         rig
     }
 
-    /// Brings the component into another state, or under the control of another client.
+    /// Puts the component into another state, or under the control of another client.
     pub fn stand(&mut self, state: State, controller: Option<JausId>) {
         let controller = controller.map(|id| Controller { id, authority: 127 });
         let before = std::mem::replace(
@@ -77,7 +77,7 @@ impl Rig {
         }
     }
 
-    /// Hands a message to the first service that wants it; says whether one did.
+    /// Passes a message to the first service that handles it; returns whether one did.
     pub fn send<M: Message>(&mut self, source: JausId, message: &M) -> bool {
         let received = Received {
             source,
@@ -113,7 +113,7 @@ impl Rig {
             .and_then(|sent| super::code_of(&sent.payload))
     }
 
-    /// Lets time pass, and wakes the services when they want it.
+    /// Advances the time, and wakes the services when they are due.
     pub fn run(&mut self, duration: Duration) {
         let end = self.now + duration;
         while let Some(wake) = self.poll_timeout().filter(|&wake| wake <= end) {
@@ -124,18 +124,18 @@ impl Rig {
         self.wake();
     }
 
-    /// The codes of queries whose answers the services have said to have changed.
+    /// The codes of queries whose answers have changed, as reported by the services.
     pub fn changed(&mut self) -> &mut BTreeSet<u16> {
         &mut self.news.changed
     }
 
-    /// The codes of commands that have come to an end, and whether to the wanted one.
+    /// The codes of commands that have ended, and whether successfully.
     #[must_use]
     pub fn ended(&self) -> &[(u16, bool)] {
         &self.news.ended
     }
 
-    /// When the services want to be woken next.
+    /// When the services must be woken next.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
         let services = self.services.iter();

@@ -1,27 +1,28 @@
-//! What a service must have beside it before a component may offer it.
+//! Checks whether a component may offer a service.
 //!
-//! A service that moves something needs Management, so that it acts only for a client in control of
-//! a ready component, and a stop action. One that lets clients set it up needs Access Control.
+//! A service that moves something needs a stop action, and Management, so that it acts only for the
+//! client in control of a ready component. A service that clients can configure needs Access
+//! Control.
 
 use super::{Service, Standing};
 use crate::codec::ServiceId;
 
-/// The commands that a service takes.
+/// The guarded commands of a service.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Hazards {
-    /// A command that makes something act, such as Set Wrench Effort.
+    /// A command that moves something, such as Set Wrench Effort.
     pub acts_on: Option<&'static str>,
-    /// A command that sets something up, such as Set Local Pose.
+    /// A command that configures something, such as Set Local Pose.
     pub set_up_by: Option<&'static str>,
-    /// Whether [`Service::handle_stop`] stops what the commands move.
+    /// Whether [`Service::handle_stop`] stops everything that the commands move.
     pub stops: bool,
 }
 
-/// Why a service cannot be offered by a component.
+/// Why a component cannot offer a service.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnsafeService {
-    /// It moves something, and the component has no states in which it must not.
+    /// It moves something, and the component has no states that forbid motion.
     #[error(
         "{service} acts on {command}, and the component has no Management, without which it would \
          obey anyone and could not be stopped: add `.management(Management::new())` to its builder"
@@ -43,7 +44,7 @@ pub enum UnsafeService {
         /// The command.
         command: &'static str,
     },
-    /// Anyone could set it up.
+    /// Anyone could configure it.
     #[error(
         "{service} is set up by {command}, and the component has no Access Control, without which \
          it would obey anyone: add `.access_control(AccessControl::new())` or \
@@ -57,7 +58,8 @@ pub enum UnsafeService {
     },
 }
 
-/// Whether a component with or without Management and in this standing may offer a service.
+/// Checks whether a component with or without Management, and with this standing, may offer a
+/// service.
 pub(super) fn check(
     service: &dyn Service,
     managed: bool,
@@ -93,7 +95,7 @@ mod tests {
 
     const SERVICE: ServiceId = list_manager::LATEST;
 
-    /// Why a component with these settings cannot offer these handlers.
+    /// The error for a component with these settings and these handlers.
     fn refused(
         handlers: Handlers,
         settings: impl FnOnce(Stack) -> Stack,

@@ -1,24 +1,24 @@
-//! Fair shares of a bounded table among the network addresses that its entries come from, so that one
-//! host cannot fill it.
+//! Fair shares of a bounded table among the network addresses of its entries, so that one host
+//! cannot fill it.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 
 use crate::endpoint::{LinkId, Received, Remote, quota_address};
 
-/// Where an entry comes from.
+/// The origin of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Share {
     /// A component of the same node.
     Here,
-    /// A network address, or a network that one host may have all of.
+    /// A network address, or a network that one host may own entirely.
     Address(IpAddr),
     /// A serial line.
     Line(LinkId),
 }
 
 impl Share {
-    /// Where a message came from.
+    /// The origin of a message.
     pub(super) fn of(received: &Received) -> Self {
         let Some(path) = received.path else {
             return Self::Here;
@@ -30,10 +30,10 @@ impl Share {
     }
 }
 
-/// What each share has taken of a bounded table.
+/// How much of a bounded table each share has taken.
 ///
-/// All together may take twice `most`. The first half goes to whoever comes; of the second nobody gets more
-/// than an eighth of what is free, so that a newcomer finds room.
+/// The table holds twice `most` entries. The first half is first come, first served. Of the second
+/// half a share gets at most an eighth of the free entries, so that a newcomer finds room.
 #[derive(Debug)]
 pub(super) struct Shares {
     most: usize,
@@ -50,7 +50,7 @@ impl Shares {
         }
     }
 
-    /// Whether a share may have so much more.
+    /// Whether a share may take `more` entries.
     pub(super) fn has_room(&self, share: Share, more: usize) -> bool {
         if self.total.saturating_add(more) <= self.most {
             return true;

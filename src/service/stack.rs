@@ -1,4 +1,4 @@
-//! All services of one component, as one machine without I/O.
+//! The stack: all services of one component as a single state machine without I/O.
 
 mod safeguard;
 
@@ -27,20 +27,20 @@ use crate::endpoint::{Outgoing, Received};
 use crate::messages::core::{QueryAuthority, QueryControl, QueryStatus};
 use crate::wire::{Broadcast, Priority};
 
-/// A component without a network: its services, its view of the others, and its open questions.
+/// A component without a network: its services, its directory, and its pending queries.
 pub struct Stack {
     discovery: Discovery,
     services: Vec<Box<dyn Service>>,
     subscribers: Events,
     control: Control,
-    /// What the services know of the control.
+    /// The standing that the services see.
     standing: Standing,
-    /// Whether the clients that matter are alive.
+    /// Liveness of the clients that matter.
     life: Life,
-    /// The client in control whose death would go unnoticed, once that is logged.
+    /// The client in control whose death would go undetected, once a warning about it was logged.
     mute: Option<JausId>,
     faults: Faults,
-    /// When it was called last.
+    /// When it was last called.
     called: Option<Instant>,
     news: News,
     inquiries: Inquiries,
@@ -50,25 +50,25 @@ pub struct Stack {
     events: VecDeque<Event>,
 }
 
-/// What a component should know.
+/// A notification for the application.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
-    /// Somebody came, changed or went.
+    /// A component was found, has changed, or was lost.
     Change(Change),
-    /// A question has been answered, or nobody will.
+    /// A query was answered, or has timed out.
     Answer(Inquiry, Result<Bytes, NoAnswer>),
-    /// Something has become of a subscription.
+    /// News of a subscription.
     Subscription(SubscriptionId, SubscriptionNews),
-    /// Something has become of the control over a peer.
+    /// News of the control over a peer.
     Control(ControlId, ControlNews),
-    /// The component's own state, or who controls it, is another now.
+    /// The component's own state or its controller has changed.
     Standing(Standing),
-    /// A message that no service wanted.
+    /// A message that no service consumed.
     Message(Received),
 }
 
 impl Stack {
-    /// A component with its discovery and what else it offers.
+    /// A component with its discovery and its other services.
     #[must_use]
     pub fn new(discovery: Discovery, services: Vec<Box<dyn Service>>) -> Self {
         let out = Outbox::new(discovery.id());
@@ -92,14 +92,14 @@ impl Stack {
         stack.with_control(Control::default())
     }
 
-    /// What clients may subscribe to at most.
+    /// Sets the limits of events for clients.
     #[must_use]
     pub fn event_settings(mut self, settings: EventSettings) -> Self {
         self.subscribers = Events::new(settings);
         self
     }
 
-    /// Offers Access Control: commands come from the client in control alone.
+    /// Offers Access Control: only the client in control may command.
     #[must_use]
     pub fn access_control(self, settings: AccessControl) -> Self {
         self.with_control(Control::with_access_control(settings))
@@ -112,7 +112,7 @@ impl Stack {
         self.with_control(Control::with_management(settings))
     }
 
-    /// A stack that has not begun to live, with this control.
+    /// The stack with this control. Only for a stack that has not started.
     fn with_control(mut self, control: Control) -> Self {
         self.standing = *control.standing();
         self.control = control;
@@ -126,26 +126,25 @@ impl Stack {
         self.out.source()
     }
 
-    /// Everybody who is known.
+    /// The directory of known components.
     #[must_use]
     pub fn directory(&self) -> Arc<Directory> {
         self.discovery.directory()
     }
 
-    /// How many events run for clients.
+    /// The number of events that run for clients.
     #[must_use]
     pub fn event_count(&self) -> usize {
         self.subscribers.len()
     }
 
-    /// What clients are subscribed to at present: the query, and its rate in hertz; no rate for what
-    /// is told on every change.
+    /// The current subscriptions of clients: the query and the rate in hertz, or no rate for
+    /// reports on change.
     pub fn subscribed(&self) -> impl Iterator<Item = (&Bytes, Option<f64>)> {
         self.subscribers.wanted()
     }
 
-    /// A client is gone, as somebody else has found out: what it subscribed to ends, and so does its
-    /// control.
+    /// Ends the subscriptions and the control of a client that another layer has found to be gone.
     pub fn forget(&mut self, now: Instant, client: JausId) {
         self.control.forget(client, &mut self.out);
         self.subscribers.forget(client);
@@ -158,25 +157,25 @@ impl Stack {
         &self.standing
     }
 
-    /// The application tells that the answer to the query with this code is another now.
+    /// Reports, for the application, that the answer to the query with this code has changed.
     pub fn announce(&mut self, now: Instant, query: u16) {
         self.news.changed.insert(query);
         self.collect(now);
     }
 
-    /// The application tells that the command with this code has ended, and whether it has done what
-    /// it was to do.
+    /// Reports, for the application, that the command with this code has ended, and whether
+    /// successfully.
     pub fn end_command(&mut self, now: Instant, command: u16, successful: bool) {
         self.news.ended.push((command, successful));
         self.collect(now);
     }
 
-    /// Begins to live: the services get their first wake-up.
+    /// Starts the component: the services get their first wake-up.
     pub fn start(&mut self, now: Instant) {
         self.wake(now);
     }
 
-    /// A message for this component has arrived.
+    /// Handles a message to this component.
     pub fn handle_message(&mut self, now: Instant, message: &Received) {
         self.end_overdue(now);
         self.life
@@ -220,13 +219,13 @@ impl Stack {
         handled
     }
 
-    /// The node of a peer has acknowledged a message that wanted it.
+    /// Handles the acknowledgement of a message by the peer's node.
     pub fn handle_acknowledged(&mut self, now: Instant, peer: JausId) {
         self.life.acknowledged(now, peer);
     }
 
-    /// Hands a message to the services. A command takes the place of the one with the same code
-    /// whose end somebody waits for.
+    /// Passes a message to the services. A command ends, as unsuccessful, the command event with
+    /// the same code that a client is waiting for.
     fn handle_message_for_services(&mut self, now: Instant, message: &Received) -> Handled {
         if let Some(code) = code_of(&message.payload)
             && self.standing.acts_for(message.source)
@@ -264,7 +263,7 @@ impl Stack {
         Handled::Yes
     }
 
-    /// Carries out a command whose end a client wants to be told of.
+    /// Runs a command for a client that requests a command event, unless it must be refused.
     fn carry_out(&mut self, now: Instant, trial: &CommandTrial) {
         let code = trial.code;
         let told = self.services.iter().any(|it| it.tells_end_of(code));
@@ -281,7 +280,7 @@ impl Stack {
         }
     }
 
-    /// What the component would answer to a client's query, if anything.
+    /// The component's answer to a client's query, if any.
     fn answer(&mut self, now: Instant, client: JausId, query: &Bytes) -> Option<Bytes> {
         let id = self.id();
         let message = Received {
@@ -293,7 +292,7 @@ impl Stack {
             payload: query.clone(),
             path: None,
         };
-        // What is said meanwhile is the answer and goes nowhere; a query changes nothing.
+        // Messages sent meanwhile are the answer and are not transmitted. A query changes nothing.
         let out = std::mem::replace(&mut self.out, Outbox::new(id));
         let news = std::mem::take(&mut self.news);
         let discovered = self.discovery.handle_quoted(now, &message, &mut self.out);
@@ -322,28 +321,30 @@ impl Stack {
         }
     }
 
-    /// The time of [`poll_timeout`](Self::poll_timeout) has come; earlier does no harm.
+    /// Call this when the time of [`poll_timeout`](Self::poll_timeout) has come. Earlier calls are
+    /// harmless.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.wake(now);
     }
 
-    /// Another component of the node has changed the [directory](super::NodeDirectory) that they share.
+    /// Handles changes that another component of the node has made to the shared
+    /// [directory](super::NodeDirectory).
     pub fn handle_directory(&mut self, now: Instant) {
         self.collect(now);
     }
 
-    /// Sends a message, and forgets it.
+    /// Sends a message without waiting for an answer.
     pub fn send<M: Message>(&mut self, destination: JausId, message: &M) {
         self.out.send(destination, message);
     }
 
-    /// Sends octets that begin with a message code, and forgets them.
+    /// Sends octets that begin with a message code, without waiting for an answer.
     pub fn send_octets(&mut self, destination: JausId, payload: Bytes) {
         self.out.send_octets(destination, payload);
     }
 
-    /// Asks a peer and waits for the first message with the code `report` from it. A peer with
-    /// wildcards stands for whoever answers first.
+    /// Sends a query to a peer and waits for its first message with the code `report`. If the peer
+    /// id has wildcards, the first answer of any matching component counts.
     pub fn ask(
         &mut self,
         now: Instant,
@@ -356,16 +357,16 @@ impl Stack {
             .ask(now, peer, query, report, patience, &mut self.out)
     }
 
-    /// Gives a question up.
+    /// Cancels a query.
     pub fn cancel(&mut self, now: Instant, inquiry: Inquiry) {
         self.inquiries.cancel(now, inquiry, &mut self.out);
     }
 
-    /// Subscribes to a peer's reports. [`Event::Subscription`] tells what becomes of it, first of
-    /// all whether the peer confirms; `patience` is for that.
+    /// Subscribes to a peer's reports. [`Event::Subscription`] brings the news of it, beginning
+    /// with the peer's confirmation; `patience` limits the wait for that.
     ///
     /// # Errors
-    /// If there is nothing that could be asked for.
+    /// If no valid request can be made of `topic`.
     pub fn subscribe(
         &mut self,
         now: Instant,
@@ -382,11 +383,11 @@ impl Stack {
             .unsubscribe(now, subscription, &mut self.out);
     }
 
-    /// Asks for control of a peer and keeps it. [`Event::Control`] tells whether it was granted,
-    /// and when it is lost.
+    /// Requests control of a peer and keeps renewing it. [`Event::Control`] reports whether it was
+    /// granted, and when it is lost.
     ///
     /// # Errors
-    /// If it cannot even be asked for.
+    /// If it cannot even be requested.
     pub fn request_control(
         &mut self,
         now: Instant,
@@ -398,14 +399,14 @@ impl Stack {
             .request(now, peer, authority, patience, &mut self.out)
     }
 
-    /// Gives control back, or what was asked for up.
+    /// Releases control, or cancels a request for it.
     pub fn release_control(&mut self, now: Instant, control: ControlId) {
         self.controls.release(now, control, &mut self.out);
     }
 
-    /// Ends all subscriptions and gives back all control.
+    /// Ends all subscriptions and releases all control.
     ///
-    /// Whatever the services move stops, and no command is obeyed any more.
+    /// Everything that the services move stops, and the component obeys no more commands.
     pub fn take_leave(&mut self, now: Instant) {
         self.stop(&StopCause::Ended);
         self.control.end(&mut self.out);
@@ -414,16 +415,16 @@ impl Stack {
         self.controls.farewell(now, &mut self.out);
     }
 
-    /// Whether control is being given back, and a peer has not confirmed that.
+    /// Whether a release of control still waits for its peer's confirmation.
     #[must_use]
     pub fn is_releasing(&self) -> bool {
         self.controls.is_releasing()
     }
 
-    /// Adds a service while the component runs, and tells the peers.
+    /// Adds a service while the component runs, and notifies the peers.
     ///
     /// # Errors
-    /// As [`check`](Self::check).
+    /// As for [`check`](Self::check).
     pub fn offer(&mut self, now: Instant, service: Box<dyn Service>) -> Result<(), UnsafeService> {
         self.check_service(service.as_ref())?;
         self.services.push(service);
@@ -432,8 +433,8 @@ impl Stack {
         Ok(())
     }
 
-    /// Takes a service back, whatever its version, stops what it moves, and tells the peers. Says
-    /// whether it was there.
+    /// Withdraws a service in every version, stops what it moves, and notifies the peers. Returns
+    /// whether it was offered.
     pub fn withdraw(&mut self, now: Instant, urn: &str) -> bool {
         let is_meant = |service: &mut Box<dyn Service>| {
             let offers = service.offers();
@@ -467,7 +468,7 @@ impl Stack {
         self.out.pop()
     }
 
-    /// The next thing to know.
+    /// The next notification for the application.
     pub fn poll_event(&mut self) -> Option<Event> {
         self.events.pop_front()
     }
@@ -519,7 +520,7 @@ impl Stack {
         }
         self.follow_faults();
         self.follow_control(now);
-        // A stop may itself find something broken.
+        // A stop may itself report a fault.
         self.follow_faults();
         self.follow_control(now);
         self.watch_clients(now);
@@ -536,7 +537,7 @@ impl Stack {
         }
     }
 
-    /// Tells the services what the control has decided.
+    /// Passes the decisions of control on to the services.
     fn follow_control(&mut self, now: Instant) {
         let after = *self.control.standing();
         let before = std::mem::replace(&mut self.standing, after);
@@ -562,7 +563,7 @@ impl Stack {
         self.events.push_back(Event::Standing(after));
     }
 
-    /// Sends what clients have subscribed to and is due, or has changed.
+    /// Sends the reports of clients' subscriptions that are due or have changed.
     fn tell_subscribers(&mut self, now: Instant) {
         let ended = std::mem::take(&mut self.news.ended);
         let changed = std::mem::take(&mut self.news.changed);

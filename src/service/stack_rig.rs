@@ -1,5 +1,5 @@
-//! For tests: a whole component without a network, its clients, and the clock that it lives by. The
-//! clients answer Query Heartbeat Pulse by themselves, unless they are dead.
+//! A test rig for a whole component without a network: its clients and its clock. The clients
+//! answer Query Heartbeat Pulse automatically, unless they are dead.
 
 use std::time::{Duration, Instant};
 
@@ -15,18 +15,18 @@ use crate::wire::{Broadcast, Priority};
 /// The component.
 pub(crate) const US: JausId = JausId::new(105, 1, 1);
 
-/// What somebody was told.
+/// A message and its receiver.
 pub(crate) type Told = (JausId, Bytes);
 
 pub(crate) struct StackRig {
     pub(crate) stack: Stack,
     pub(crate) now: Instant,
-    /// Clients that answer no more.
+    /// Clients that no longer answer.
     pub(crate) dead: Vec<JausId>,
 }
 
 impl StackRig {
-    /// A component that looks for nobody, with these services and settings.
+    /// A component without search, with these services and settings.
     #[expect(
         clippy::disallowed_methods,
         reason = "any moment will do as the beginning of virtual time"
@@ -44,12 +44,12 @@ impl StackRig {
         }
     }
 
-    /// A client sends something; what it and others are told.
+    /// Handles a client's message; returns the messages to it and to others.
     pub(crate) fn hear<M: Message>(&mut self, source: JausId, message: &M) -> Vec<Told> {
         self.hear_on(None, source, message)
     }
 
-    /// The same through the network.
+    /// The same with a message from the network.
     pub(crate) fn hear_on<M: Message>(
         &mut self,
         path: Option<Path>,
@@ -69,7 +69,7 @@ impl StackRig {
         self.said()
     }
 
-    /// What has been said since this was asked last, but for the probes.
+    /// The messages sent since the last call, without the probes.
     pub(crate) fn said(&mut self) -> Vec<Told> {
         let mut said = Vec::new();
         while let Some(message) = self.stack.poll_transmit() {
@@ -83,14 +83,14 @@ impl StackRig {
         said
     }
 
-    /// Lets time pass, and wakes the component once.
+    /// Advances the time, and wakes the component once.
     pub(crate) fn pass(&mut self, time: Duration) -> Vec<Told> {
         self.now += time;
         self.stack.handle_timeout(self.now);
         self.said()
     }
 
-    /// Lets time pass from wake-up to wake-up; what was said, and when.
+    /// Advances the time from wake-up to wake-up; returns the messages and their times.
     pub(crate) fn run(&mut self, time: Duration) -> Vec<(Duration, JausId, Bytes)> {
         let (start, end) = (self.now, self.now + time);
         let mut said = Vec::new();

@@ -1,4 +1,4 @@
-//! What a component is fit for now, and who may command it.
+//! A component's standing: its state, and the client that may command it.
 
 use std::fmt;
 
@@ -8,19 +8,19 @@ use crate::address::JausId;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[repr(u8)]
 pub enum State {
-    /// Getting ready; cannot be controlled yet.
+    /// Starting; cannot be controlled yet.
     Initialize = 0,
     /// Acts on the commands of the client in control.
     #[default]
     Ready = 1,
-    /// Can be controlled, and does not act.
+    /// Can be controlled, but does not act.
     Standby = 2,
-    /// Going away.
+    /// Shutting down.
     Shutdown = 3,
-    /// Something is broken; it ends when that is mended, which the application says
+    /// Something is broken. Ends when the application reports the repair
     /// ([`Condition::Initialized`](super::Condition::Initialized)).
     Failure = 4,
-    /// Stopped by a client's emergency, until each client that set one has cleared it.
+    /// Stopped by a client's emergency, until every client that set one has cleared it.
     Emergency = 5,
 }
 
@@ -37,31 +37,31 @@ impl fmt::Display for State {
     }
 }
 
-/// Who controls a component.
+/// The client in control of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Controller {
     /// The client.
     pub id: JausId,
-    /// Its authority code, 0 to 255; the greater one wins.
+    /// Its authority code, 0 to 255; the higher one wins.
     pub authority: u8,
 }
 
-/// The state of a component and its controller: what every service that takes commands must know.
+/// The state of a component and its controller, for every service that takes commands.
 ///
 /// A component without Management is always [`State::Ready`]; one without Access Control obeys
 /// anyone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Standing {
-    /// What the component is fit for.
+    /// The state of the component.
     pub state: State,
-    /// Whether commands need control at all: whether the component offers Access Control.
+    /// Whether commands need control, that is, whether the component offers Access Control.
     pub exclusive: bool,
     /// The client in control, if any.
     pub controller: Option<Controller>,
 }
 
 impl Standing {
-    /// Whether `client` may configure the component: it is in control, or nobody need be.
+    /// Whether `client` may configure the component: it is in control, or control is not needed.
     #[must_use]
     pub fn obeys(&self, client: JausId) -> bool {
         match self.controller {
@@ -70,22 +70,23 @@ impl Standing {
         }
     }
 
-    /// Whether `client` may make the component act: it [may command](Self::obeys), and the component
-    /// is ready.
+    /// Whether `client` may make the component act: the component [obeys](Self::obeys) it and is
+    /// ready.
     #[must_use]
     pub fn acts_for(&self, client: JausId) -> bool {
         self.state == State::Ready && self.obeys(client)
     }
 
-    /// Whether what a client has set in motion must stop now, this having been `before`: the
-    /// component may no longer act, or another client has taken control.
+    /// Whether a change from `before` to this standing must stop motion: the component may no
+    /// longer act, or another client is in control.
     #[must_use]
     pub fn stops(&self, before: &Self) -> bool {
         let client = |standing: &Self| standing.controller.map(|controller| controller.id);
         !self.may_act() || client(self) != client(before)
     }
 
-    /// Whether the component may act at all: it is ready, and somebody is there to answer for it.
+    /// Whether the component may act at all: it is ready, and a client is in control unless control
+    /// is not needed.
     #[must_use]
     pub const fn may_act(&self) -> bool {
         matches!(self.state, State::Ready) && (self.controller.is_some() || !self.exclusive)

@@ -1,15 +1,16 @@
-//! The Time service: tells a component's time, and lets the client in control set it.
+//! The Time service: reports a component's time, and lets the client in control set it.
 //!
-//! The time is that of a clock which the application gives, moved by what Set Time asked for: the
-//! host's own clock is not touched, because other programs go by it too.
+//! The time is that of a clock from the application plus the correction from Set Time. The host's
+//! own clock is never set, because other programs depend on it.
 //!
-//! # What Set Time may leave out
+//! # Partial Set Time messages
 //!
-//! * Without a date stamp, the time stamp's day of the month is the nearest such day: a time just
-//!   after midnight, told to a clock just before, is tomorrow's, also on the last of a month.
-//! * Without a time stamp, the time of day stays.
-//! * A day of the month that contradicts the date stamp, or is no day at all (some peers leave it
-//!   0), counts for nothing. Any other field out of its range makes the message void.
+//! * Without a date stamp, the date is the nearest one with the time stamp's day of the month. A
+//!   time just after midnight, received just before midnight, means tomorrow, even at the end of a
+//!   month.
+//! * Without a time stamp, the time of day does not change.
+//! * A day of the month that contradicts the date stamp, or is no valid day (some peers leave it
+//!   0), is ignored. Any other field out of range invalidates the message.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -24,20 +25,19 @@ use crate::messages::core::{self, QueryTime, ReportTime, SetTime};
 
 const DAY: i64 = 86_400_000;
 
-/// The time of day of a component: a clock, and the correction that Set Time asked for. Cheap to
-/// clone; the clones are one time, so that a vehicle's reports are stamped with the time that
-/// [`Time`] reports.
+/// A component's time of day: a clock and the correction from Set Time. Cheap to clone. All clones
+/// share one time, so that a vehicle's reports are stamped with the time that [`Time`] reports.
 #[derive(Clone)]
 pub struct TimeOfDay(Arc<Corrected>);
 
 struct Corrected {
     clock: Box<dyn Fn() -> Duration + Send + Sync>,
-    /// By how many milliseconds this time is ahead of the clock.
+    /// How many milliseconds this time is ahead of the clock.
     ahead: AtomicI64,
 }
 
 impl TimeOfDay {
-    /// Goes by `clock`, which returns the time since the beginning of 1970 (UTC).
+    /// Uses `clock`, which returns the time since the beginning of 1970 (UTC).
     #[must_use]
     pub fn new(clock: impl Fn() -> Duration + Send + Sync + 'static) -> Self {
         Self(Arc::new(Corrected {
@@ -46,7 +46,7 @@ impl TimeOfDay {
         }))
     }
 
-    /// The time since the beginning of 1970 (UTC); 0 if it was set to before that.
+    /// The time since the beginning of 1970 (UTC); 0 if it was set to an earlier time.
     #[must_use]
     pub fn now(&self) -> Duration {
         let clock = (self.0.clock)();
@@ -58,7 +58,7 @@ impl TimeOfDay {
         }
     }
 
-    /// By how many milliseconds it is ahead of its clock.
+    /// How many milliseconds it is ahead of its clock.
     #[must_use]
     pub fn ahead(&self) -> i64 {
         self.0.ahead.load(Ordering::Relaxed)
@@ -73,7 +73,7 @@ impl TimeOfDay {
         i64::try_from((self.0.clock)().as_millis()).unwrap_or(i64::MAX)
     }
 
-    /// From now on the time is this, in milliseconds since the beginning of 1970.
+    /// Sets the time to `wanted`, in milliseconds since the beginning of 1970.
     fn set(&self, wanted: i64) {
         let ahead = wanted.saturating_sub(self.by_the_clock());
         self.0.ahead.store(ahead, Ordering::Relaxed);
@@ -88,8 +88,8 @@ impl std::fmt::Debug for TimeOfDay {
     }
 }
 
-/// Answers Query Time (2011h), and obeys Set Time (0011h) of the client in control, in whatever
-/// state the component is.
+/// Answers Query Time (2011h), and obeys Set Time (0011h) from the client in control, in any state
+/// of the component.
 ///
 /// ```
 /// use std::time::{SystemTime, UNIX_EPOCH};
@@ -108,7 +108,7 @@ impl Time {
     const TIME_STAMP: u8 = 1;
     const DATE_STAMP: u8 = 2;
 
-    /// Reports `time`, and sets it for all of its clones.
+    /// Reports `time`, and sets it for all its clones.
     #[must_use]
     pub const fn new(time: TimeOfDay) -> Self {
         Self { time }
@@ -122,7 +122,7 @@ impl Time {
         }
     }
 
-    /// Returns whether there is such a time.
+    /// Returns whether the message gives a valid time.
     fn set(&self, set: &SetTime) -> bool {
         let Some(wanted) = wanted(self.time.milliseconds(), set) else {
             return false;
@@ -174,7 +174,7 @@ impl Service for Time {
     }
 }
 
-/// The time that a message asks for.
+/// The time that a message sets, in milliseconds since the beginning of 1970.
 fn wanted(now: i64, set: &SetTime) -> Option<i64> {
     let of_day = match set.time_stamp {
         Some(stamp) => milliseconds_of_day(stamp)?,
@@ -195,7 +195,7 @@ fn milliseconds_of_day(stamp: TimeStamp) -> Option<i64> {
     real.then_some(((hour * 60 + minutes) * 60 + seconds) * 1000 + milliseconds)
 }
 
-/// Days after the first of January 1970.
+/// Days after 1 January 1970.
 fn day_of(stamp: DateStamp) -> Option<i64> {
     let date = Date {
         year: 2000 + u64::from(stamp.year()),
@@ -206,10 +206,10 @@ fn day_of(stamp: DateStamp) -> Option<i64> {
         .and_then(|days| i64::try_from(days).ok())
 }
 
-/// The day closest to now with this number within its month; today if there is none.
+/// The day closest to now with this day of the month; today if there is none.
 fn nearest_day(now: i64, of_day: i64, number: u8) -> i64 {
     let today = now.div_euclid(DAY);
-    // No number is missing in two months on end, so that it is among these.
+    // One of any two consecutive months has this day, so the range contains it.
     (today - 61..=today + 61)
         .filter(|&day| date_on(day).is_some_and(|date| date.day == u64::from(number)))
         .min_by_key(|&day| (day * DAY + of_day).abs_diff(now))
@@ -234,7 +234,7 @@ fn time_stamp(now: i64) -> Option<TimeStamp> {
     stamp.with_milliseconds(milliseconds).ok()
 }
 
-/// `None` before 2000 and after 2127, which the field cannot say.
+/// `None` before 2000 and after 2127, which the field cannot hold.
 fn date_stamp(now: i64) -> Option<DateStamp> {
     let date = date_on(now.div_euclid(DAY))?;
     let stamp = DateStamp::default();
@@ -256,7 +256,7 @@ mod tests {
     /// 2024-02-28 23:59:58.250.
     const BEFORE_MIDNIGHT: u64 = 1_709_164_798_250;
 
-    /// A component whose clock shows so many milliseconds.
+    /// A component whose clock shows `milliseconds`.
     fn rig(milliseconds: u64) -> (Rig, Arc<AtomicU64>) {
         let clock = Arc::new(AtomicU64::new(milliseconds));
         let read = clock.clone();
@@ -340,7 +340,7 @@ mod tests {
             (at(28, 0, 0), on(24, 2, 28)),
             (at(1, 0, 0), on(24, 3, 1)),
             (at(31, 0, 0), on(24, 1, 31)),
-            // No day at all: today.
+            // Not a valid day: today.
             (at(0, 0, 0), on(24, 2, 28)),
         ] {
             let (mut rig, _) = rig(BEFORE_MIDNIGHT);

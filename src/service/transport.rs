@@ -1,4 +1,4 @@
-//! The Transport service: every component offers it, and the endpoint does its work.
+//! The Transport service: every component lists it; the endpoint does its work.
 
 use std::time::Instant;
 

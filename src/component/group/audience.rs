@@ -1,10 +1,11 @@
-//! Who is meant: a part of the network, the providers of a service, or those within that part.
+//! The audience of a message: a part of the network, the providers of a service, or such providers
+//! within a part.
 
 use crate::address::JausId;
 use crate::codec::ServiceId;
 use crate::service::{self, Directory};
 
-/// Those for whom a message is, by what they are and not by name.
+/// A group of components, selected by position or service instead of by name.
 ///
 /// ```
 /// use jaus::address::JausId;
@@ -19,7 +20,7 @@ use crate::service::{self, Directory};
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Audience {
-    /// An id, mostly with wildcards.
+    /// An id, usually with wildcards.
     scope: JausId,
     service: Option<Wanted>,
 }
@@ -53,7 +54,7 @@ impl Audience {
         Self::scope(JausId::new(subsystem, node, 1).whole_node())
     }
 
-    /// All components anywhere that offer a service, in whatever version.
+    /// All components anywhere that offer a service, in any version.
     #[must_use]
     pub fn providers(urn: impl Into<String>) -> Self {
         Self {
@@ -63,7 +64,7 @@ impl Audience {
     }
 
     /// All components anywhere that offer a service in a version that a client made for `wanted`
-    /// can use: the same major version, and no older minor one.
+    /// can use: the same major version, and at least the same minor one.
     #[must_use]
     pub const fn providers_of(wanted: ServiceId) -> Self {
         Self {
@@ -72,19 +73,19 @@ impl Audience {
         }
     }
 
-    /// Only those of a subsystem.
+    /// Restricts the audience to a subsystem.
     #[must_use]
     pub fn in_subsystem(self, subsystem: u16) -> Self {
         self.within(JausId::new(subsystem, 1, 1).whole_subsystem())
     }
 
-    /// Only those whose ids `scope` stands for, instead of wherever they were looked for before.
+    /// Restricts the audience to ids that match `scope`, in place of any earlier restriction.
     #[must_use]
     pub fn within(self, scope: JausId) -> Self {
         Self { scope, ..self }
     }
 
-    /// Whether a component of the directory belongs to it.
+    /// Whether a component of the directory belongs to the audience.
     #[must_use]
     pub fn includes(&self, component: &service::Component) -> bool {
         let offers = match &self.service {
@@ -95,7 +96,7 @@ impl Audience {
         offers && self.scope.matches(component.id)
     }
 
-    /// The ids of all that belong to it, without `own`, in order.
+    /// The ids of all members except `own`, in order.
     pub(super) fn members(&self, directory: &Directory, own: JausId) -> Vec<JausId> {
         let others = directory.components().filter(|it| it.id != own);
         others
@@ -104,7 +105,7 @@ impl Audience {
             .collect()
     }
 
-    /// The destination that reaches all of them at once, if there is one.
+    /// The destination that reaches all members at once, if there is one.
     pub(super) const fn as_destination(&self) -> Option<JausId> {
         match self.service {
             None => Some(self.scope),
@@ -113,7 +114,7 @@ impl Audience {
     }
 }
 
-/// Everybody for whom the id stands; one component if it has no wildcards.
+/// All components whose ids match; one component if the id has no wildcards.
 impl From<JausId> for Audience {
     fn from(scope: JausId) -> Self {
         Self::scope(scope)
@@ -127,14 +128,14 @@ impl From<&str> for Audience {
     }
 }
 
-/// The providers of the service, in a version that will do.
+/// The providers of the service, in a suitable version.
 impl From<ServiceId> for Audience {
     fn from(wanted: ServiceId) -> Self {
         Self::providers_of(wanted)
     }
 }
 
-/// The same once more, so that one can be kept and used again.
+/// A clone, so that an audience can be reused.
 impl From<&Self> for Audience {
     fn from(audience: &Self) -> Self {
         audience.clone()

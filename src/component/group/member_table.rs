@@ -1,12 +1,12 @@
-//! Whom a group subscription has, wants and waits for: a list that is called again whenever the
-//! directory changes. It does no I/O and is told the time.
+//! The member table of a group subscription: which members to ask, and when. It is updated on each
+//! change of the directory, does no I/O and reads no clock.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use crate::address::JausId;
 
-/// The members of a group, and how it stands with each.
+/// The members of a group, and the state of each subscription.
 #[derive(Debug, Default)]
 pub(super) struct MemberTable {
     members: BTreeMap<JausId, Member>,
@@ -15,7 +15,7 @@ pub(super) struct MemberTable {
 #[derive(Debug)]
 struct Member {
     state: State,
-    /// How often it has refused since it came.
+    /// The number of refusals since it was found.
     refusals: u32,
 }
 
@@ -35,7 +35,7 @@ impl MemberTable {
     /// … which doubles up to this.
     const LONGEST_PAUSE: Duration = Duration::from_secs(32);
 
-    /// Those who are there now, in order. Says who has left.
+    /// Updates the members with the sorted list of those now present. Returns those that have left.
     pub(super) fn handle_present(&mut self, present: &[JausId]) -> Vec<JausId> {
         for &id in present {
             self.members.entry(id).or_insert(Member {
@@ -50,7 +50,7 @@ impl MemberTable {
         left
     }
 
-    /// Who is to be asked for a subscription now, if there is anybody.
+    /// The next member to ask for a subscription, if any.
     pub(super) fn poll_ask(&mut self, now: Instant) -> Option<JausId> {
         let asked = self.members.values().filter(|it| it.state == State::Asked);
         if asked.count() >= Self::MOST_ASKED {
@@ -66,14 +66,15 @@ impl MemberTable {
         Some(id)
     }
 
-    /// A member has confirmed the subscription.
+    /// Notes that a member has confirmed the subscription.
     pub(super) fn handle_subscribed(&mut self, id: JausId) {
         if let Some(member) = self.members.get_mut(&id) {
             member.state = State::Subscribed;
         }
     }
 
-    /// A member would have none, or no longer. Says how long it is left alone.
+    /// Notes that a member has refused or ended the subscription. Returns the pause before the next
+    /// request.
     pub(super) fn handle_refused(&mut self, now: Instant, id: JausId) -> Duration {
         let Some(member) = self.members.get_mut(&id) else {
             return Self::LONGEST_PAUSE;
@@ -85,7 +86,7 @@ impl MemberTable {
         pause
     }
 
-    /// When somebody is to be asked again.
+    /// When the next pause ends.
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         let pauses = self.members.values().filter_map(|it| match it.state {
             State::Pausing { until } => Some(until),

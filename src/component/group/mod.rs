@@ -1,8 +1,8 @@
-//! Groups: a message for many, with what became of it at each of them; and the reports of all who
-//! offer a service, whoever they are at the time.
+//! Groups: a message or query to many components with a result for each, and subscriptions to all
+//! providers of a service, including those found later.
 //!
-//! Nobody joins a group and nobody keeps one: an [`Audience`] says who is meant, and Discovery says
-//! who that is now.
+//! There is no membership protocol: an [`Audience`] describes the members, and Discovery finds
+//! them.
 
 mod audience;
 mod member_table;
@@ -19,26 +19,26 @@ pub use audience::Audience;
 pub use reports::{GroupSubscription, GroupUpdate};
 pub use results::Results;
 
-/// How many members are told or asked at the same time. A node acknowledges with hundreds, but a
-/// slow link should not be given more at once.
+/// How many members are sent to at the same time. A node handles hundreds of acknowledgements, but
+/// a slow link should not get more at once.
 const AT_ONCE: usize = 32;
 
 impl Component {
-    /// Who belongs to an audience now, as far as Discovery has found them, in order of their ids;
-    /// never this component itself.
+    /// The current members of an audience, as far as Discovery has found them, in order of their
+    /// ids. Never includes this component.
     #[must_use]
     pub fn members(&self, audience: impl Into<Audience>) -> Vec<JausId> {
         audience.into().members(&self.directory(), self.id())
     }
 
-    /// Sends a message to all of an audience, and forgets it; says how many members were known.
+    /// Sends a message to an audience without acknowledgement; returns how many members were known.
     ///
-    /// An audience without a service is one message to a destination with wildcards: it also
-    /// reaches members that are not known here yet. The providers of a service get one each.
+    /// For an audience without a service this is one message to a destination with wildcards, which
+    /// also reaches members that are not known here yet. Each provider of a service gets its own
+    /// message.
     ///
     /// # Errors
-    /// If the wire cannot carry it, or the node would not take it for one of them; the others get
-    /// it all the same.
+    /// If the wire cannot carry it, or the node rejects it for one member; the others still get it.
     pub fn send_all<M: Message>(
         &self,
         audience: impl Into<Audience>,
@@ -54,7 +54,7 @@ impl Component {
         match audience.as_destination() {
             Some(destination) => send(destination)?,
             None => {
-                // Everybody gets it, whatever became of it for the one before.
+                // Send to every member, even after an error.
                 let sent: Vec<_> = members.iter().map(|&member| send(member)).collect();
                 sent.into_iter().collect::<Result<(), _>>()?;
             }
@@ -62,11 +62,11 @@ impl Component {
         Ok(members.len())
     }
 
-    /// Sends a message to each member of an audience, again and again if need be, until each has
-    /// acknowledged it or is not known to have it; says which. Dropping the future forgets the
-    /// message, which may still arrive.
+    /// Sends a message to each member of an audience, with retransmission until it is acknowledged
+    /// or times out. Returns the result for each member. Dropping the future cancels the
+    /// retransmission; the message may still arrive.
     ///
-    /// Who comes while it runs is not told.
+    /// Members that are found meanwhile do not get it.
     pub async fn deliver_all<M: Message>(
         &self,
         audience: impl Into<Audience>,
@@ -76,8 +76,7 @@ impl Component {
         results::of_each(members, AT_ONCE, |member| self.deliver(member, message)).await
     }
 
-    /// Asks each member of an audience, and waits until each has answered or has been asked often
-    /// enough.
+    /// Queries each member of an audience, and waits until each has answered or timed out.
     pub async fn query_all<R: Message, Q: Message>(
         &self,
         audience: impl Into<Audience>,
@@ -87,8 +86,8 @@ impl Component {
         results::of_each(members, AT_ONCE, |member| self.query(member, query)).await
     }
 
-    /// Has every member of an audience answer a query again and again, also those that are not
-    /// there yet. A text stands for the providers of the service with that URN:
+    /// Subscribes to a query at every member of an audience, including those that are found later.
+    /// A string means the providers of the service with that URN:
     ///
     /// ```no_run
     /// # use jaus::component::{Component, GroupUpdate, When};
@@ -108,7 +107,7 @@ impl Component {
     /// ```
     ///
     /// # Errors
-    /// If the wire cannot carry the query or the rate. What a single member has against it comes as
+    /// If the wire cannot carry the query or the rate. Refusals of single members arrive as
     /// [`GroupUpdate::NotSubscribed`].
     pub fn subscribe_all<R: Message, Q: Message>(
         &self,

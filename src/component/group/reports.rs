@@ -1,5 +1,5 @@
-//! A subscription to a whole group: it takes in who comes, lets go of who leaves, and asks again
-//! who refuses, and is one stream to its reader.
+//! A subscription to a whole group: it subscribes to members as they are found, drops those that
+//! leave, retries those that refuse, and merges all reports into one stream.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
@@ -19,55 +19,55 @@ use crate::component::driver::sleep_until;
 use crate::component::{Component, SubscribeError, Subscription, Update};
 use crate::service::{Outage, Topic};
 
-/// The reports of all members of an [`Audience`], as they come, whoever they are at the time. Made
-/// by [`Component::subscribe_all`]; dropping it ends the events at all of them.
+/// The merged reports of all current members of an [`Audience`]. Created by
+/// [`Component::subscribe_all`]; dropping it ends the events at all members.
 ///
-/// A member that restarts under the same id is `Down` and `Up` again, as in a single
-/// [`Subscription`]; one that Discovery gives up, or that takes its service back, is `Gone`, and is
-/// subscribed to anew when it comes again. One that refuses is asked again, less and less often.
-/// It works while [`next`](Self::next) is waited for.
+/// A member that restarts under the same id is `Down` and then `Up` again, as in a single
+/// [`Subscription`]. A member that Discovery loses, or that withdraws its service, is `Gone`, and
+/// is subscribed to again when it returns. A member that refuses is asked again, at growing
+/// intervals. All this happens only while [`next`](Self::next) is awaited.
 pub struct GroupSubscription<R> {
     component: Component,
     audience: Audience,
-    /// With the peer left to be filled in.
+    /// The peer is filled in for each member.
     topic: Topic,
     query: &'static str,
     directories: watch::Receiver<()>,
-    /// Whether the members are to be looked up.
+    /// Whether the members must be looked up.
     is_stale: bool,
     member_table: MemberTable,
     asked: BTreeMap<JausId, Asking<R>>,
     subscribed: BTreeMap<JausId, Subscription<R>>,
     news: VecDeque<(JausId, GroupUpdate<R>)>,
-    /// Who had a report last: the next one's turn is first.
+    /// The member of the last report. The next poll starts after it.
     last: JausId,
 }
 
-/// A subscription to one member in the making.
+/// A pending subscription to one member.
 type Asking<R> = Pin<Box<dyn Future<Output = Result<Subscription<R>, SubscribeError>> + Send>>;
 
-/// What a group subscription brings of one member.
+/// An update about one member of a group subscription.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GroupUpdate<R> {
     /// A report.
     Report(R),
-    /// It is up: for the first time, or after it was down.
+    /// It is up: for the first time, or after an outage.
     Up,
-    /// Nothing comes at present.
+    /// No reports arrive at present.
     Down {
-        /// When the last sign of the event came.
+        /// Time of the last sign of the event.
         since: Instant,
-        /// What is the matter.
+        /// The cause.
         why: Outage,
     },
-    /// It belongs to the audience, but cannot be subscribed to.
+    /// It belongs to the audience, but the subscription failed.
     NotSubscribed {
-        /// Why not.
+        /// The reason.
         why: SubscribeError,
-        /// After how long it is tried again.
+        /// The time until the next attempt.
         again: Duration,
     },
-    /// It does not belong to the audience any more.
+    /// It no longer belongs to the audience.
     Gone,
 }
 
@@ -103,9 +103,9 @@ impl<R: Message> GroupSubscription<R> {
         }
     }
 
-    /// Waits for the next update, and says whose it is; `None` when the component has stopped.
+    /// Waits for the next update and its member; `None` when the component has stopped.
     ///
-    /// Nothing is lost if the returned future is dropped.
+    /// Cancel safe: dropping the returned future loses nothing.
     pub async fn next(&mut self) -> Option<(JausId, GroupUpdate<R>)> {
         loop {
             if std::mem::take(&mut self.is_stale) {
@@ -150,7 +150,7 @@ impl<R: Message> GroupSubscription<R> {
         }
     }
 
-    /// Takes in who has come, and lets go of who has left.
+    /// Adds new members, and drops those that have left.
     fn call_the_roll(&mut self) {
         self.directories.mark_unchanged();
         let directory = self.component.directory();
@@ -177,13 +177,13 @@ impl<R: Message> GroupSubscription<R> {
 }
 
 impl<R> GroupSubscription<R> {
-    /// Whose reports these are.
+    /// The audience of the subscription.
     #[must_use]
     pub const fn audience(&self) -> &Audience {
         &self.audience
     }
 
-    /// Those who have confirmed, each with its own subscription.
+    /// The members that have confirmed, each with its own subscription.
     pub fn members(&self) -> impl Iterator<Item = (JausId, &Subscription<R>)> {
         self.subscribed.iter().map(|(&id, it)| (id, it))
     }
@@ -201,7 +201,7 @@ impl<R> fmt::Debug for GroupSubscription<R> {
 
 type News<R> = VecDeque<(JausId, GroupUpdate<R>)>;
 
-/// Sees who has answered; says whether anybody has.
+/// Polls pending subscriptions; returns whether any has completed.
 fn poll_asked<R>(
     cx: &mut Context<'_>,
     asked: &mut BTreeMap<JausId, Asking<R>>,
@@ -217,7 +217,7 @@ fn poll_asked<R>(
                 member_table.handle_subscribed(member);
                 subscribed.insert(member, subscription);
             }
-            // That is told by the end of everything.
+            // The end of the whole stream reports this.
             Poll::Ready(Err(SubscribeError::Stopped)) => {}
             Poll::Ready(Err(why)) => {
                 let again = member_table.handle_refused(Instant::now(), member);
@@ -229,7 +229,8 @@ fn poll_asked<R>(
     asked.len() < before
 }
 
-/// Looks for the next update, first of those behind `last`; says whether there was anything.
+/// Polls for the next update, starting with the members after `last`; returns whether there was
+/// one.
 fn poll_subscribed<R: Message>(
     cx: &mut Context<'_>,
     last: JausId,
@@ -251,7 +252,8 @@ fn poll_subscribed<R: Message>(
                 Poll::Ready(None) => {
                     let end = subscription.end();
                     subscribed.remove(&member);
-                    // Without a reason the component has stopped, which is told by the end of all.
+                    // Without a reason the component has stopped, which the end of the whole stream
+                    // reports.
                     if let Some(why) = end {
                         let again = member_table.handle_refused(Instant::now(), member);
                         let why = SubscribeError::Ended {

@@ -1,4 +1,4 @@
-//! What became of something at each member of a group, and how it is done at several at once.
+//! The results of an operation at each member of a group, and the limit of parallel operations.
 
 use std::future::poll_fn;
 use std::pin::Pin;
@@ -6,25 +6,25 @@ use std::task::Poll;
 
 use crate::address::JausId;
 
-/// What each member of a group made of a message, in order of their ids.
+/// The result at each member of a group, in order of their ids.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[must_use = "a group does not fail as a whole: see who has it and who has not"]
 pub struct Results<T, E>(Vec<(JausId, Result<T, E>)>);
 
 impl<T, E> Results<T, E> {
-    /// How many members there were.
+    /// The number of members.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there was nobody.
+    /// Whether there were no members.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Whether it went well with every member, and there was one at least.
+    /// Whether there was at least one member and no failure.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         !self.is_empty() && self.0.iter().all(|(_, result)| result.is_ok())
@@ -35,13 +35,13 @@ impl<T, E> Results<T, E> {
         self.0.iter().map(|(id, result)| (*id, result))
     }
 
-    /// The members with which it went well, and what they answered.
+    /// The members without a failure, and their answers.
     pub fn successes(&self) -> impl Iterator<Item = (JausId, &T)> {
         let all = self.iter();
         all.filter_map(|(id, result)| result.as_ref().ok().map(|it| (id, it)))
     }
 
-    /// The members with which it did not, and why.
+    /// The members with a failure, and the reason.
     pub fn failures(&self) -> impl Iterator<Item = (JausId, &E)> {
         let all = self.iter();
         all.filter_map(|(id, result)| result.as_ref().err().map(|it| (id, it)))
@@ -57,7 +57,7 @@ impl<T, E> IntoIterator for Results<T, E> {
     }
 }
 
-/// Begins something with each member, `at_once` of them at a time, and waits for all of them.
+/// Runs an operation for each member, `at_once` of them in parallel, and waits for all.
 pub(super) async fn of_each<T, E, F>(
     members: Vec<JausId>,
     at_once: usize,

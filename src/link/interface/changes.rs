@@ -1,5 +1,5 @@
-//! Word from the operating system that interfaces or their addresses have changed: on Linux from
-//! rtnetlink; other systems are not asked.
+//! Notifications from the operating system about changes of interfaces and addresses: on Linux from
+//! rtnetlink, on other systems none.
 
 #[cfg(not(target_os = "linux"))]
 pub(crate) use elsewhere::Changes;
@@ -19,16 +19,16 @@ mod linux {
 
     use crate::link::watch::watch;
 
-    /// `RTMGRP_LINK`, `RTMGRP_IPV4_IFADDR` and `RTMGRP_IPV6_IFADDR`: interfaces that come, go, or
-    /// change their state, and addresses.
+    /// `RTMGRP_LINK`, `RTMGRP_IPV4_IFADDR` and `RTMGRP_IPV6_IFADDR`: added, removed or changed
+    /// interfaces, and their addresses.
     const GROUPS: u32 = 0x1 | 0x10 | 0x100;
 
-    /// A listener to changes.
+    /// A listener for changes.
     #[derive(Debug)]
     pub(crate) struct Changes(Option<AsyncFd<OwnedFd>>);
 
     impl Changes {
-        /// Listens from now on, if the operating system lets us. Must be called within a tokio
+        /// Listens from now on, if the operating system permits. Must be called within a tokio
         /// runtime.
         pub(crate) fn open() -> Self {
             let socket = listen();
@@ -46,14 +46,14 @@ mod linux {
         /// Waits until something has changed.
         pub(crate) async fn next(&mut self) {
             if let Some(socket) = &self.0 {
-                // What has changed is looked up afterwards; an error is as good a reason to look.
+                // The caller looks up what has changed. An error is as good a reason for that.
                 let _ = socket.readable().await;
             } else {
                 std::future::pending::<()>().await;
             }
         }
 
-        /// Forgets the changes that were announced until now.
+        /// Discards the changes announced so far.
         pub(crate) fn forget(&mut self) {
             let Some(socket) = &self.0 else {
                 return;
@@ -61,7 +61,7 @@ mod linux {
             let read = |socket: &OwnedFd| {
                 let mut message = [0; 4096];
                 match recv(socket, &mut message[..], RecvFlags::DONTWAIT) {
-                    // More was announced than we have read, or a signal came.
+                    // More was announced than was read, or a signal arrived.
                     Err(Errno::NOBUFS | Errno::INTR) => Ok(()),
                     other => other.map(|_| ()).map_err(io::Error::from),
                 }
@@ -73,7 +73,7 @@ mod linux {
     fn listen() -> io::Result<AsyncFd<OwnedFd>> {
         let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
         let (family, kind) = (AddressFamily::NETLINK, SocketType::RAW);
-        // Protocol 0, the usual one, is rtnetlink.
+        // Protocol 0, the default, is rtnetlink.
         let socket = socket_with(family, kind, flags, None)?;
         bind(&socket, &SocketAddrNetlink::new(0, GROUPS))?;
         watch(socket, Interest::READABLE)
@@ -82,12 +82,12 @@ mod linux {
 
 #[cfg(not(target_os = "linux"))]
 mod elsewhere {
-    /// A listener to changes, to which nothing is said.
+    /// A listener that never reports a change.
     #[derive(Debug)]
     pub(crate) struct Changes;
 
     impl Changes {
-        /// Listens to nothing.
+        /// Does not listen.
         pub(crate) const fn open() -> Self {
             Self
         }

@@ -1,4 +1,4 @@
-//! Which of the host's interfaces and addresses a node uses.
+//! Selects the host's interfaces and addresses that a node uses.
 
 #[cfg(feature = "serde")]
 use std::fmt;
@@ -7,19 +7,19 @@ use std::net::{IpAddr, SocketAddr};
 use super::{Available, Interface, Place, list};
 use crate::link::Error;
 
-/// The versions of IP that are used on the interfaces chosen. An interface or a peer that is named
-/// by its address is used whatever its version.
+/// The IP versions to use on the selected interfaces. An interface or a peer that is given by
+/// address is used whatever its version.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Ip {
-    /// IPv4, which is all that other implementations speak.
+    /// IPv4, the only version that other implementations support.
     #[default]
     #[cfg_attr(feature = "serde", serde(rename = "4"))]
     V4,
     /// IPv6.
     #[cfg_attr(feature = "serde", serde(rename = "6"))]
     V6,
-    /// Both. A peer that is heard both ways is answered the way it was heard last.
+    /// Both. A peer that sends over both is replied to over the one it used last.
     #[cfg_attr(feature = "serde", serde(rename = "both"))]
     Both,
 }
@@ -44,25 +44,26 @@ impl Ip {
 
 /// The interfaces that a node opens links on.
 ///
-/// On each of them one address of each [`Ip`] version is used: with IPv4 the first; with IPv6 the
-/// link-local one (`fe80::…`), which every interface has and by which neighbours meet without any
-/// set-up, or else the first. Another address is chosen by naming it.
+/// On each interface a node uses one address per [`Ip`] version. With IPv4 this is the first one.
+/// With IPv6 it is the link-local one (`fe80::…`), which every interface has and with which
+/// neighbours find each other without any configuration, or else the first one. To use another
+/// address, name it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Interfaces {
-    /// Every interface that is up and has an address, without loopback. Nodes of one host hear
-    /// each other there too. A host that has nothing else uses loopback.
+    /// Every interface that is up and has an address, except loopback. Nodes of one host reach each
+    /// other there too. A host without any other interface uses loopback.
     #[default]
     All,
-    /// Only the loopback interface: nothing leaves this host and no network is needed.
+    /// Only the loopback interface: nothing leaves this host, and no network is needed.
     Loopback,
-    /// The interfaces named, each by name (`eth0`) or by an address of this host, such as
-    /// `10.0.3.2`, `fd00::2` or `fe80::1%eth0`. Any address in 127.0.0.0/8 stands for the loopback
+    /// The listed interfaces, each by name (`eth0`) or by an address of this host, such as
+    /// `10.0.3.2`, `fd00::2` or `fe80::1%eth0`. Any address in 127.0.0.0/8 means the loopback
     /// interface with that address.
     Only(Vec<String>),
 }
 
 impl Interfaces {
-    /// The interfaces of this host that are meant.
+    /// The selected interfaces of this host.
     ///
     /// # Errors
     /// [`Error::NoSuchInterface`], [`Error::NoAddress`], [`Error::InterfaceDown`] or
@@ -84,7 +85,7 @@ impl Interfaces {
         Ok(chosen)
     }
 
-    /// Those of the available interfaces that are meant and are up. May be none.
+    /// The selected ones of the available interfaces that are up. May be empty.
     #[must_use]
     pub fn present(&self, available: &[Interface], ip: Ip) -> Vec<Interface> {
         let mut chosen: Vec<Interface> = Vec::new();
@@ -115,7 +116,7 @@ impl Interfaces {
     }
 }
 
-/// One address of each version that is meant, of each interface.
+/// One address per interface and selected version.
 fn usual<'a>(addresses: impl Iterator<Item = &'a Interface>, ip: Ip) -> Vec<Interface> {
     let mut chosen: Vec<Interface> = Vec::new();
     for address in addresses.filter(|i| ip.includes(i.address)) {
@@ -133,7 +134,7 @@ fn usual<'a>(addresses: impl Iterator<Item = &'a Interface>, ip: Ip) -> Vec<Inte
     chosen
 }
 
-/// The addresses of the interface that was asked for, which must be up.
+/// The addresses of a requested interface, which must be up.
 fn named(wanted: &str, available: &[Interface], ip: Ip) -> Result<Vec<Interface>, Error> {
     let all = || Available(available.to_vec());
     let of_name = |i: &&Interface| i.name == wanted;

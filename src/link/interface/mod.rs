@@ -1,7 +1,7 @@
-//! Which network interfaces this host has, with which addresses.
+//! The network interfaces of this host and their addresses.
 //!
-//! A link is opened per interface and bound to one address of it, so choosing an interface
-//! ([`Interfaces`]) also chooses the address that peers see.
+//! A link is opened per interface and bound to one of its addresses, so selecting an interface
+//! ([`Interfaces`]) also selects the address that peers see.
 
 mod changes;
 mod choice;
@@ -23,19 +23,19 @@ use super::Error;
 pub struct Interface {
     /// The operating system's name, such as `eth0`.
     pub name: String,
-    /// The operating system's number for it, used to join multicast groups.
+    /// The operating system's index, used to join multicast groups.
     pub index: u32,
     /// The address that a link on this interface is bound to.
     pub address: IpAddr,
-    /// How many leading bits of the address name the attached network.
+    /// The length of the network prefix in bits.
     pub prefix: u8,
-    /// Whether it is up, as far as the operating system tells.
+    /// Whether it is up, as far as the operating system reports it.
     pub up: bool,
-    /// Whether it carries multicast. Tunnels (`wg0`, `ppp0`) often do not; loopback does for
-    /// IPv4 alone.
+    /// Whether it carries multicast. Tunnels (`wg0`, `ppp0`) often do not; loopback does for IPv4
+    /// only.
     pub multicast: bool,
-    /// The address by which everyone in the attached network is reached, if there is one: never
-    /// with IPv6, nor on tunnels and loopback.
+    /// The broadcast address of the attached network, if there is one: never with IPv6, nor on
+    /// tunnels and loopback.
     pub broadcast: Option<Ipv4Addr>,
 }
 
@@ -46,13 +46,13 @@ impl Interface {
         self.address.is_loopback()
     }
 
-    /// Whether the address holds on the attached network alone (IPv6's `fe80::/10`).
+    /// Whether the address is link-local (IPv6's `fe80::/10`).
     #[must_use]
     pub const fn is_link_local(&self) -> bool {
         matches!(self.address, IpAddr::V6(v6) if v6.is_unicast_link_local())
     }
 
-    /// Whether `peer` lies in the network attached to this interface.
+    /// Whether `peer` is on the network attached to this interface.
     #[must_use]
     pub fn reaches(&self, peer: SocketAddr) -> bool {
         let (own, other, length) = match (self.address, peer) {
@@ -73,8 +73,8 @@ impl Interface {
         network(own) == network(other)
     }
 
-    /// A socket address on this interface; an address that holds on the attached network alone
-    /// says which network it is.
+    /// A socket address on this interface; a link-local address includes the interface index as its
+    /// scope.
     #[must_use]
     pub const fn at(&self, port: u16) -> SocketAddr {
         match self.address {
@@ -97,7 +97,7 @@ impl fmt::Display for Interface {
     }
 }
 
-/// Lists for an error message: what there is to choose from.
+/// A list of the existing interfaces, for error messages.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Available(pub Vec<Interface>);
 
@@ -117,7 +117,7 @@ impl fmt::Display for Available {
 /// Every address of every interface of this host, up or not.
 ///
 /// # Errors
-/// [`Error::Io`] if the operating system does not tell.
+/// [`Error::Io`] if the operating system does not list them.
 pub fn list() -> Result<Vec<Interface>, Error> {
     let found = if_addrs::get_if_addrs().map_err(|source| Error::Io {
         doing: "listing the network interfaces".into(),
@@ -131,8 +131,8 @@ pub fn list() -> Result<Vec<Interface>, Error> {
     Ok(found.into_iter().filter_map(describe).map(usable).collect())
 }
 
-/// The local address from which the operating system would send to `peer`; `None` if it knows no
-/// way there. Nothing is sent.
+/// The local address from which the operating system would send to `peer`; `None` without a route.
+/// Nothing is sent.
 #[must_use]
 pub fn local_address_for(peer: SocketAddr) -> Option<IpAddr> {
     let any = match peer {
@@ -160,7 +160,7 @@ fn describe(found: if_addrs::Interface) -> Option<Interface> {
     let has = |flag: u32| flags.map(|flags| flags & flag != 0);
     let loopback = address.is_loopback();
     let multicast = if loopback {
-        // IPv4's loopback carries multicast although its flag says otherwise. IPv6's does not.
+        // IPv4 loopback carries multicast although its flag says otherwise. IPv6 loopback does not.
         address.is_ipv4()
     } else {
         has(IFF_MULTICAST).unwrap_or(!found.is_p2p)
@@ -179,12 +179,12 @@ fn describe(found: if_addrs::Interface) -> Option<Interface> {
     })
 }
 
-/// The last address of a network, which is its broadcast address unless another was set.
+/// The last address of a network, which is its broadcast address unless another one is set.
 fn last_address(address: IpAddr, prefix: u8) -> Option<Ipv4Addr> {
     let IpAddr::V4(v4) = address else {
         return None;
     };
-    // A network of two has none, RFC 3021.
+    // A network of two addresses has none (RFC 3021).
     (prefix < 31).then(|| Ipv4Addr::from(u32::from(v4) | (u32::MAX >> prefix)))
 }
 
@@ -192,14 +192,14 @@ const IFF_UP: u32 = 0x1;
 const IFF_BROADCAST: u32 = 0x2;
 const IFF_MULTICAST: u32 = 0x1000;
 
-/// The interface's flags where the operating system (Linux) shows them as a file.
+/// The interface's flags where the operating system (Linux) provides them as a file.
 fn sysfs_flags(name: &str) -> Option<u32> {
     let text = std::fs::read_to_string(format!("/sys/class/net/{name}/flags")).ok()?;
     u32::from_str_radix(text.trim().trim_start_matches("0x"), 16).ok()
 }
 
-/// IPv6 addresses that cannot be bound to yet, because the host (Linux) is still finding out
-/// whether somebody else has them. That takes a second or two after an interface has come up.
+/// IPv6 addresses that cannot be bound yet, because the host (Linux) is still checking for
+/// duplicates. That takes a second or two after an interface has come up.
 fn tentative_addresses() -> Vec<(IpAddr, u32)> {
     let table = std::fs::read_to_string("/proc/net/if_inet6").unwrap_or_default();
     table.lines().filter_map(tentative_address).collect()

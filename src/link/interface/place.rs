@@ -1,5 +1,5 @@
-//! The address of one host as people write it: `10.0.0.2`, `10.0.0.2:3795`, `fd00::2`,
-//! `[fd00::2]:3795`, `fe80::2%eth0`, `[fe80::2%eth0]:3795`.
+//! Parses the address of one host: `10.0.0.2`, `10.0.0.2:3795`, `fd00::2`, `[fd00::2]:3795`,
+//! `fe80::2%eth0`, `[fe80::2%eth0]:3795`.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr, SocketAddrV6};
@@ -7,11 +7,11 @@ use std::str::FromStr;
 
 use super::super::STANDARD_PORT;
 
-/// The address and port of one host; for an IPv6 link-local address, which every network has
-/// anew, also the interface to that network.
+/// The address and port of one host. An IPv6 link-local address is only unique within a network, so
+/// it also needs the interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Place {
-    /// Without scope if `zone` has a name.
+    /// Without a scope id if `zone` has a name.
     address: SocketAddr,
     zone: Option<Zone>,
 }
@@ -25,15 +25,15 @@ struct Zone([u8; 15]);
 pub struct NoPlace;
 
 impl Place {
-    /// Whether it is an address that every network has anew, and no interface is named.
+    /// Whether it is a link-local address without an interface.
     #[must_use]
     pub const fn lacks_zone(&self) -> bool {
         matches!(self.address, SocketAddr::V6(v6)
             if v6.ip().is_unicast_link_local() && v6.scope_id() == 0 && self.zone.is_none())
     }
 
-    /// The socket address, with the number that the interface has just now; with scope 0, which
-    /// leads nowhere, while there is no such interface.
+    /// The socket address, with the current index of the interface as its scope. While there is no
+    /// such interface the scope is 0, which is unreachable.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         match (self.address, self.zone) {
@@ -69,7 +69,7 @@ impl Zone {
 
     fn name(&self) -> &str {
         let length = self.0.iter().position(|&o| o == 0).unwrap_or(self.0.len());
-        // Made of a `str`, so it is one.
+        // Made from a `str`, so it is valid UTF-8.
         std::str::from_utf8(&self.0[..length]).unwrap_or_default()
     }
 }
@@ -77,7 +77,7 @@ impl Zone {
 impl FromStr for Place {
     type Err = NoPlace;
 
-    /// Without a port it is 3794.
+    /// The default port is 3794.
     fn from_str(text: &str) -> Result<Self, NoPlace> {
         let named = || {
             let (ip, zone, port) = split(text)?;
@@ -101,7 +101,7 @@ impl FromStr for Place {
     }
 }
 
-/// Takes `IP%ZONE` or `[IP%ZONE]:PORT` apart.
+/// Splits `IP%ZONE` or `[IP%ZONE]:PORT`.
 fn split(text: &str) -> Option<(Ipv6Addr, &str, u16)> {
     let (host, port) = match text.strip_prefix('[') {
         None => (text, STANDARD_PORT),

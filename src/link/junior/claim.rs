@@ -1,4 +1,4 @@
-//! The sockets in the folder of Junior's node manager: its own, and one for each client.
+//! The sockets in the folder of Junior's node manager: its own, and one per client.
 
 use std::fs::{self, Permissions};
 use std::io::{self, ErrorKind};
@@ -19,7 +19,7 @@ pub const DEFAULT_FOLDER: &str = "/tmp";
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There can be no sockets.
+    /// The folder cannot contain sockets.
     #[error(
         "`{}` cannot be the folder of Junior's sockets: it must be a folder whose path has at most \
          90 octets. Junior uses /tmp, fkie's what its `SockPath` says", .0.display()
@@ -33,7 +33,7 @@ pub enum Error {
     Manager {
         /// Its socket.
         path: PathBuf,
-        /// The operating system's words.
+        /// The error of the operating system.
         source: io::Error,
     },
     /// Another client has the id.
@@ -47,7 +47,7 @@ pub enum Error {
         /// The other client's socket.
         path: PathBuf,
     },
-    /// The socket for an id cannot be made.
+    /// The socket for an id cannot be created.
     #[error(
         "{id} cannot be a client of Junior's node manager: its socket {} cannot be made ({source}): \
          {}", .path.display(), remedy(source, path, "see to that path")
@@ -57,7 +57,7 @@ pub enum Error {
         id: JausId,
         /// Its socket.
         path: PathBuf,
-        /// The operating system's words.
+        /// The error of the operating system.
         source: io::Error,
     },
 }
@@ -73,10 +73,10 @@ fn remedy(error: &io::Error, path: &Path, otherwise: &str) -> String {
     }
 }
 
-/// Whether a node manager reads its socket in this folder.
+/// Checks that a node manager listens in this folder.
 ///
 /// # Errors
-/// Why not, and what to do.
+/// The reason, and a remedy.
 pub fn check(folder: &Path) -> Result<(), Error> {
     check_folder(folder)?;
     let path = manager_in(folder);
@@ -101,7 +101,7 @@ fn client_in(folder: &Path, id: JausId) -> PathBuf {
     folder.join(id.to_u32().to_string())
 }
 
-/// A socket that sends to the node manager, and does not block.
+/// A non-blocking socket that sends to the node manager.
 pub(super) fn connect(folder: &Path) -> io::Result<UnixDatagram> {
     let socket = UnixDatagram::unbound()?;
     socket.connect(manager_in(folder))?;
@@ -109,20 +109,21 @@ pub(super) fn connect(folder: &Path) -> io::Result<UnixDatagram> {
     Ok(socket)
 }
 
-/// The socket at which the node manager reaches one component. Its file goes with it.
+/// The socket at which the node manager reaches one component. Dropping it removes the file.
 #[derive(Debug)]
 pub(crate) struct Claim {
     id: JausId,
     path: PathBuf,
-    /// Device and number of the file: another client may have taken its place.
+    /// Device and inode of the file: another client may have replaced it.
     file: (u64, u64),
-    /// The socket, until the runtime watches it: components are attached outside it too.
+    /// The socket until the runtime watches it, because components may be attached outside a
+    /// runtime.
     idle: Option<UnixDatagram>,
     watched: Option<net::UnixDatagram>,
 }
 
 impl Claim {
-    /// Takes the place of an id. A dead client's socket is replaced, a living one's is not.
+    /// Creates the socket of an id. Replaces the socket of a dead client, but not of a living one.
     pub(crate) fn new(folder: &Path, id: JausId) -> Result<Self, Error> {
         let path = client_in(folder, id);
         let failed = |source| {
@@ -149,7 +150,7 @@ impl Claim {
             idle: Some(socket),
             watched: None,
         };
-        // The node manager may be another user's, and must be able to write here.
+        // The node manager may belong to another user, and must be able to write here.
         let rights = Permissions::from_mode(0o666);
         fs::set_permissions(&claim.path, rights).map_err(failed)?;
         Ok(claim)
@@ -159,7 +160,7 @@ impl Claim {
         self.id
     }
 
-    /// Receives a datagram, within a runtime.
+    /// Receives a datagram. Must be called within a runtime.
     pub(super) fn poll_recv(
         &mut self,
         cx: &mut Context<'_>,
@@ -178,7 +179,7 @@ impl Claim {
 impl Drop for Claim {
     fn drop(&mut self) {
         if file_at(&self.path).is_ok_and(|file| file == self.file) {
-            // A file that stays is recognised as stale by the next client.
+            // The next client recognises a remaining file as stale.
             let _ = fs::remove_file(&self.path);
         }
     }
@@ -189,7 +190,7 @@ fn file_at(path: &Path) -> io::Result<(u64, u64)> {
     Ok((file.dev(), file.ino()))
 }
 
-/// Whether a path leads to a socket that nobody reads.
+/// Whether a path is a socket without a reader.
 fn is_dead(path: &Path) -> bool {
     let is_socket = fs::symlink_metadata(path).is_ok_and(|file| file.file_type().is_socket());
     let answer = UnixDatagram::unbound().and_then(|socket| socket.connect(path));
@@ -259,7 +260,7 @@ mod tests {
         let folder = folder("stolen");
         let claim = Claim::new(&folder, ID).unwrap();
         let path = client_in(&folder, ID);
-        // As Junior's library does without asking.
+        // Junior's library does the same without a check.
         fs::remove_file(&path).unwrap();
         let _thief = UnixDatagram::bind(&path).unwrap();
         drop(claim);

@@ -1,27 +1,30 @@
-//! Junior's node manager on the same host, with this node's components as its clients.
+//! The link through Junior's node manager on the same host, with this node's components as its
+//! clients.
 //!
-//! Junior's node manager (`JuniorRTE`, in the JAUS Tool Set `NodeManager`) holds UDP port 3794 of
-//! all addresses, so a node beside it cannot receive the multicast group. Its own clients reach the
-//! network through it, by Unix datagrams in one [folder](DEFAULT_FOLDER), and so does this link:
+//! Junior's node manager (`JuniorRTE`; in the JAUS Tool Set `NodeManager`) holds UDP port 3794 of
+//! all addresses, so another node on the host cannot receive the multicast group. Its own clients
+//! reach the network through it, with Unix datagrams in one [folder](DEFAULT_FOLDER), and so does
+//! this link:
 //!
 //! * `JuniorRTE` in the folder is the node manager's socket. One connected socket of the link sends
 //!   for all components, because the node manager looks only at the source id of a message.
 //! * It delivers to `<folder>/<id as a decimal number>`, so each component has a socket there
-//!   (`Claim`). A wildcard from the network arrives there once for each component, with that
-//!   component's id in its place.
-//! * `Registration` says when to register each id (Connect, answered by Accept), and to do it
-//!   again with a node manager that was restarted.
+//!   (`Claim`). A message from the network with a wildcard arrives once for each component, with
+//!   that component's id as its destination.
+//! * `Registration` determines when to register each id (Connect, answered by Accept), and when to
+//!   repeat that with a restarted node manager.
 //!
-//! Each datagram carries one message, as the node manager reads no second one. It stops all
-//! traffic of the host while a client's queue is full, so sockets are read at once. What it does
-//! not read waits here, bounded, the urgent first; the oldest of the least urgent is dropped and
-//! counted. While the node manager is away, outgoing messages are dropped and counted.
+//! Each datagram carries one message, because the node manager does not read a second one. It stops
+//! all traffic of the host while a client's queue is full, so the sockets are read at once.
+//! Messages that it does not read yet wait here in a bounded queue, most urgent first; the oldest
+//! of the lowest priority is dropped and counted. While the node manager is away, outgoing messages
+//! are dropped and counted.
 //!
 //! # Trust
 //!
-//! Junior authenticates nothing. Any user who may write to the folder can answer as the node
-//! manager, and any local process can send to a component's socket under any id. Its messages
-//! are trusted no more than those of the network; see `docs/several-nodes-on-one-host.md`.
+//! Junior authenticates nothing. Any user who may write to the folder can impersonate the node
+//! manager, and any local process can send to a component's socket under any id. Its messages are
+//! trusted no more than those of the network; see `docs/several-nodes-on-one-host.md`.
 
 mod claim;
 mod registration;
@@ -47,22 +50,22 @@ use crate::address::JausId;
 use crate::endpoint::Transmit;
 use crate::wire::{Frame, Priority, Version, judp};
 
-/// What waits for the node manager: 0.1 s of what it reads at most.
+/// Limits of the queue to the node manager: at most 0.1 s of what it reads.
 const OUTBOX: Bounds = Bounds {
     items: 1024,
     octets: 1 << 20,
 };
-/// Datagrams taken from one socket before the others have their turn.
+/// Limit of datagrams from one socket before the others have their turn.
 const BATCH: usize = 64;
 
-/// Codes of the messages between the node manager (id 0) and its clients, which have the header of
-/// AS5669.
+/// Codes of the messages between the node manager (id 0) and its clients, which have an AS5669
+/// header.
 const CONNECT: u16 = 1;
 const ACCEPT: u16 = 2;
 const CANCEL: u16 = 3;
 const MANAGER: JausId = JausId::from_u32(0);
 
-/// What a link through Junior has done since it was opened.
+/// Counts of a link through Junior since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Counters {
@@ -70,9 +73,9 @@ pub struct Counters {
     pub received: u64,
     /// Datagrams that could not be received.
     pub receive_errors: u64,
-    /// Datagrams given to the node manager.
+    /// Datagrams passed to the node manager.
     pub sent: u64,
-    /// Datagrams that the operating system refused.
+    /// Datagrams that the operating system rejected.
     pub send_errors: u64,
     /// Datagrams dropped because the node manager read too slowly.
     pub send_overflows: u64,
@@ -92,7 +95,7 @@ pub struct JuniorLink {
     clients: BTreeMap<JausId, Claim>,
     registration: Registration,
     outbox: Backlog<Bytes>,
-    /// The datagram for which the node manager has no room yet.
+    /// The datagram that waits for room at the node manager.
     leaving: Option<Bytes>,
     is_stuck: bool,
     last_error: Option<io::ErrorKind>,
@@ -100,10 +103,10 @@ pub struct JuniorLink {
 }
 
 impl JuniorLink {
-    /// Prepares a link through the node manager in this folder, which need not run yet.
+    /// Prepares a link through the node manager in this folder, which need not be running yet.
     ///
     /// # Errors
-    /// [`Error::Folder`] if there can be no sockets in the folder.
+    /// [`Error::Folder`] if the folder cannot contain the sockets.
     pub fn open(folder: &Path) -> Result<Self, Error> {
         claim::check_folder(folder)?;
         Ok(Self {
@@ -119,31 +122,31 @@ impl JuniorLink {
         })
     }
 
-    /// Where the sockets are.
+    /// The folder of the sockets.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Whether the node manager is there and has accepted all components.
+    /// Whether the node manager is present and has accepted all components.
     #[must_use]
     pub fn is_registered(&self) -> bool {
         self.registration.is_complete()
     }
 
-    /// What it has done so far.
+    /// Its counters so far.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// Registers a component with the node manager from the next [`receive`](Self::receive) on.
+    /// Registers a component with the node manager, from the next [`receive`](Self::receive) on.
     pub(crate) fn admit(&mut self, claim: Claim) {
         self.registration.add(claim.id());
         self.clients.insert(claim.id(), claim);
     }
 
-    /// Takes a component from the node manager, and frees its place at once: it may come back.
+    /// Deregisters a component, and removes its socket at once, because the component may return.
     pub(crate) fn release(&mut self, id: JausId) {
         if self.clients.remove(&id).is_some() {
             self.registration.remove(id);
@@ -151,7 +154,7 @@ impl JuniorLink {
         }
     }
 
-    /// Queues what the endpoint gives out, for [`poll_flush`](Self::poll_flush).
+    /// Queues a datagram from the endpoint, for [`poll_flush`](Self::poll_flush).
     pub fn transmit(&mut self, transmit: &Transmit) {
         self.push(transmit.priority, transmit.payload.clone());
     }
@@ -168,7 +171,7 @@ impl JuniorLink {
         }
     }
 
-    /// Sends what waits, as fast as the node manager reads; ready when nothing waits any more.
+    /// Sends queued datagrams, as fast as the node manager reads; ready when none is left.
     pub fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         while let Some(manager) = &self.manager {
             let Some(datagram) = self.leaving.take().or_else(|| self.outbox.pop()) else {
@@ -202,8 +205,8 @@ impl JuniorLink {
         self.registration.poll_timeout()
     }
 
-    /// Registers what must be registered, and takes in what has arrived; whether there was more
-    /// than the link's share.
+    /// Sends due registrations, and receives datagrams. Returns whether there was more than the
+    /// link's share.
     pub fn receive(
         &mut self,
         cx: &mut Context<'_>,
@@ -271,7 +274,8 @@ impl JuniorLink {
         }
     }
 
-    /// Sends an empty datagram, which the node manager ignores: it fails if that has gone.
+    /// Sends an empty datagram, which the node manager ignores. It fails if the node manager is
+    /// gone.
     fn probe(&mut self) {
         let probed = self.manager.as_ref().map(|manager| manager.try_send(&[]));
         if let Some(Err(error)) = probed.filter(|it| it.as_ref().is_err_and(has_gone)) {
@@ -302,13 +306,13 @@ impl JuniorLink {
         self.registration.handle_lost();
     }
 
-    /// Takes all components from the node manager.
+    /// Deregisters all components.
     pub fn hang_up(&mut self) -> Poll<()> {
         while let Some((&id, _)) = self.clients.first_key_value() {
             self.release(id);
         }
         while let (Some(manager), Some(datagram)) = (&self.manager, self.outbox.pop()) {
-            // A node manager that has not read it finds nobody at the socket's path.
+            // If the node manager has not read it, it finds no socket at the component's path.
             if manager.try_send(&datagram).is_err() {
                 break;
             }
@@ -326,7 +330,7 @@ fn has_gone(error: &io::Error) -> bool {
     )
 }
 
-/// Whether this is the node manager's answer to Connect.
+/// Whether this is the node manager's Accept.
 fn is_accept(datagram: &Bytes) -> bool {
     let first = judp::frames(datagram.clone())
         .ok()

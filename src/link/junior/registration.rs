@@ -1,34 +1,34 @@
-//! When a client of Junior's node manager has to do what. Without sockets and clock.
+//! The registration state machine of clients of Junior's node manager, without sockets and clock.
 //!
-//! Nothing tells a client that its node manager was restarted and knows it no more. So a probe goes
-//! there on the connected socket, which fails if the process that bound it has gone, however
-//! quickly another took its place.
+//! A client is not notified when its node manager has restarted and no longer knows it. So it sends
+//! probes on the connected socket. They fail if the process that bound it is gone, however quickly
+//! another took its place.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
 
 use crate::address::JausId;
 
-/// The time between two attempts to find the node manager or to register, and between two probes.
+/// Interval of attempts to find the node manager or to register, and of probes.
 pub(super) const INTERVAL: Duration = Duration::from_millis(500);
 
-/// What to do now.
+/// The next action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
     /// Find the node manager.
     Connect,
-    /// Ask it to take this id.
+    /// Register this id.
     Register(JausId),
-    /// See whether it is still there.
+    /// Check that it is still there.
     Probe,
 }
 
-/// The ids to register, and what the node manager knows of them.
+/// The ids to register, and their state at the node manager.
 #[derive(Debug, Default)]
 pub(super) struct Registration {
     ids: BTreeSet<JausId>,
     is_connected: bool,
-    /// When to connect or to probe; `None`: at the next opportunity.
+    /// When to connect or to probe; `None` means at the next opportunity.
     next: Option<Instant>,
     /// The ids that it has not accepted, and when each is due.
     pending: BTreeMap<JausId, Option<Instant>>,
@@ -49,24 +49,24 @@ impl Registration {
         self.pending.remove(&id);
     }
 
-    /// The node manager is there, and knows nobody.
+    /// Notes that the node manager is present and has no registrations.
     pub(super) fn handle_connected(&mut self) {
         self.is_connected = true;
         self.pending = self.ids.iter().map(|&id| (id, None)).collect();
     }
 
-    /// The node manager has gone.
+    /// Notes that the node manager is gone.
     pub(super) fn handle_lost(&mut self) {
         self.is_connected = false;
         self.next = None;
     }
 
-    /// The node manager has accepted an id; whether that is news.
+    /// Notes that the node manager has accepted an id; returns whether that is new.
     pub(super) fn handle_accept(&mut self, id: JausId) -> bool {
         self.pending.remove(&id).is_some()
     }
 
-    /// What to do now, until there is nothing more.
+    /// The next action, until there is none.
     pub(super) fn poll(&mut self, now: Instant) -> Option<Step> {
         if is_due(self.next, now) {
             self.next = Some(now + INTERVAL);

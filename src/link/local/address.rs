@@ -1,4 +1,4 @@
-//! Where the node of a host is found: a socket in the file system, or a port of loopback.
+//! The address of a host's node: a socket in the file system, or a port of loopback.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -11,15 +11,15 @@ use crate::as_text::serde_as_text;
 /// port of loopback such as `127.0.0.1:3795`.
 ///
 /// The default is `jaus/node.sock` in the user's runtime directory (`$XDG_RUNTIME_DIR`, else
-/// `/run/user/UID`), or `/tmp/jaus-UID/node.sock` where there is none; on systems without Unix
-/// sockets the port 127.0.0.1:37940.
+/// `/run/user/UID`), or `/tmp/jaus-UID/node.sock` if there is none; on systems without Unix
+/// sockets, port 127.0.0.1:37940.
 ///
-/// A Unix socket is for the processes of one user (and of root), and the operating system says who
-/// is at the other end. **A port of loopback is open to everybody who can run a program on the
-/// host**: use it where there is nothing else.
+/// A Unix socket is for the processes of one user (and root), and the operating system identifies
+/// the process at the other end. **A port of loopback is open to everyone who can run a program on
+/// the host**: use it only if there is no alternative.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Address {
-    /// The usual place.
+    /// The default place.
     #[default]
     Default,
     /// A Unix stream socket.
@@ -34,7 +34,7 @@ pub enum Local {
     /// It does not.
     #[default]
     Off,
-    /// It does, there.
+    /// It does, at this address.
     At(Address),
 }
 

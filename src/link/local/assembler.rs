@@ -1,4 +1,4 @@
-//! Takes a stream apart into records.
+//! Extracts records from a stream.
 
 use std::cell::RefCell;
 use std::mem::take;
@@ -7,44 +7,45 @@ use bytes::Bytes;
 
 use super::record::{LENGTH, Record, RecordError};
 
-/// Octets read at once, unless a long record is on its way.
+/// Octets per read, except while a long record is arriving.
 const CHUNK: usize = 16 << 10;
-/// Up to this length a record is copied out of what was read; a longer one gets a buffer of its own,
+/// A record up to this length is copied out of the read buffer. A longer one gets its own buffer,
 /// into which the rest of it is read.
 const COPIED: usize = 4096;
-/// That buffer grows with what arrives, whatever the record announces: to at most twice that, and by
-/// so many octets at least. Until octets arrive it takes addresses and no memory.
+/// That buffer grows as octets arrive, whatever length the record announces: to at most twice its
+/// content, in steps of at least this size. Until octets arrive it takes address space but no
+/// memory.
 const GROWTH: usize = 2 << 20;
 
-/// The least capacity of a buffer in the pool. Smaller ones the allocator reuses by itself; for larger
-/// ones it asks the kernel, which takes as long to provide their pages as to copy a message.
+/// The smallest capacity of a buffer in the pool. The allocator reuses smaller ones by itself. For
+/// larger ones it asks the kernel, which takes as long to provide the pages as to copy a message.
 const POOLED: usize = 128 << 10;
-/// Octets of the buffers in the pool of a thread, at most.
+/// Limit of the octets of buffers in a thread's pool.
 const POOL_OCTETS: usize = 8 << 20;
 
 thread_local! {
-    /// A buffer for the assembler that reads next.
+    /// The read buffer for the next assembler that reads.
     static SPARE: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
-    /// Buffers of long records, with their capacities. Those to which nothing else refers are free.
+    /// Buffers of long records, with their capacities. Those with no other reference are free.
     static POOL: RefCell<Vec<(usize, Bytes)>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Octets in, in any pieces; records out. One that waits for a new record has no buffer; each thread
-/// keeps a pool of those of long records, at most 8 MiB.
+/// Assembles records from octets in any pieces. An assembler between records holds no buffer. Each
+/// thread keeps a pool of buffers for long records, at most 8 MiB.
 #[derive(Debug)]
 pub struct Assembler {
-    /// The longest record, in octets without its length.
+    /// Limit of a record's length in octets, without the length field.
     limit: usize,
-    /// What has arrived. A long record has it for itself, without its length.
+    /// The received octets. A long record has its own buffer, without the length field.
     buffer: Vec<u8>,
-    /// Octets of it that were taken out.
+    /// Octets of it that were already extracted.
     taken: usize,
-    /// Octets that the long record will have; 0 if there is none.
+    /// The length of the long record in octets; 0 if there is none.
     long: usize,
 }
 
 impl Assembler {
-    /// For records of at most `limit` octets.
+    /// Accepts records of at most `limit` octets.
     #[must_use]
     pub const fn new(limit: usize) -> Self {
         Self {
@@ -55,12 +56,12 @@ impl Assembler {
         }
     }
 
-    /// From now on records may have that many octets.
+    /// Sets the limit of a record's length.
     pub const fn set_limit(&mut self, limit: usize) {
         self.limit = limit;
     }
 
-    /// The buffer to whose end the next octets are to be appended, with spare capacity for them.
+    /// The buffer to append the next octets to, with spare capacity for them.
     pub fn room(&mut self) -> &mut Vec<u8> {
         if self.buffer.capacity() == 0 {
             self.buffer = SPARE.take();
@@ -78,7 +79,7 @@ impl Assembler {
         &mut self.buffer
     }
 
-    /// Nothing has come for the [room](Self::room).
+    /// Call this when no octets have arrived for the [room](Self::room); releases an empty buffer.
     pub fn rest(&mut self) {
         if self.taken == self.buffer.len() && self.long == 0 {
             self.taken = 0;
@@ -89,7 +90,7 @@ impl Assembler {
     /// The next record, or `None` if it has not arrived in full.
     ///
     /// # Errors
-    /// A record that is too long or cannot be read: nothing behind it can be trusted.
+    /// If a record is too long or does not decode. Nothing after it can be trusted.
     pub fn next_record(&mut self) -> Result<Option<Record>, RecordError> {
         if self.long > 0 {
             return self.next_long();
@@ -140,7 +141,7 @@ fn reuse(length: usize) -> Option<Vec<u8>> {
     })
 }
 
-/// The octets of a buffer, which joins the pool in place of the oldest ones.
+/// The octets of a buffer, which joins the pool in place of the oldest buffers.
 fn freeze(buffer: Vec<u8>) -> Bytes {
     let capacity = buffer.capacity();
     let octets = Bytes::from(buffer);

@@ -1,4 +1,4 @@
-//! A connection of the local link: records in, records out. Both sides use the same two halves.
+//! The two halves of a local connection: a reader and a writer of records. Both sides use them.
 
 use std::collections::VecDeque;
 use std::future::poll_fn;
@@ -11,18 +11,18 @@ use super::record::{Record, RecordError};
 use super::stream::{ReadHalf, WriteHalf};
 use super::{Assembler, Error};
 
-/// Reads in a row before other tasks have their turn.
+/// Consecutive reads before other tasks have their turn.
 const TURN: usize = 4;
-/// Payloads from so many octets on are written from where they are.
+/// Payloads of at least this many octets are written without a copy.
 const LARGE: usize = 8192;
-/// The most pieces given to the kernel at once.
+/// Limit of pieces in one write.
 const PIECES: usize = 16;
 /// Octets collected before a sender writes them itself.
 const COLLECTED: usize = 16 << 10;
 /// Octets of memory that an idle connection keeps.
 const KEPT: usize = 1024;
 
-/// The half that is read.
+/// The reading half.
 #[derive(Debug)]
 pub(crate) struct Reader {
     stream: ReadHalf,
@@ -32,7 +32,7 @@ pub(crate) struct Reader {
 }
 
 impl Reader {
-    /// For records of at most `limit` octets.
+    /// Accepts records of at most `limit` octets.
     pub(crate) fn new(stream: ReadHalf, limit: usize) -> Self {
         Self {
             stream,
@@ -41,12 +41,12 @@ impl Reader {
         }
     }
 
-    /// From now on records may have that many octets.
+    /// Sets the limit of a record's length.
     pub(crate) const fn set_limit(&mut self, limit: usize) {
         self.assembler.set_limit(limit);
     }
 
-    /// The next record of what was read, if it is whole.
+    /// The next record among the octets read so far, if complete.
     pub(crate) fn next_record(&mut self) -> Result<Option<Record>, RecordError> {
         self.assembler.next_record()
     }
@@ -61,8 +61,7 @@ impl Reader {
         }
     }
 
-    /// Waits until something has arrived, and reads it. `may_read` is asked whenever the task is
-    /// woken.
+    /// Waits until octets arrive, and reads them. `may_read` is called on each wake-up.
     pub(crate) async fn fill(&mut self, may_read: impl Fn() -> bool) -> Result<(), Error> {
         if self.reads == TURN {
             self.reads = 0;
@@ -90,25 +89,25 @@ impl Reader {
     }
 }
 
-/// The half that is written: small records are collected, so that one call carries many; large
-/// payloads are not copied.
+/// The writing half. It collects small records, so that one call writes many, and does not copy
+/// large payloads.
 #[derive(Debug, Default)]
 pub(crate) struct Writer {
     /// `None` once it is closed.
     stream: Option<WriteHalf>,
-    /// What goes first: finished collections and large payloads.
+    /// Written first: finished collections and large payloads.
     pieces: VecDeque<Bytes>,
     /// The records collected after the last piece.
     collected: Vec<u8>,
-    /// Octets of these that are written.
+    /// Octets of `collected` that are already written.
     taken: usize,
     /// Octets that wait.
     waiting: usize,
-    /// Octets written since the connection stands.
+    /// Octets written since the connection was opened.
     written: u64,
     /// Whether a sender has written since the task's turn.
     had_turn: bool,
-    /// Whether the socket takes no more.
+    /// Whether the socket is full.
     is_full: bool,
     task: Option<Waker>,
 }
@@ -134,12 +133,12 @@ impl Writer {
         self.waiting == 0
     }
 
-    /// Octets written since the connection stands.
+    /// Octets written since the connection was opened.
     pub(crate) const fn written(&self) -> u64 {
         self.written
     }
 
-    /// Queues a record; on a closed connection it is dropped.
+    /// Queues a record. On a closed connection it is dropped.
     pub(crate) fn queue(&mut self, record: &Record) {
         if !self.is_open() {
             return;
@@ -156,14 +155,15 @@ impl Writer {
         self.pieces.extend([collected, record.payload.clone()]);
     }
 
-    /// Queues a record from outside the task that writes.
+    /// Queues a record from outside the writing task.
     pub(crate) fn send(&mut self, record: &Record) {
         self.queue(record);
         self.wake_task();
     }
 
-    /// The same, and perhaps writes what waits. The first after the task's turn does, the next ones
-    /// when enough has been collected: a burst costs a few calls and not one for each record.
+    /// Like [`send`](Self::send), but may write at once. The first record after the task's turn
+    /// does, later ones when enough is collected: so a burst takes a few calls instead of one per
+    /// record.
     pub(crate) fn send_now(&mut self, record: &Record) {
         self.queue(record);
         if !self.had_turn || self.waiting >= COLLECTED {
@@ -173,10 +173,10 @@ impl Writer {
         self.wake_task();
     }
 
-    /// Writes what waits, as far as the socket takes it.
+    /// Writes queued octets, as far as the socket takes them.
     pub(crate) fn flush_now(&mut self) {
         if !self.is_full {
-            // The task finds the error too, and knows what to do.
+            // The task gets the error too, and handles it.
             let _ = self.try_flush();
         }
     }
@@ -187,7 +187,7 @@ impl Writer {
         }
     }
 
-    /// Writes as much as the socket takes; whether nothing waits any more.
+    /// Writes as much as the socket takes; returns whether nothing is left.
     pub(crate) fn try_flush(&mut self) -> Result<bool, Error> {
         self.is_full = false;
         while !self.is_empty() && !self.is_full {
@@ -204,7 +204,7 @@ impl Writer {
         Ok(self.is_empty())
     }
 
-    /// Writes all, for the task that is woken by [`send`](Self::send) as well.
+    /// Writes everything. For the task that [`send`](Self::send) also wakes.
     pub(crate) fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), Error>> {
         self.await_more(cx);
         loop {
@@ -218,12 +218,12 @@ impl Writer {
         }
     }
 
-    /// Writes everything that waits; for the sole owner of the connection.
+    /// Writes everything queued. For the sole owner of the connection.
     pub(crate) async fn flush(&mut self) -> Result<(), Error> {
         poll_fn(|cx| self.poll_flush(cx)).await
     }
 
-    /// Has the task woken by the next [`send`](Self::send).
+    /// Registers the task to be woken by the next [`send`](Self::send).
     pub(crate) fn await_more(&mut self, cx: &Context<'_>) {
         match &self.task {
             Some(task) if task.will_wake(cx.waker()) => {}
@@ -231,7 +231,7 @@ impl Writer {
         }
     }
 
-    /// Drops what waits, and the connection.
+    /// Drops the queue and the connection.
     pub(crate) fn close(&mut self) {
         let task = self.task.take();
         *self = Self {
@@ -240,7 +240,7 @@ impl Writer {
         };
     }
 
-    /// Writes once: how many octets, and whether the socket took all that it was given.
+    /// Writes once; returns the number of octets, and whether the socket took all of them.
     fn write(&self) -> io::Result<(usize, bool)> {
         let Some(stream) = &self.stream else {
             return Err(io::ErrorKind::NotConnected.into());
@@ -281,7 +281,7 @@ impl Writer {
     }
 }
 
-/// A connection that was reset is closed.
+/// Maps an error. A connection that was reset counts as closed.
 fn failed(doing: &str, error: io::Error) -> Error {
     use io::ErrorKind::{BrokenPipe, ConnectionReset};
     match error.kind() {

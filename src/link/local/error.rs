@@ -16,10 +16,10 @@ pub enum Error {
          in its settings), or give the component a node of its own"
     )]
     NoNode {
-        /// Where it was looked for.
+        /// The address.
         place: String,
     },
-    /// Another node has the socket.
+    /// Another node is using the socket.
     #[error(
         "another node{} serves the components at {}: end it, or choose another path for one of \
          the two", process(*pid), path.display()
@@ -27,19 +27,19 @@ pub enum Error {
     Served {
         /// The socket.
         path: PathBuf,
-        /// The process of the other node, if the system tells.
+        /// The process of the other node, if the system reports it.
         pid: Option<u32>,
     },
     /// The port is in use.
     #[error("the TCP port {0} is taken: choose another for the local link")]
     PortTaken(SocketAddr),
-    /// There is a file of another kind in the socket's place.
+    /// A file of another kind has the socket's path.
     #[error(
         "{} is in the way of the local link's socket and is no socket: choose another path, or \
          move it", .0.display()
     )]
     NoSocket(PathBuf),
-    /// Others could put their own socket in the place of ours.
+    /// Other users could replace the socket by their own.
     #[error(
         "the directory {} of the local link's socket is not safe: {why}. {remedy}",
         directory.display()
@@ -49,7 +49,7 @@ pub enum Error {
         directory: PathBuf,
         /// What is wrong with it.
         why: String,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// The process at the other end belongs to another user.
@@ -58,37 +58,37 @@ pub enum Error {
          root: run components and node as one user, or choose another address"
     )]
     Foreign {
-        /// Where.
+        /// The address.
         place: String,
-        /// Whose it is.
+        /// The user id of its owner.
         uid: u32,
-        /// Who we are.
+        /// The user id of this process.
         own: u32,
     },
-    /// The other side wrote what is not in the protocol.
+    /// The other side violated the protocol.
     #[error("the other side of the local link cannot be understood: {0}")]
     Record(#[from] RecordError),
     /// The other side is gone.
     #[error("the connection was closed by the other side")]
     Closed,
-    /// It did not answer.
+    /// The other side did not answer.
     #[error(
         "what listens at {place} does not greet: it hangs, or it is no node; look who it is \
          (`ss -xlp`, `ss -tlp`)"
     )]
     Mute {
-        /// Where.
+        /// The address.
         place: String,
     },
     /// This system has no Unix sockets.
     #[error("this system has no Unix sockets: use a port of loopback such as 127.0.0.1:37940")]
     NoUnixSockets,
-    /// Anything else that the operating system refuses.
+    /// Any other error of the operating system.
     #[error("{doing} failed: {source}")]
     Io {
-        /// What was attempted.
+        /// The attempted operation.
         doing: String,
-        /// The operating system's words.
+        /// The error of the operating system.
         source: io::Error,
     },
 }

@@ -1,4 +1,4 @@
-//! Where a node listens for component processes.
+//! The listener of a node for component processes.
 
 use std::io;
 use std::net::SocketAddr;
@@ -41,7 +41,8 @@ impl Listener {
             _ => Error::io(format!("listening on {port}"))(source),
         };
         let listen = || {
-            // With the address reused, as is usual for listeners: not in spite of a living one.
+            // On Unix this sets SO_REUSEADDR, as usual for listeners. It still fails if another
+            // listener is alive.
             let listener = std::net::TcpListener::bind(port)?;
             listener.set_nonblocking(true)?;
             TcpListener::from_std(listener)
@@ -50,7 +51,7 @@ impl Listener {
         listen().map(Self::Tcp).map_err(failed)
     }
 
-    /// Waits for the next component. An error concerns that one alone.
+    /// Waits for the next component. An error concerns only that component.
     pub(crate) async fn accept(&self) -> Result<Stream, Error> {
         match self {
             #[cfg(unix)]
@@ -63,7 +64,7 @@ impl Listener {
         }
     }
 
-    /// Where it is, for people.
+    /// Its address, for people.
     pub(crate) fn place(&self) -> String {
         match self {
             #[cfg(unix)]

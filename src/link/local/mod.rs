@@ -1,25 +1,25 @@
-//! The local link: how component processes of a host reach its node.
+//! The local link: connects component processes of a host to its node.
 //!
 //! A node that offers it listens on a Unix stream socket that only its owner may use, or on a TCP
-//! port of loopback. **Each component has a connection of its own**: a component that does not read
-//! fills its own socket and no other, the end of its process ends exactly its connection, and the
-//! sender's id is that of the connection, not of the message.
+//! port of loopback. **Each component has its own connection**: a component that does not read
+//! fills only its own socket, the end of its process ends exactly its connection, and the sender's
+//! id comes from the connection, not from the message.
 //!
-//! The connection carries [records](record) and not the frames of a stream link, because the
-//! component has no endpoint: acknowledgements, duplicates, fragments and routes are the node's.
-//! A message crosses whole, so that the kernel alone copies a large one, where AS5669A's size field
-//! would cut it every 64 KiB; its record says what a frame has no field for: the path on which a
-//! message came, and the number by which the component learns what became of it. An endpoint in each
-//! component process would process every message of a host three times.
+//! The connection carries [records](record) instead of the frames of a stream link, because the
+//! component has no endpoint: the node handles acknowledgements, duplicates, fragments and routes.
+//! A message is transferred whole, so that only the kernel copies a large one, whereas AS5669A's
+//! size field would split it every 64 KiB. A record has fields that a frame lacks: the path on
+//! which a message arrived, and the handle for its outcome. With an endpoint in each component
+//! process, every message within a host would be processed three times.
 //!
 //! | file | content |
 //! |---|---|
 //! | [`record`] | the records: pure functions between octets and records |
-//! | `assembler` | records out of a stream, without I/O |
+//! | `assembler` | extracts records from a stream, without I/O |
 //! | `connection` | the two halves of a connection, the same on both sides |
 //! | `stream` | the two kinds of stream, and the process at the other end |
-//! | `address`, `usual_place` | where the node listens |
-//! | `listener`, `unix_socket` | the node's side: directory and socket with their rights, stale sockets |
+//! | `address`, `usual_place` | the address at which the node listens |
+//! | `listener`, `unix_socket` | the node's side: directory and socket with their permissions, stale sockets |
 //!
 //! [`node`](crate::node) reads and answers the records.
 

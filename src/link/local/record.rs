@@ -1,8 +1,8 @@
-//! What a component process and its host's node write to each other.
+//! The wire format between a component process and its host's node.
 //!
-//! A record is a length (four octets, of what follows), a kind (one octet), the fields of that kind,
-//! and a payload up to the record's end: a message, a name, or an explanation for people. Numbers are
-//! little-endian, as everywhere in JAUS; the flags octet is that of AS5669A.
+//! A record consists of a length (four octets; counts what follows), a kind (one octet), the fields
+//! of that kind, and a payload up to the record's end: a message, a name, or an explanation for
+//! people. Numbers are little-endian, as everywhere in JAUS. The flags octet is that of AS5669A.
 //!
 //! | kind | | fields | payload |
 //! |---|---|---|---|
@@ -17,9 +17,9 @@
 //! A path is 00h for a message from the same node; 01h and the link u16 for a serial line; 02h, link
 //! u16, IPv6 address (IPv4 mapped), port u16 and scope u32 for a socket.
 //!
-//! The component begins with Hello, and the node answers with Welcome or Refused. Either side then
-//! writes when it has something. **Hello up to its version, and Refused, are the same in all
-//! versions**: components and nodes of different releases refuse each other with the reason.
+//! The component begins with Hello, and the node answers with Welcome or Refused. After that either
+//! side writes at any time. **Hello up to its version, and Refused, are the same in all versions**:
+//! components and nodes of different releases reject each other with a readable reason.
 
 use std::net::{IpAddr, Ipv6Addr, SocketAddr, SocketAddrV6};
 
@@ -31,15 +31,15 @@ use crate::wire::Flags;
 
 /// The version of the format.
 pub const VERSION: u8 = 2;
-/// Octets of the length in front of each record.
+/// Octets of the length field before each record.
 pub const LENGTH: usize = 4;
 /// The longest message that a record carries, in octets.
 pub const LONGEST_MESSAGE: usize = 16 << 20;
 /// The longest kind and fields, in octets.
 pub const LONGEST_HEAD: usize = 64;
-/// The longest record that a node reads before it knows the component, without the length.
+/// The longest record that a node reads before a component is attached, without the length field.
 pub const LONGEST_HELLO: usize = 512;
-/// Octets of a name or an explanation that are kept.
+/// Limit of octets of a name or an explanation; longer ones are truncated.
 const LONGEST_TEXT: usize = 255;
 
 const MAGIC: [u8; 4] = *b"JAUS";
@@ -49,7 +49,7 @@ const MAGIC: [u8; 4] = *b"JAUS";
 pub struct Record {
     /// Its kind and fields.
     pub head: Head,
-    /// All that follows them.
+    /// The rest of the record.
     pub payload: Bytes,
 }
 
@@ -58,18 +58,19 @@ pub struct Record {
 pub enum Head {
     /// A component's first record. The payload is its name.
     Hello {
-        /// The version of the format that it writes. Of other versions nothing more is read.
+        /// The version of its format. If it is another version, the rest is not read.
         version: u8,
-        /// The id that it wants; with subsystem and node 0, that component of whichever node it is.
+        /// The requested id. With subsystem and node 0, that component of the node, whatever its
+        /// id.
         id: JausId,
     },
-    /// A message from the component, whose id is that of the connection.
+    /// A message from the component. Its source id is that of the connection.
     Send {
-        /// Priority, scope, and whether the receiver is to acknowledge it.
+        /// Priority, scope, and whether to request an acknowledgement.
         flags: Flags,
-        /// The component's number for it.
+        /// The component's handle for it.
         handle: u64,
-        /// For whom; may hold wildcards.
+        /// Its destination; may have wildcards.
         destination: JausId,
     },
     /// The component leaves on purpose.
@@ -81,45 +82,45 @@ pub enum Head {
         /// The longest message that the node sends or receives, in octets.
         max_message: u32,
     },
-    /// The node has not attached the component. The payload says why.
+    /// The node has not attached the component. The payload is the reason.
     Refused(Reason),
     /// A message for the component.
     Deliver {
         /// Priority and scope.
         flags: Flags,
-        /// Who sent it.
+        /// Its source.
         source: JausId,
-        /// For whom, as the sender wrote it.
+        /// Its destination, as given by the sender.
         destination: JausId,
-        /// How it came to the node; `None` from a component of the same node.
+        /// The path on which it arrived; `None` from a component of the same node.
         path: Option<Path>,
     },
-    /// What has become of a message from the component.
+    /// The outcome of a message from the component.
     Outcome {
-        /// The component's number for it.
+        /// The component's handle for it.
         handle: u64,
-        /// What has become of it.
+        /// The outcome.
         outcome: Outcome,
     },
 }
 
-/// What has become of a message from a component.
+/// The outcome of a message from a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Its receiver has acknowledged it.
     Acknowledged,
     /// It was not acknowledged, and will not be sent again.
     NotAcknowledged {
-        /// Why not.
+        /// The reason.
         reason: Unacknowledged,
-        /// For whom it was.
+        /// Its destination.
         destination: JausId,
         /// Octets of it that were acknowledged.
         acknowledged: u32,
-        /// Octets of it in all.
+        /// Octets of the whole message.
         length: u32,
     },
-    /// The node did not send it. The payload says why.
+    /// The node rejected it. The payload is the reason.
     Rejected,
 }
 
@@ -133,7 +134,7 @@ pub enum Reason {
     Taken,
     /// The id belongs to another subsystem or node, or names no single component.
     WrongId,
-    /// The node has as many components as it may have.
+    /// The node's limit of components is reached.
     TooMany,
     /// The node is about to stop.
     Stopping,
@@ -141,27 +142,27 @@ pub enum Reason {
     Other(u8),
 }
 
-/// Why a stream cannot be read any further: the connection ends.
+/// Why a stream cannot be decoded any further. The connection ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
-    /// A record announces more octets than are allowed.
+    /// A record is longer than the limit.
     #[error("a record of {length} octets, where at most {limit} are allowed")]
     TooLong {
-        /// Octets that it announces.
+        /// Its length in octets.
         length: usize,
-        /// The most that are allowed.
+        /// The limit.
         limit: usize,
     },
-    /// Kind or fields cannot be read.
+    /// The kind or the fields are invalid.
     #[error("a record of kind {kind} and {length} octets that cannot be read")]
     Malformed {
         /// Its kind, 0 if it has none.
         kind: u8,
-        /// Octets of it.
+        /// Its length in octets.
         length: usize,
     },
-    /// A record that this side does not expect now.
+    /// A record that is not valid at this point.
     #[error("a record that is not expected here")]
     Unexpected,
 }
@@ -177,7 +178,7 @@ impl Record {
         }
     }
 
-    /// Why the node does not attach a component.
+    /// The refusal of a component.
     #[must_use]
     pub fn refused(reason: Reason, why: &str) -> Self {
         Self {
@@ -186,7 +187,7 @@ impl Record {
         }
     }
 
-    /// That the node did not send a message, and why.
+    /// The rejection of a message.
     #[must_use]
     pub fn rejected(handle: u64, why: &str) -> Self {
         let outcome = Outcome::Rejected;
@@ -196,7 +197,7 @@ impl Record {
         }
     }
 
-    /// The payload as text that any terminal can show, at most 255 octets of it.
+    /// The payload as text that is safe for a terminal, at most 255 octets of it.
     #[must_use]
     pub fn text(&self) -> String {
         let octets = &self.payload[..self.payload.len().min(LONGEST_TEXT)];
@@ -207,21 +208,21 @@ impl Record {
         String::from_utf8_lossy(octets).chars().map(shown).collect()
     }
 
-    /// Appends the record without its payload, which is to follow as it is.
+    /// Appends the record without its payload, which must follow unchanged.
     pub fn encode_head(&self, out: &mut Vec<u8>) {
         let start = out.len();
         out.put_u32_le(0);
         self.head.encode(out);
         let length = out.len() - start - LENGTH + self.payload.len();
-        // Longer payloads are refused where they are sent.
+        // Longer payloads are rejected before this.
         let length = u32::try_from(length).unwrap_or(u32::MAX);
         out[start..start + LENGTH].copy_from_slice(&length.to_le_bytes());
     }
 
-    /// Reads a record, given without its length.
+    /// Decodes a record without its length field.
     ///
     /// # Errors
-    /// [`RecordError::Malformed`] if its kind is unknown or its fields cannot be read.
+    /// [`RecordError::Malformed`] if its kind is unknown or its fields are invalid.
     pub fn decode(mut octets: Bytes) -> Result<Self, RecordError> {
         let (head, payload) = Head::split_off(&octets)?;
         octets.advance(octets.len() - payload.len());
@@ -231,7 +232,7 @@ impl Record {
         })
     }
 
-    /// The same, with a copy of the payload.
+    /// Like [`decode`](Self::decode), with a copy of the payload.
     pub(super) fn copy(octets: &[u8]) -> Result<Self, RecordError> {
         let (head, payload) = Head::split_off(octets)?;
         let payload = Bytes::copy_from_slice(payload);
@@ -294,7 +295,7 @@ impl Head {
         }
     }
 
-    /// The head of a record, and what follows it.
+    /// Splits a record into head and payload.
     fn split_off(octets: &[u8]) -> Result<(Self, &[u8]), RecordError> {
         let mut rest = octets;
         let head = Self::decode(&mut rest).ok_or_else(|| RecordError::Malformed {
@@ -347,7 +348,7 @@ impl Head {
 }
 
 impl Outcome {
-    /// The reasons by their codes, from 1 on.
+    /// The reasons in the order of their codes, from 1.
     const REASONS: [Unacknowledged; 3] = [
         Unacknowledged::TimedOut,
         Unacknowledged::Refused,
@@ -452,13 +453,13 @@ fn id(octets: &mut &[u8]) -> Option<JausId> {
     octets.try_get_u32_le().ok().map(JausId::from_u32)
 }
 
-/// Flags with a known scope, of a whole message.
+/// Flags of a whole message, with a valid scope.
 fn flags(octets: &mut &[u8]) -> Option<Flags> {
     let flags = Flags(octets.try_get_u8().ok()?);
     flags.broadcast().map(|_| flags)
 }
 
-/// A name or an explanation, up to a whole character.
+/// A name or an explanation, truncated at a character boundary.
 fn text(text: &str) -> Bytes {
     let mut end = text.len().min(LONGEST_TEXT);
     while !text.is_char_boundary(end) {

@@ -18,9 +18,9 @@ use super::{Address, Assembler, Error, usual_place};
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Process {
-    /// Its number, where the operating system tells.
+    /// Its process id, if the operating system reports it.
     pub pid: Option<u32>,
-    /// What it calls itself.
+    /// The name that it has sent.
     pub name: String,
 }
 
@@ -35,7 +35,7 @@ impl fmt::Display for Process {
     }
 }
 
-/// Both halves of a stream, and the process at the other end where the operating system tells.
+/// Both halves of a stream, and the process id of the other end if the operating system reports it.
 #[derive(Debug)]
 pub(crate) struct Stream {
     pub(crate) read: ReadHalf,
@@ -61,15 +61,15 @@ mod on_unix {
     use super::{Assembler, Stream};
     use crate::link::watch::watch;
 
-    /// The half of a stream that is read.
+    /// The reading half of a stream.
     #[derive(Debug)]
     pub(crate) struct ReadHalf(AsyncFd<Arc<Socket>>);
 
-    /// The half of a stream that is written.
+    /// The writing half of a stream.
     #[derive(Debug)]
     pub(crate) struct WriteHalf {
         socket: Arc<Socket>,
-        /// What is waited for while the socket is full.
+        /// Watches for room while the socket is full.
         full: Option<AsyncFd<Socket>>,
     }
 
@@ -85,7 +85,7 @@ mod on_unix {
     }
 
     impl ReadHalf {
-        /// Reads once, as much as there is room for; 0 octets mean the end.
+        /// Reads once, as much as fits; 0 octets mean the end.
         pub(in super::super) fn poll_read(
             &mut self,
             cx: &mut Context<'_>,
@@ -99,7 +99,7 @@ mod on_unix {
                 let Ok(read) = read else { continue };
                 match read {
                     Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-                    // It is empty now; the kernel tells of whatever comes, also of the end.
+                    // It is empty now. The kernel reports any further octets, and the end.
                     Ok(read) if read < octets => ready.clear_ready(),
                     _ => {}
                 }
@@ -109,12 +109,12 @@ mod on_unix {
     }
 
     impl WriteHalf {
-        /// Writes as much as can be written without waiting.
+        /// Writes as much as possible without waiting.
         pub(in super::super) fn try_write(&self, pieces: &[IoSlice<'_>]) -> io::Result<usize> {
             (&*self.socket).write_vectored(pieces)
         }
 
-        /// Waits until a socket that was full may have room again.
+        /// Waits until a full socket may have room again.
         pub(in super::super) fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
             let full = match &mut self.full {
                 Some(full) => full,
@@ -124,16 +124,17 @@ mod on_unix {
                 .map_ok(|mut ready| ready.clear_ready())
         }
 
-        /// Nothing waits to be written any more.
+        /// Call this when nothing is left to write.
         pub(in super::super) fn rest(&mut self) {
             self.full = None;
         }
     }
 
     impl Drop for WriteHalf {
-        /// The other side shall see the end, even while the half that is read is still held.
+        /// Closes both directions, so that the other side sees the end even while the reading half
+        /// is still held.
         fn drop(&mut self) {
-            // An error means that it is closed already.
+            // An error means that it is already closed.
             let _ = self.socket.shutdown(Shutdown::Both);
         }
     }
@@ -141,7 +142,7 @@ mod on_unix {
 
 #[cfg(not(unix))]
 mod elsewhere {
-    //! TCP sockets, as the runtime has them.
+    //! TCP sockets of the runtime.
 
     use std::io::{self, IoSlice};
     use std::pin::pin;
@@ -153,11 +154,11 @@ mod elsewhere {
 
     use super::{Assembler, Stream};
 
-    /// The half of a stream that is read.
+    /// The reading half of a stream.
     #[derive(Debug)]
     pub(crate) struct ReadHalf(tcp::OwnedReadHalf);
 
-    /// The half of a stream that is written.
+    /// The writing half of a stream.
     #[derive(Debug)]
     pub(crate) struct WriteHalf(tcp::OwnedWriteHalf);
 
@@ -170,7 +171,7 @@ mod elsewhere {
     }
 
     impl ReadHalf {
-        /// Reads once, as much as there is room for; 0 octets mean the end.
+        /// Reads once, as much as fits; 0 octets mean the end.
         pub(in super::super) fn poll_read(
             &mut self,
             cx: &mut Context<'_>,
@@ -183,29 +184,29 @@ mod elsewhere {
     }
 
     impl WriteHalf {
-        /// Writes as much as can be written without waiting.
+        /// Writes as much as possible without waiting.
         pub(in super::super) fn try_write(&self, pieces: &[IoSlice<'_>]) -> io::Result<usize> {
             self.0.try_write_vectored(pieces)
         }
 
-        /// Waits until a socket that was full may have room again.
+        /// Waits until a full socket may have room again.
         pub(in super::super) fn poll_room(&mut self, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
             self.0.as_ref().poll_write_ready(cx)
         }
 
-        /// Nothing waits to be written any more.
+        /// Call this when nothing is left to write.
         pub(in super::super) fn rest(&mut self) {}
     }
 }
 
 /// Both halves of a TCP stream.
 pub(super) fn tcp_stream(stream: TcpStream) -> io::Result<Stream> {
-    // Records are collected before they are written; waiting for more would only delay them.
+    // Records are collected before they are written, so waiting for more would only delay them.
     let _ = stream.set_nodelay(true);
     Stream::new(stream.into_std()?, None)
 }
 
-/// Both halves of a Unix stream, and the user at the other end.
+/// Both halves of a Unix stream, and the user id of the other end.
 #[cfg(unix)]
 pub(super) fn unix_stream(stream: UnixStream) -> io::Result<(Stream, u32)> {
     let peer = stream.peer_cred()?;
@@ -213,15 +214,15 @@ pub(super) fn unix_stream(stream: UnixStream) -> io::Result<(Stream, u32)> {
     Ok((stream, peer.uid()))
 }
 
-/// The number of the process at the other end, as credentials tell it.
+/// The process id of the other end, from its credentials.
 #[cfg(unix)]
 pub(super) fn pid_of(credentials: &UCred) -> Option<u32> {
     let pid = credentials.pid()?;
-    // 0 is what a process of another pid namespace looks like.
+    // A process of another pid namespace appears as 0.
     u32::try_from(pid).ok().filter(|&pid| pid != 0)
 }
 
-/// Reaches the node that serves components at an address.
+/// Connects to the node that serves components at an address.
 pub(crate) async fn connect(address: &Address) -> Result<Stream, Error> {
     match address {
         #[cfg(unix)]
@@ -242,7 +243,7 @@ async fn connect_unix(path: &std::path::Path) -> Result<Stream, Error> {
     let stream = UnixStream::connect(path).await.and_then(unix_stream);
     let (stream, uid) = stream.map_err(|error| unreachable(&place, error))?;
     let own = usual_place::own_uid();
-    // Root may do everything, also trust any user.
+    // Root may trust any user.
     if uid != own && uid != 0 && own != 0 {
         return Err(Error::Foreign { place, uid, own });
     }

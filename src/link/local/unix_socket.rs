@@ -1,8 +1,9 @@
-//! A node's socket in the file system: directory and socket with their rights, and stale sockets.
+//! A node's Unix socket: directory and socket with their permissions, and stale sockets.
 //!
-//! The socket lies in a directory in which only its owner can put anything, and is for the owner
-//! alone; besides, the operating system says whose process connects. Trying to connect tells the
-//! socket of a living node from one that a crashed node has left behind.
+//! The socket is in a directory that only its owner can write to, and is accessible to the owner
+//! alone. In addition the operating system reports the user of each connecting process. A
+//! connection attempt distinguishes the socket of a living node from one that a crashed node has
+//! left behind.
 
 use std::fs::{self, DirBuilder, Metadata, Permissions};
 use std::io::{self, ErrorKind};
@@ -20,7 +21,7 @@ use super::usual_place::{directory, own_uid, path};
 pub(crate) struct UnixSocket {
     listener: UnixListener,
     path: PathBuf,
-    /// Device and number of the socket's file: another may have taken its place.
+    /// Device and inode of the socket's file: another one may have replaced it.
     file: (u64, u64),
     owner: u32,
 }
@@ -65,18 +66,18 @@ impl Drop for UnixSocket {
     fn drop(&mut self) {
         let is_ours = |file: Metadata| (file.dev(), file.ino()) == self.file;
         if fs::symlink_metadata(&self.path).is_ok_and(is_ours) {
-            // A file that stays is recognised as stale by the next node.
+            // The next node recognises a remaining file as stale.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// The owner's components and root's.
+/// Accepts components of the owner and of root.
 const fn may_attach(uid: u32, owner: u32) -> bool {
     uid == owner || uid == 0
 }
 
-/// The usual path, in a directory that exists and is the owner's alone.
+/// The default path, in a directory that exists and is accessible to the owner alone.
 pub(super) fn make_default() -> Result<PathBuf, Error> {
     let directory = directory();
     match DirBuilder::new().mode(0o700).create(&directory) {
@@ -96,8 +97,9 @@ fn parent(path: &Path) -> &Path {
     }
 }
 
-/// Makes sure that nobody else can put anything into the directory: it is ours or root's, and
-/// none of the rights in `forbidden` is given, unless only owners can remove what is theirs.
+/// Checks that no other user can put files into the directory: it belongs to this user or root, and
+/// its mode has none of the bits in `forbidden`, except that a sticky directory, where only owners
+/// can remove their files, is allowed for 0o022.
 fn check_directory(directory: &Path, own: u32, forbidden: u32) -> Result<(), Error> {
     let unsafe_because = |why: String, remedy: String| {
         Err(Error::UnsafeDirectory {
@@ -108,7 +110,7 @@ fn check_directory(directory: &Path, own: u32, forbidden: u32) -> Result<(), Err
     };
     let doing = || format!("looking at {}", directory.display());
     let metadata = if forbidden == 0o077 {
-        // The directory that we make ourselves may be no link to elsewhere.
+        // The directory that this process creates itself must not be a symbolic link.
         fs::symlink_metadata(directory)
     } else {
         fs::metadata(directory)
@@ -137,7 +139,7 @@ fn check_directory(directory: &Path, own: u32, forbidden: u32) -> Result<(), Err
     Ok(())
 }
 
-/// Listens, in the place of a dead node's socket if need be.
+/// Listens on the socket, after replacing that of a dead node if necessary.
 fn bind(path: &Path) -> Result<UnixListener, Error> {
     let failed = |source| Error::io(format!("listening at {}", path.display()))(source);
     match UnixListener::bind(path) {
@@ -152,7 +154,7 @@ fn bind(path: &Path) -> Result<UnixListener, Error> {
         Found::Nothing => {}
         Found::Other => return Err(Error::NoSocket(path.to_owned())),
         Found::Alive(pid) => return served(pid),
-        // Moved away first: between looking and removing, another node may have come.
+        // Renamed first: between the check and the removal, another node may have started.
         Found::Dead => {
             let aside = path.with_extension(format!("dead-{}", std::process::id()));
             match fs::rename(path, &aside) {
@@ -173,7 +175,7 @@ fn bind(path: &Path) -> Result<UnixListener, Error> {
     }
 }
 
-/// What is in the place of our socket.
+/// What exists at the socket's path.
 enum Found {
     Nothing,
     Alive(Option<u32>),
@@ -197,7 +199,7 @@ fn look(path: &Path) -> Result<Found, Error> {
         }
         Err(error) if error.kind() == ErrorKind::ConnectionRefused => Ok(Found::Dead),
         Err(error) if error.kind() == ErrorKind::NotFound => Ok(Found::Nothing),
-        // Somebody listens whose queue is full.
+        // A listener with a full queue.
         Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(Found::Alive(None)),
         Err(error) => Err(Error::io(doing())(error)),
     }

@@ -1,9 +1,9 @@
-//! Where a node is found by whoever is told nothing else.
+//! The default address of a host's node.
 
 #[cfg(unix)]
 pub(super) use unix::{directory, own_uid, path};
 
-/// Where a node is found on systems without Unix sockets.
+/// The default address on systems without Unix sockets.
 #[cfg(not(unix))]
 pub(super) const PORT: std::net::SocketAddr =
     std::net::SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 37940);
@@ -12,12 +12,12 @@ pub(super) const PORT: std::net::SocketAddr =
 mod unix {
     use std::path::PathBuf;
 
-    /// The usual path of the socket, whether it is there or not.
+    /// The default path of the socket, whether or not it exists.
     pub(in super::super) fn path() -> PathBuf {
         directory().join("node.sock")
     }
 
-    /// The usual directory: the user's own for what runs, if there is one.
+    /// The default directory: in the user's runtime directory, if there is one.
     pub(in super::super) fn directory() -> PathBuf {
         let given = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
         if let Some(directory) = given.filter(|directory| directory.is_absolute()) {
@@ -31,7 +31,7 @@ mod unix {
         PathBuf::from(format!("/tmp/jaus-{uid}"))
     }
 
-    /// The user that this process acts for.
+    /// The effective user id of this process.
     pub(in super::super) fn own_uid() -> u32 {
         rustix::process::geteuid().as_raw()
     }

@@ -1,4 +1,4 @@
-//! Why a serial port cannot be used, and what to do about it.
+//! Errors of a serial port, with their remedies.
 
 use std::fmt;
 use std::io;
@@ -12,11 +12,11 @@ use serial2_tokio::SerialPort;
     remedy(source)
 )]
 pub struct SerialError {
-    /// The port, as it was given.
+    /// The port as given.
     pub device: String,
-    /// What else there is.
+    /// The existing ports.
     pub ports: Ports,
-    /// The operating system's words.
+    /// The error of the operating system.
     pub source: io::Error,
 }
 
@@ -58,7 +58,7 @@ impl fmt::Display for Ports {
 
 fn remedy(error: &io::Error) -> &'static str {
     use io::ErrorKind::{InvalidInput, NotFound, PermissionDenied, ResourceBusy};
-    /// The same number on all Unix systems: an ioctl for a terminal that the file is not.
+    /// ENOTTY has this number on all Unix systems: a terminal ioctl on a file that is no terminal.
     const ENOTTY: i32 = 25;
     match error.kind() {
         NotFound => "plug it in or choose another",

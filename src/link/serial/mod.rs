@@ -1,12 +1,12 @@
-//! A serial line with whoever is at its other end. It carries JSerial.
+//! The serial link: one serial line, carrying JSerial.
 //!
-//! Behind the line any number of JAUS ids may live. What is for everyone goes to the line too, as
-//! there is nothing else on it. Lines are slow: what the operating system does not take waits,
-//! bounded, the urgent first; when there is no more room, the oldest of the least urgent goes.
+//! Any number of JAUS ids may be reached over the line. Broadcasts go to the line too. Lines are
+//! slow: data that the operating system does not take yet waits in a bounded queue, most urgent
+//! first. When the queue is full, the oldest packet of the lowest priority is dropped.
 //!
-//! The port must be usable when the link is opened. When it goes away later, as USB ports do, it
-//! is opened again, with pauses from [`FIRST_PAUSE`] to [`LONGEST_PAUSE`]; what is sent meanwhile is
-//! lost, and counted, since nobody wants old commands when the line is back.
+//! The port must be usable when the link is opened. If it disappears later, as USB ports do, it is
+//! reopened, with pauses from [`FIRST_PAUSE`] to [`LONGEST_PAUSE`]. Packets sent meanwhile are
+//! dropped and counted, because old commands are useless when the line is back.
 //!
 //! The port is driven through `serial2-tokio`, which needs no C library such as libudev.
 
@@ -31,42 +31,43 @@ use crate::endpoint::Transmit;
 use crate::wire::Frame;
 use crate::wire::jserial::{self, Decoder};
 
-/// The pause before a port that has gone is opened again. It doubles with each failure.
+/// The pause before a lost port is reopened. It doubles with each failure.
 pub const FIRST_PAUSE: Duration = Duration::from_millis(250);
-/// The longest pause between two attempts to open a port again.
+/// The longest pause between attempts to reopen a port.
 pub const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
-/// What waits for the line. The octets have room for one message of the usual greatest length.
+/// Limits of the queue to the line. The octets leave room for one message of the default maximum
+/// length.
 const OUTBOX: Bounds = Bounds {
     items: 1024,
     octets: 1 << 20,
 };
 
-/// Octets read at once. The operating system keeps no more than these for a line.
+/// Octets per read. The operating system buffers no more than this for a line.
 const CHUNK: usize = 4096;
-/// Chunks taken from a line before the other links have their turn.
+/// Chunks read from a line before the other links have their turn.
 const BATCH: usize = 8;
 
-/// What a serial link has done since it was opened.
+/// Counts of a serial link since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Counters {
-    /// What the line has brought: packets, messages, and what could not be used.
+    /// Received packets and messages, and errors.
     pub received: jserial::Counters,
-    /// Packets given to the operating system.
+    /// Packets passed to the operating system.
     pub sent: u64,
-    /// Packets lost because the line was slower for too long.
+    /// Packets dropped because the line was too slow.
     pub send_overflows: u64,
-    /// Packets lost because the port was away.
+    /// Packets dropped because the port was away.
     pub port_away: u64,
     /// How often the port went away.
     pub failures: u64,
 }
 
-/// What has happened on a line.
+/// An event on a line.
 #[derive(Debug)]
 pub enum Arrival {
-    /// A message came.
+    /// A message was received.
     Frame(Frame),
     /// The port is gone.
     Lost,
@@ -79,7 +80,7 @@ pub struct SerialLink {
     port: Result<SerialPort, Away>,
     decoder: Decoder,
     outbox: Backlog<Bytes>,
-    /// The packet that is on its way into the operating system.
+    /// The packet that is being written.
     leaving: Bytes,
     counters: Counters,
 }
@@ -87,12 +88,12 @@ pub struct SerialLink {
 /// A port that is gone.
 #[derive(Debug)]
 struct Away {
-    /// When it is opened again; `None` until the clock is known, and while an attempt is under way.
+    /// When to reopen it; `None` until the time is known, and during an attempt.
     retry_at: Option<Instant>,
-    /// The attempt to open it, on a thread of its own: a driver may take its time.
+    /// The attempt to open it, on its own thread, because a driver may take time.
     opening: Option<JoinHandle<io::Result<SerialPort>>>,
     pause: Duration,
-    /// Whether the other side has been told.
+    /// Whether [`Arrival::Lost`] was reported.
     told: bool,
 }
 
@@ -100,7 +101,7 @@ impl SerialLink {
     /// Opens the port.
     ///
     /// # Errors
-    /// What is wrong with the port, and what to do.
+    /// [`SerialError`] names the problem and a remedy.
     pub fn open(settings: &Settings) -> Result<Self, SerialError> {
         let port = settings.open();
         let port = port.map_err(|source| SerialError::new(&settings.device, source))?;
@@ -119,19 +120,19 @@ impl SerialLink {
         })
     }
 
-    /// How it is set up.
+    /// Its settings.
     #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Whether the port is there just now.
+    /// Whether the port is open at present.
     #[must_use]
     pub const fn is_open(&self) -> bool {
         self.port.is_ok()
     }
 
-    /// What it has done so far.
+    /// Its counters so far.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         Counters {
@@ -140,7 +141,7 @@ impl SerialLink {
         }
     }
 
-    /// Queues what the endpoint gives out, for [`poll_flush`](Self::poll_flush).
+    /// Queues a packet from the endpoint, for [`poll_flush`](Self::poll_flush).
     pub fn transmit(&mut self, transmit: &Transmit) {
         if self.port.is_err() {
             self.counters.port_away += 1;
@@ -151,7 +152,7 @@ impl SerialLink {
         self.counters.send_overflows += self.outbox.push(transmit.priority, octets, payload);
     }
 
-    /// Writes what waits, as fast as the line takes it; ready when nothing waits any more.
+    /// Writes queued packets, as fast as the line takes them; ready when none is left.
     pub fn poll_flush(&mut self, cx: &mut Context<'_>) -> Poll<()> {
         while let Ok(port) = &mut self.port {
             if self.leaving.is_empty() {
@@ -168,7 +169,7 @@ impl SerialLink {
                 Err(error) => self.lose(&error),
             }
             if self.port.is_err() {
-                // For the next `receive`, which tells and opens it again.
+                // For the next `receive`, which reports the loss and reopens the port.
                 cx.waker().wake_by_ref();
             }
         }
@@ -181,8 +182,8 @@ impl SerialLink {
         self.port.as_ref().err().and_then(|away| away.retry_at)
     }
 
-    /// Takes in what has arrived, and opens the port again if it was gone; whether there was more
-    /// than the line's share.
+    /// Receives data, and reopens a lost port. Returns whether there was more than the line's
+    /// share.
     pub fn receive(
         &mut self,
         cx: &mut Context<'_>,
@@ -234,7 +235,7 @@ impl SerialLink {
         }
     }
 
-    /// The port is gone.
+    /// Handles the loss of the port.
     fn lose(&mut self, error: &io::Error) {
         tracing::warn!(device = self.settings.device, %error, "serial port lost; it is tried again");
         self.counters.failures += 1;
@@ -248,7 +249,7 @@ impl SerialLink {
             told: false,
         });
         let port = std::mem::replace(&mut self.port, away);
-        // Closing waits for what the driver has not written yet.
+        // Closing blocks until the driver has written its buffer.
         spawn_blocking(move || drop(port));
     }
 
@@ -269,7 +270,7 @@ impl SerialLink {
             return;
         };
         away.opening = None;
-        // An attempt that the runtime gave up has failed too.
+        // An attempt that the runtime has cancelled counts as failed.
         match opened.map_err(io::Error::from).flatten() {
             Ok(port) => {
                 tracing::info!(device = self.settings.device, "serial port is back");

@@ -1,16 +1,17 @@
-//! How a serial line is set up. Both ends must agree; nothing on the line tells.
+//! The settings of a serial line. Both ends must agree; they are not negotiated.
 
 use serial2_tokio as serial2;
 
-/// How a [`SerialLink`](super::SerialLink) is set up. Characters have 8 bits: the framing needs them.
+/// The settings of a [`SerialLink`](super::SerialLink). Characters have 8 bits, as the framing
+/// requires.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Settings {
     /// The port: a path such as `/dev/ttyUSB0`, on Windows a name such as `COM3`. Paths under
-    /// `/dev/serial/by-id` stay the same when ports are plugged in in another order.
+    /// `/dev/serial/by-id` do not change when ports are plugged in in another order.
     pub device: String,
-    /// Bits per second, 115200 by default, as USB converters and boards have it. (Junior's default
+    /// Bits per second. The default is 115200, as for USB converters and boards. (Junior's default
     /// is 19200.)
     #[cfg_attr(feature = "serde", serde(default = "usual_baud"))]
     pub baud: u32,
@@ -20,7 +21,7 @@ pub struct Settings {
     /// The stop bits, 1 or 2.
     #[cfg_attr(feature = "serde", serde(default = "one"))]
     pub stop_bits: u8,
-    /// How a receiver that cannot follow stops the sender. (Junior's default is hardware.)
+    /// How a slow receiver stops the sender. (Junior's default is hardware.)
     #[cfg_attr(feature = "serde", serde(default))]
     pub flow_control: FlowControl,
 }
@@ -30,7 +31,7 @@ pub struct Settings {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum Parity {
-    /// There is none.
+    /// No parity bit.
     #[default]
     None,
     /// It makes the number of ones odd.
@@ -39,15 +40,15 @@ pub enum Parity {
     Even,
 }
 
-/// How a receiver that cannot follow stops the sender.
+/// How a slow receiver stops the sender.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "lowercase"))]
 pub enum FlowControl {
-    /// It does not: three wires are enough.
+    /// It cannot: three wires are enough.
     #[default]
     None,
-    /// By the wires RTS and CTS.
+    /// With the wires RTS and CTS.
     Hardware,
 }
 
@@ -61,7 +62,8 @@ const fn one() -> u8 {
 }
 
 impl Settings {
-    /// The usual settings: 115200 bits per second, 8 bits, no parity, one stop bit, no flow control.
+    /// The default settings: 115200 bits per second, 8 bits, no parity, one stop bit, no flow
+    /// control.
     #[must_use]
     pub fn new(device: impl Into<String>) -> Self {
         Self {

@@ -1,9 +1,10 @@
-//! Whether a new connection gets a place, and which other connection loses its own for it.
+//! Admission control: decides whether a new connection gets a place, and which connection it
+//! displaces.
 //!
-//! The node cannot tell a peer from an attacker before something arrives, and not always then. So
-//! places are shared between network addresses: no address holds more than its quota, and when all
-//! places are taken, the address that holds the most gives one up. An idle peer keeps its connection
-//! as long as there is room.
+//! The node cannot tell a peer from an attacker before data arrives, and not always then. So places
+//! are shared among network addresses: no address gets more than its quota, and when all places are
+//! taken, the address with the most places gives one up. An idle peer keeps its connection while
+//! there is room.
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -13,40 +14,41 @@ use std::time::Instant;
 use super::settings::HANDSHAKE;
 use crate::endpoint::quota_address;
 
-/// The most connections that others may open.
+/// Limits of accepted connections.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Quota {
-    /// All together.
+    /// Of all addresses together.
     pub(super) total: usize,
-    /// From one network address.
+    /// Of one network address.
     pub(super) per_address: usize,
 }
 
-/// A connection that somebody else has opened.
+/// An accepted connection.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) remote: SocketAddr,
     pub(super) opened: Instant,
-    /// When the latest valid message came.
+    /// When the last valid message arrived.
     pub(super) heard: Option<Instant>,
 }
 
-/// The answer to a newcomer.
+/// The decision about a new connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Admission {
     /// There is room.
     Admit,
-    /// There is room once this connection is closed, which has said nothing valid in its time.
+    /// There is room after closing this connection, which has sent nothing valid within
+    /// [`HANDSHAKE`].
     ReplaceSilent(SocketAddr),
-    /// There is room once this connection is closed: its network address holds the most places,
-    /// and it has been idle for longest.
+    /// There is room after closing this connection: its network address has the most places, and it
+    /// has been idle the longest.
     ReplaceIdle(SocketAddr),
     /// There is no room.
     Refuse,
 }
 
 impl Quota {
-    /// Decides about a newcomer at `remote`, given the connections that others have opened.
+    /// Decides about a new connection from `remote`, given the accepted connections.
     pub(super) fn admit(self, remote: SocketAddr, places: &[Place], now: Instant) -> Admission {
         let newcomer = quota_address(remote.ip());
         let mut held = BTreeMap::<IpAddr, usize>::new();
@@ -66,7 +68,8 @@ impl Quota {
             let others = places
                 .iter()
                 .filter(|place| held_by(place.source()) > own + 1);
-            // An address with one place gives it up for one without, the longest idle of all.
+            // An address with one place gives it up for an address with none; the longest idle one
+            // goes.
             let any = places.iter().filter(|_| own == 0);
             let key =
                 |place: &&Place| (Reverse(held_by(place.source())), place.heard, place.opened);

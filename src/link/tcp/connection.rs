@@ -1,4 +1,4 @@
-//! One TCP connection: frames in, messages out, and what waits because the other side is slower.
+//! One TCP connection: decodes received frames, and queues messages for a slow receiver.
 
 use std::io;
 use std::net::SocketAddr;
@@ -15,12 +15,12 @@ use crate::wire::jtcp::{Decoder, split_version};
 use crate::wire::judp::{VERSION_AS5669, VERSION_AS5669A};
 use crate::wire::{self, Frame, Priority, Version};
 
-/// Octets that are read, and written, with one call. Many small messages share it: one call for
-/// each would cost most of the time.
+/// Octets read or written with one call. Many small messages share a call: one call each would take
+/// most of the time.
 const CHUNK: usize = 64 * 1024;
 
-/// When so many more octets wait, they are written at once and not when the node has its turn: a
-/// component may send much before it comes to that.
+/// Growth of the backlog, in octets, at which it is written at once instead of in the node's next
+/// turn: a component may send much before that.
 const WRITE_AT_ONCE: usize = 32 * 1024;
 
 /// Why a connection was closed.
@@ -33,20 +33,20 @@ pub enum Closed {
     /// The other side closed it within a message.
     #[error("the other side closed it within a message")]
     CutShort,
-    /// What came is no JAUS, or out of step: nothing behind it can be trusted.
+    /// The input is not JAUS, or out of step. Nothing after it can be trusted.
     #[error("{0}")]
     Malformed(wire::Error),
-    /// The other side has taken nothing for [`STUCK`], while messages for it were lost.
+    /// The other side has taken nothing for [`STUCK`] while messages for it were dropped.
     #[error("the other side took nothing for {} s while messages for it were lost", STUCK.as_secs())]
     Stuck,
-    /// It had said nothing valid, and its place was needed.
+    /// It had sent nothing valid, and its place was needed.
     #[error("it had said nothing valid and its place was needed")]
     Silent,
-    /// It was idle for longest at the network address that held the most connections, and its place
-    /// was needed.
+    /// It was idle the longest at the network address with the most connections, and its place was
+    /// needed.
     #[error("it was idle, others from its address hold the most places, and its place was needed")]
     Idle,
-    /// The operating system's words.
+    /// An error of the operating system.
     #[error("{0}")]
     Io(io::Error),
 }
@@ -54,28 +54,29 @@ pub enum Closed {
 #[derive(Debug)]
 pub(super) struct Connection {
     stream: TcpStream,
-    /// The address of this end, unless the connection broke as soon as it stood.
+    /// The address of this end, unless the connection failed at once.
     pub(super) local: Option<SocketAddr>,
     pub(super) dialed: bool,
     pub(super) opened: Instant,
     decoder: Decoder,
     /// Frames received.
     pub(super) received: u64,
-    /// When the latest came.
+    /// When the last frame arrived.
     pub(super) heard: Option<Instant>,
-    /// The version octet that our direction began with.
+    /// The version octet with which our direction began.
     spoken: Option<Version>,
     backlog: Backlog<Bytes>,
-    /// On its way into the kernel; nothing overtakes it.
+    /// Octets being passed to the kernel; nothing overtakes them.
     leaving: BytesMut,
-    /// As soon as so many octets wait, they are written.
+    /// The backlog is written at once when it reaches this many octets.
     write_at: usize,
-    /// Messages lost because the other side is slower.
+    /// Messages dropped because the other side was too slow.
     pub(super) overflows: u64,
-    /// Messages lost, and no octet taken, since when; `None` in it until the clock is known.
+    /// Set when messages were dropped and no octet taken since: the time, or `None` in it until the
+    /// time is known.
     stuck: Option<Option<Instant>>,
     failed: Option<io::Error>,
-    /// Whether we have said that nothing more comes.
+    /// Whether the sending direction is shut down.
     hung_up: bool,
 }
 
@@ -110,23 +111,23 @@ impl Connection {
         self.backlog.len()
     }
 
-    /// Octets of them.
+    /// Octets of the waiting messages.
     pub(super) fn waiting_octets(&self) -> usize {
         self.backlog.octets()
     }
 
-    /// Drops the oldest of the least urgent messages that wait.
+    /// Drops the oldest waiting message of the lowest priority.
     pub(super) fn drop_least(&mut self) {
         if self.backlog.drop_least() {
             self.count_lost(1);
         }
     }
 
-    /// Queues what [`jtcp::encode`](crate::wire::jtcp::encode) wrote. Whether it could be: a
-    /// connection carries one version.
+    /// Queues the output of [`jtcp::encode`](crate::wire::jtcp::encode). Returns whether it was
+    /// accepted: a connection carries only one version.
     pub(super) fn send(&mut self, priority: Priority, encoded: &Bytes) -> bool {
         let (version, message) = split_version(encoded.clone());
-        // Who writes the version octet before each message may need it there to read one (JAUS++).
+        // A peer that sends the version octet before each message may need it there, too (JAUS++).
         let repeats = self.spoken.is_some() && self.decoder.repeats_version();
         let message = if repeats { encoded.clone() } else { message };
         let spoken = *self.spoken.get_or_insert_with(|| {
@@ -155,8 +156,8 @@ impl Connection {
         }
     }
 
-    /// Writes what the kernel takes without asking the runtime, which learns only between tasks
-    /// that there is room again.
+    /// Writes what the kernel takes without asking the runtime, which notices free room only
+    /// between tasks.
     fn write_straight(&mut self) {
         while self.fill() {
             match SockRef::from(&self.stream).send(&self.leaving) {
@@ -169,7 +170,7 @@ impl Connection {
         self.write_at = self.backlog.octets() + WRITE_AT_ONCE;
     }
 
-    /// Writes what waits; ready when nothing waits any more, or never will.
+    /// Writes queued messages; ready when none is left, or writing has failed.
     pub(super) fn poll_flush(&mut self, cx: &mut Context<'_>, now: Instant) -> Poll<()> {
         while self.failed.is_none() && self.fill() {
             if let Some(since @ None) = &mut self.stuck {
@@ -188,7 +189,7 @@ impl Connection {
         Poll::Ready(())
     }
 
-    /// Collects what is written with one call, the urgent first; whether there is anything.
+    /// Collects octets for one call, most urgent first; returns whether there are any.
     fn fill(&mut self) -> bool {
         while self.leaving.len() < CHUNK
             && let Some(message) = self.backlog.pop()
@@ -208,12 +209,12 @@ impl Connection {
         }
     }
 
-    /// Says that nothing more comes, once nothing waits any more. What the other side still has to
-    /// say is to be read: closing at once would tell it that something was lost.
+    /// Shuts down the sending direction when nothing is left to send. The other side's data must
+    /// still be read: closing at once would signal a loss to it.
     pub(super) fn hang_up(&mut self) {
         if !self.hung_up && self.leaving.is_empty() && self.backlog.is_empty() {
             self.hung_up = true;
-            // Where that fails there is nobody any more.
+            // If that fails, the other side is gone.
             let _ = SockRef::from(&self.stream).shutdown(std::net::Shutdown::Write);
         }
     }
@@ -227,7 +228,7 @@ impl Connection {
         self.stuck.flatten().map(|since| since + STUCK)
     }
 
-    /// The next frame, or why there will be none.
+    /// The next frame, or the reason why there are no more.
     pub(super) fn poll_recv(
         &mut self,
         cx: &mut Context<'_>,
@@ -252,7 +253,7 @@ impl Connection {
         }
     }
 
-    /// Whether a version octet stood before the latest frame that was not the stream's first octet.
+    /// Whether a version octet preceded the last frame that was not the stream's first octet.
     pub(super) const fn repeats_version(&self) -> bool {
         self.decoder.repeats_version()
     }

@@ -1,4 +1,4 @@
-//! Connecting to a configured peer, again and again, with growing pauses.
+//! Dials a configured peer: reconnects with growing pauses.
 
 use std::fmt;
 use std::hash::{BuildHasher, RandomState};
@@ -17,24 +17,24 @@ use crate::wire::Priority;
 
 type Connecting = Pin<Box<dyn Future<Output = io::Result<TcpStream>> + Send>>;
 
-/// A peer that is to be connected to.
+/// A peer to connect to.
 #[derive(Debug)]
 pub(super) struct Dial {
     pub(super) address: SocketAddr,
     state: State,
     failures: u32,
-    /// For the peer, while an attempt is under way.
+    /// Messages for the peer during an attempt.
     pub(super) waiting: Backlog<(Priority, Bytes)>,
 }
 
 enum State {
-    /// A connection stands.
+    /// There is a connection.
     Connected,
     Connecting {
         attempt: Connecting,
         until: Instant,
     },
-    /// There is none, and until then there will be no attempt; `None`: at once.
+    /// No attempt before this time; `None` means at once.
     Pausing(Option<Instant>),
 }
 
@@ -58,21 +58,21 @@ impl Dial {
         }
     }
 
-    /// Whether a connection stands.
+    /// Whether there is a connection.
     pub(super) const fn is_connected(&self) -> bool {
         matches!(self.state, State::Connected)
     }
 
-    /// Keeps a message for the connection, before the first attempt and during each. In the pauses
-    /// it would wait for too long to be of use. Returns how many messages were lost, this one or
-    /// others, or `None` if none is kept.
+    /// Queues a message for the connection, before the first attempt and during each one. In the
+    /// pauses it would wait too long to be useful. Returns how many messages were dropped, this one
+    /// or others, or `None` if messages are not queued now.
     pub(super) fn keep(&mut self, priority: Priority, payload: &Bytes) -> Option<u64> {
         let keeps = matches!(self.state, State::Connecting { .. } | State::Pausing(None));
         let waiting = (priority, payload.clone());
         keeps.then(|| self.waiting.push(priority, payload.len(), waiting))
     }
 
-    /// When to poll again, if nothing happens before.
+    /// When to poll again if nothing happens before.
     pub(super) const fn deadline(&self) -> Option<Instant> {
         match self.state {
             State::Connected => None,
@@ -81,7 +81,7 @@ impl Dial {
         }
     }
 
-    /// A connection, or why an attempt has failed.
+    /// A new connection, or the error of a failed attempt.
     pub(super) fn poll(
         &mut self,
         cx: &mut Context<'_>,
@@ -113,7 +113,7 @@ impl Dial {
         }
     }
 
-    /// The connection is gone; `was_good` if something valid had come through it.
+    /// Handles the loss of the connection; `was_good` if a valid message had arrived on it.
     pub(super) fn lost(&mut self, now: Instant, was_good: bool) {
         if was_good {
             self.failures = 0;
@@ -129,7 +129,7 @@ impl Dial {
     }
 }
 
-/// The pause after so many failures before, with a quarter more or less by chance.
+/// The pause after this many earlier failures, ± 25 % at random.
 fn pause(failures: u32, chance: u64) -> Duration {
     let doubled = FIRST_PAUSE
         .saturating_mul(1 << failures.min(16))

@@ -1,32 +1,32 @@
-//! The TCP link of a node: connections that others open to it, and those that it opens to
-//! configured peers. They carry JTCP.
+//! The TCP link of a node: accepted connections, and connections to configured peers. They carry
+//! JTCP.
 //!
-//! Any number of JAUS ids may live behind a connection. Messages are sent to the *connection*, named
-//! by its remote address, that an id was heard on last, whoever opened it; so when two nodes have
-//! connected to each other, both connections live, and each direction settles on one. Junior
-//! opens a connection for each id and version and answers on the connection that it was asked on,
-//! which comes to the same.
+//! Any number of JAUS ids may be reached over a connection. Messages for an id go to the
+//! *connection*, named by its remote address, on which the id was last heard, whichever side opened
+//! it. So when two nodes have connected to each other, both connections stay, and each direction
+//! settles on one. Junior opens a connection per id and version and replies on the connection of
+//! the query, which is compatible.
 //!
-//! # Nobody waits for a slow peer
+//! # Slow peers
 //!
-//! Each connection has a backlog of its own, bounded, the urgent first. A peer that does not read
-//! loses the oldest of its own least urgent messages; when it has taken nothing for
-//! [`STUCK`] since the first loss, its connection is closed. Messages
-//! are collected until the node has nothing more to send just now, and written with one call.
+//! Each connection has its own bounded backlog, most urgent first. If a peer does not read, the
+//! oldest of its own least urgent messages are dropped. If it has taken nothing for [`STUCK`] since
+//! the first loss, its connection is closed. Messages are collected until the node has nothing more
+//! to send at the moment, and then written with one call.
 //!
-//! All backlogs together have a bound too, at which the largest gives way.
+//! All backlogs together have a limit too, at which the largest one drops messages.
 //!
 //! # Connecting
 //!
-//! An attempt may take [`CONNECT_TIMEOUT`]. The pause after it is [`FIRST_PAUSE`] and doubles with
-//! each failure up to [`LONGEST_PAUSE`], a quarter more or less by chance; a connection on
-//! which something valid came begins anew. What is sent while an attempt is under way, to the peer or
-//! to everyone, waits for it, and is lost when it fails; what is sent in the pauses is lost at once.
-//! Both is counted.
+//! An attempt takes at most [`CONNECT_TIMEOUT`]. The pause after it is [`FIRST_PAUSE`] and doubles
+//! with each failure up to [`LONGEST_PAUSE`], ± 25 % at random. A connection on which a valid
+//! message arrived resets the pause. Messages sent during an attempt, to the peer or to everyone,
+//! wait for it, and are dropped if it fails. Messages sent in the pauses are dropped at once. Both
+//! are counted.
 //!
 //! # Accepting
 //!
-//! [`Settings::access`] is asked first. The places for accepted connections are shared between
+//! [`Settings::access`] is checked first. The places for accepted connections are shared among
 //! network addresses: see [`Settings::max_accepted`] and [`Settings::max_per_address`].
 
 mod admission;
@@ -55,78 +55,78 @@ use connection::Connection;
 use dial::Dial;
 use settings::MAX_WAITING;
 
-/// Frames taken from one connection, and connections accepted, before the others have their turn.
+/// Frames from one connection, and connections accepted, before the others have their turn.
 const BATCH: usize = 32;
-/// The pause after the operating system refused to accept a connection, such as for want of file
-/// descriptors.
+/// The pause after the operating system failed to accept a connection, for instance without free
+/// file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_secs(1);
-/// A backlog up to so many octets is not worth adding up all of them.
+/// For a backlog up to this size the total of all backlogs is not computed.
 const SMALL: usize = 64 * 1024;
-/// The time between two warnings that places are scarce.
+/// The shortest interval between warnings about scarce places.
 const WARNING_PAUSE: Duration = Duration::from_secs(60);
 
-/// What a TCP link has done since it was opened.
+/// Counts of a TCP link since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Counters {
-    /// Connections that others have opened.
+    /// Accepted connections.
     pub accepted: u64,
-    /// Connections that others wanted to open, refused because there were enough.
+    /// Incoming connections refused because the limit was reached.
     pub refused: u64,
-    /// Connections that others wanted to open, refused because their network address may not.
+    /// Incoming connections refused because access denies their network address.
     pub denied: u64,
     /// Connections closed to make room for others.
     pub displaced: u64,
     /// Connections opened to configured peers.
     pub connected: u64,
-    /// Attempts that failed.
+    /// Failed attempts to connect.
     pub connect_failures: u64,
-    /// Connections closed, whatever the reason.
+    /// Connections closed for any reason.
     pub closed: u64,
-    /// Of those: because of what came on them.
+    /// Of those: because of malformed input.
     pub malformed: u64,
     /// Of those: because the other side took nothing.
     pub stuck: u64,
     /// Messages received.
     pub received: u64,
-    /// Messages given to a connection, each copy counted.
+    /// Messages passed to a connection; each copy counts.
     pub sent: u64,
-    /// Messages lost because the other side was slower for too long.
+    /// Messages dropped because the other side was too slow.
     pub send_overflows: u64,
-    /// Messages lost because there was no connection to send them on.
+    /// Messages dropped because there was no connection for them.
     pub not_connected: u64,
-    /// Messages lost because the connection carries another version of the transport.
+    /// Messages dropped because the connection carries another version of the transport.
     pub other_version: u64,
 }
 
-/// One connection, as it is now.
+/// The current state of one connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ConnectionReport {
     /// The address of the other end.
     pub remote: SocketAddr,
-    /// The address of this end, unless the connection is just breaking.
+    /// The address of this end, unless the connection is failing.
     pub local: Option<SocketAddr>,
     /// Whether this side opened it.
     pub dialed: bool,
-    /// Messages that came on it.
+    /// Messages received on it.
     pub received: u64,
     /// Messages that wait for the other side.
     pub waiting: usize,
-    /// Messages lost because the other side was slower for too long.
+    /// Messages dropped because the other side was too slow.
     pub overflows: u64,
 }
 
-/// What has happened on a link.
+/// An event on a link.
 #[derive(Debug)]
 pub enum Arrival {
-    /// A message came from this remote address.
+    /// A message was received from this remote address.
     Frame {
         /// The remote address.
         remote: SocketAddr,
         /// The message.
         frame: Frame,
-        /// Whether a version octet stood before it that was not the stream's first octet.
+        /// Whether a version octet preceded it that was not the stream's first octet.
         version_again: bool,
     },
     /// The connection with this remote address is gone.
@@ -140,7 +140,7 @@ pub struct TcpLink {
     local: Option<SocketAddr>,
     quota: Quota,
     access: Access,
-    /// When the latest warning about scarce places was written.
+    /// When the last warning about scarce places was logged.
     warned: Option<Instant>,
     accept_after: Option<Instant>,
     dials: Vec<Dial>,
@@ -150,8 +150,7 @@ pub struct TcpLink {
 }
 
 impl TcpLink {
-    /// Opens the listener, if one is wanted. Connecting begins with the first
-    /// [`receive`](Self::receive).
+    /// Opens the listener, if configured. The first [`receive`](Self::receive) starts to connect.
     ///
     /// # Errors
     /// [`Error::ListenerTaken`], [`Error::Permission`], [`Error::AddressGone`] or [`Error::Io`].
@@ -182,13 +181,13 @@ impl TcpLink {
         })
     }
 
-    /// Where others may connect to.
+    /// The address that accepts connections, if any.
     #[must_use]
     pub const fn local(&self) -> Option<SocketAddr> {
         self.local
     }
 
-    /// What it has done so far.
+    /// Its counters so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
         let open: u64 = self.connections.values().map(|c| c.overflows).sum();
@@ -220,12 +219,12 @@ impl TcpLink {
         dials.chain(stuck).chain(self.accept_after).min()
     }
 
-    /// Sends what the endpoint gives out: queues it, until [`poll_flush`](Self::poll_flush) or until
-    /// there is enough for one call.
+    /// Queues a message from the endpoint, until [`poll_flush`](Self::poll_flush) or until there is
+    /// enough for one call.
     pub fn transmit(&mut self, transmit: &Transmit) {
         match transmit.to {
             To::Peer(Remote::Socket(peer)) => self.send_to(peer, transmit),
-            // No peer of this link.
+            // Not a peer of this link.
             To::Peer(Remote::Line) => {}
             To::Group => self.send_to_all(transmit.priority, &transmit.payload),
         }
@@ -246,7 +245,7 @@ impl TcpLink {
         }
     }
 
-    /// Sends on every connection, also on those that are just being opened.
+    /// Sends on every connection, including those that are being opened.
     fn send_to_all(&mut self, priority: Priority, payload: &Bytes) {
         for connection in self.connections.values_mut() {
             self.counters.count(connection.send(priority, payload));
@@ -257,7 +256,7 @@ impl TcpLink {
         self.bound_waiting();
     }
 
-    /// Keeps what waits for all connections within [`MAX_WAITING`].
+    /// Keeps the backlogs of all connections within [`MAX_WAITING`].
     fn bound_waiting(&mut self) {
         let octets = |connection: &Connection| connection.waiting_octets();
         while self.connections.values().map(octets).sum::<usize>() > MAX_WAITING
@@ -271,7 +270,7 @@ impl TcpLink {
         self.dials.iter_mut().find(|dial| dial.address == address)
     }
 
-    /// Writes what waits; ready when nothing waits any more.
+    /// Writes queued messages; ready when none is left.
     pub fn poll_flush(&mut self, cx: &mut Context<'_>, now: Instant) -> Poll<()> {
         let mut flushed = Poll::Ready(());
         for connection in self.connections.values_mut() {
@@ -282,12 +281,12 @@ impl TcpLink {
         flushed
     }
 
-    /// Says on each connection that nothing more comes, and opens no new ones. Ready when the other
-    /// sides have closed theirs too, which [`receive`](Self::receive) finds out.
+    /// Shuts down the sending direction of each connection, and opens no new ones. Ready when the
+    /// other sides have closed theirs too, which [`receive`](Self::receive) detects.
     ///
-    /// A connection that is closed while something is on its way to us is reset, and whoever writes
-    /// then gets a signal that ends it, unless it has thought of that. Junior's run-time engine has
-    /// not.
+    /// A connection that is closed while data is in flight to this side is reset. A peer that then
+    /// writes gets a signal that terminates it unless handled. Junior's run-time engine does not
+    /// handle it.
     pub fn hang_up(&mut self) -> Poll<()> {
         self.listener = None;
         self.dials.clear();
@@ -299,7 +298,7 @@ impl TcpLink {
         }
     }
 
-    /// Opens connections and takes in what has arrived on them; whether some had more than their
+    /// Opens connections and receives messages. Returns whether some connection had more than its
     /// share.
     pub fn receive(
         &mut self,
@@ -342,7 +341,7 @@ impl TcpLink {
         more
     }
 
-    /// Drops a connection; whether it is to be dialled again, which has to be asked for.
+    /// Drops a connection. Returns whether it must be dialled again, which the caller must arrange.
     fn close(&mut self, now: Instant, remote: SocketAddr, why: &Closed) -> bool {
         let Some(connection) = self.connections.remove(&remote) else {
             return false;
@@ -360,7 +359,7 @@ impl TcpLink {
         dialed
     }
 
-    /// Takes in connections; whether there may be more than one turn's share.
+    /// Accepts connections; returns whether there may be more than one turn's share.
     fn accept(&mut self, cx: &mut Context<'_>, now: Instant) -> bool {
         if self.accept_after.is_some_and(|after| now < after) {
             return false;
@@ -384,7 +383,7 @@ impl TcpLink {
         true
     }
 
-    /// Takes in a connection that somebody has opened, or refuses it.
+    /// Admits or refuses an incoming connection.
     fn admit(&mut self, stream: TcpStream, remote: SocketAddr, now: Instant) {
         if !self.access.allows_address(remote.ip()) {
             self.counters.denied += 1;
@@ -420,11 +419,11 @@ impl TcpLink {
     fn displace(&mut self, remote: SocketAddr, why: Closed, now: Instant) {
         self.warn_of_scarcity(now, "a connection was closed to make room", remote);
         self.close(now, remote, &why);
-        // For the endpoint, which has to forget the path.
+        // For the endpoint, which must forget the path.
         self.closed.push_back((remote, why));
     }
 
-    /// Warns once in a while: whoever opens connections shall not fill the log.
+    /// Warns once per [`WARNING_PAUSE`], so that incoming connections cannot fill the log.
     fn warn_of_scarcity(&mut self, now: Instant, what: &str, remote: SocketAddr) {
         let limit = self.quota.total;
         let is_due = |warned: Instant| now.saturating_duration_since(warned) >= WARNING_PAUSE;
@@ -485,7 +484,7 @@ impl TcpLink {
 }
 
 impl Counters {
-    /// Counts a message for a peer to which there is no connection; see [`Dial::keep`].
+    /// Counts a message for a peer without a connection; see [`Dial::keep`].
     const fn count_kept(&mut self, lost: Option<u64>) {
         match lost {
             Some(lost) => self.send_overflows += lost,
@@ -493,7 +492,7 @@ impl Counters {
         }
     }
 
-    /// Counts a message that a connection has taken, or has not.
+    /// Counts a message that a connection has taken or rejected.
     const fn count(&mut self, taken: bool) {
         if taken {
             self.sent += 1;
@@ -503,7 +502,7 @@ impl Counters {
     }
 }
 
-/// Whether a failure to accept is about that one connection, so that the next may succeed.
+/// Whether a failure to accept concerns only that one connection, so that the next may succeed.
 fn is_of_the_peer(error: &io::Error) -> bool {
     use io::ErrorKind::{ConnectionAborted, ConnectionReset, Interrupted};
     matches!(
@@ -519,8 +518,8 @@ fn listen(address: SocketAddr) -> Result<TcpListener, Error> {
             Type::STREAM,
             Some(Protocol::TCP),
         )?;
-        // A node that is started again finds connections of its predecessor in their last minute.
-        // (Windows takes this for leave to share the port.)
+        // A restarted node finds connections of its predecessor in TIME_WAIT. (On Windows this
+        // option would allow sharing the port.)
         #[cfg(not(windows))]
         socket.set_reuse_address(true)?;
         socket.bind(&address.into())?;

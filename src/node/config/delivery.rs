@@ -1,4 +1,4 @@
-//! The `[delivery]` section: acknowledged messages, and how datagrams leave.
+//! The `[delivery]` section: acknowledged messages, packing and pacing.
 
 #[cfg(feature = "serde")]
 use std::fmt;
@@ -16,7 +16,7 @@ const WINDOWS: RangeInclusive<usize> = 2..=16_384;
 const BURSTS: RangeInclusive<usize> = 8192..=1 << 30;
 const LONGEST_PACKING: Duration = Duration::from_secs(1);
 
-/// How messages are delivered, beyond the network's best effort.
+/// Delivery of messages beyond the network's best effort.
 ///
 /// ```toml
 /// [delivery]
@@ -43,9 +43,9 @@ pub struct Delivery {
         )
     )]
     pub patience: Duration,
-    /// The most packets on their way to one destination, 2 to 16384.
+    /// Limit of packets in flight to one destination, 2 to 16384.
     pub window: usize,
-    /// The most octets of messages that wait for acknowledgements.
+    /// Limit of octets of messages that wait for acknowledgements.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub waiting: usize,
     /// Whether small messages share datagrams; they wait for others up to 1 s.
@@ -58,12 +58,13 @@ pub struct Delivery {
     /// once; at least 8192. See [`Pacing`].
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub pace_burst: usize,
-    /// Octets of a receive buffer that are taken to be emptied each second; 0 turns pacing off.
+    /// Octets of a receive buffer that the receiver is assumed to read per second; 0 disables
+    /// pacing.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub pace_rate: usize,
     /// Peers that repeat the message code in each fragment of a large message, by id, which may
-    /// hold wildcards: the same as a `[[profile]]` with `profile = "jaus++"` for each. That a peer
-    /// does is also learned when it sends one.
+    /// have wildcards: the same as a `[[profile]]` with `profile = "jaus++"` for each. A node also
+    /// learns this from a peer's own large messages.
     pub repeat_code_to: Vec<JausId>,
 }
 
@@ -83,10 +84,10 @@ impl Default for Delivery {
 }
 
 impl Delivery {
-    /// Whether a node can be started with this.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// The first setting that is out of its range, and the range.
+    /// The first setting that is out of range, and the range.
     pub(super) fn validate(&self) -> Result<(), InvalidDelivery> {
         if !PATIENCES.contains(&self.patience) {
             return Err(InvalidDelivery::Patience(self.patience));
@@ -103,7 +104,7 @@ impl Delivery {
         Ok(())
     }
 
-    /// Puts the settings to the others of the endpoint.
+    /// Applies these settings to those of the endpoint.
     pub(super) fn apply(&self, to: endpoint::Config) -> endpoint::Config {
         let repeat = |&id: &JausId| Assignment {
             id,
@@ -126,20 +127,20 @@ impl Delivery {
     }
 }
 
-/// A setting of the section that no node can have.
+/// An invalid setting of the section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InvalidDelivery {
-    /// Too little for a round trip, or more than anybody waits.
+    /// Too short for a round trip, or longer than is useful.
     #[error("delivery.patience {0:?} cannot be: choose from 0.1s to 10min")]
     Patience(Duration),
-    /// A window without room, or with more than there are numbers for.
+    /// A window without room, or larger than the sequence numbers allow.
     #[error("delivery.window {0} cannot be: choose from 2 to 16384 packets")]
     Window(usize),
     /// Messages would be stale.
     #[error("delivery.packing cannot be so long: choose \"off\" or a time up to 1s")]
     Packing,
-    /// Less than a packet occupies.
+    /// Less than one packet occupies.
     #[error(
         "delivery.pace_burst {0} cannot be: choose from 8192 octets to 1GiB, or turn pacing off \
          with pace_rate = 0"

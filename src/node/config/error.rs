@@ -1,78 +1,78 @@
-//! The settings that no node can have.
+//! Invalid settings of a node.
 
 use super::InvalidDelivery;
 use crate::address::ParseIdError;
 use crate::link::InvalidGroup;
 
-/// A setting that no node can have.
+/// An invalid setting.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// 0 names nobody, 65535 everybody.
+    /// 0 is no subsystem, 65535 is the wildcard.
     #[error("subsystem {0} cannot be: choose a number from 1 to 65534")]
     Subsystem(u16),
-    /// 0 names nobody, 255 everybody.
+    /// 0 is no node, 255 is the wildcard.
     #[error("node {0} cannot be: choose a number from 1 to 254")]
     Node(u8),
-    /// Too little for a packet, or more than one holds.
+    /// Too small for a packet, or more than one holds.
     #[error("payload_limit {0} cannot be: choose from 64 to 4079 octets of payload in a packet")]
     PayloadLimit(usize),
-    /// Less than a packet, more than there are fragments for, or more than a small board should be asked to keep.
+    /// Less than a packet, more than there are fragments for, or too much memory for a small board.
     #[error("max_message {message} cannot be: choose from {payload} (payload_limit) to {longest}")]
     MaxMessage {
-        /// The length that was chosen, in octets.
+        /// The configured length in octets.
         message: usize,
         /// [`Config::payload_limit`](super::Config::payload_limit).
         payload: usize,
-        /// The most, in octets: 16 MiB, and no more fragments than there are sequence numbers.
+        /// The limit in octets: 16 MiB, and no more fragments than there are sequence numbers.
         longest: usize,
     },
     /// A table without room, or too large.
     #[error("max_peers {0} cannot be: choose from 1 to 65536")]
     MaxPeers(usize),
-    /// A rate of nothing.
+    /// A rate of zero.
     #[error(
         "{key} = {{ per_second = {per_second}, burst = {burst} }} cannot be: choose at least 1 for each"
     )]
     Rate {
         /// Section and key.
         key: &'static str,
-        /// How many in a second.
+        /// The rate per second.
         per_second: u32,
-        /// How many at once.
+        /// The burst.
         burst: u32,
     },
-    /// A listener that lets nobody in.
+    /// A listener that accepts no connection.
     #[error(
         "tcp.max_accepted or tcp.max_per_address 0 lets nobody connect: choose 1 or more, or leave \
              tcp.listen out"
     )]
     MaxAccepted,
-    /// Junior delivers to its own clients only.
+    /// Junior delivers only to its own clients.
     #[error(
         "routing.forward and junior exclude each other: Junior delivers nothing for components \
          behind its clients. Leave one of them out"
     )]
     JuniorForward,
-    /// Nothing is on a serial line at 0 bits per second.
+    /// A serial line carries nothing at 0 bits per second.
     #[error(
         "baud {baud} of the serial line {device} cannot be: choose what both ends have, such as 19200 or 115200"
     )]
     Baud {
-        /// The port.
+        /// The device.
         device: String,
-        /// The rate that was chosen.
+        /// The configured rate.
         baud: u32,
     },
     /// Neither one nor two stop bits.
     #[error("stop_bits {stop_bits} of the serial line {device} cannot be: choose 1 or 2")]
     StopBits {
-        /// The port.
+        /// The device.
         device: String,
-        /// The number that was chosen.
+        /// The configured number.
         stop_bits: u8,
     },
-    /// Two lines on one port.
+    /// Two lines on one device.
     #[error("the serial port {0} is named twice: leave one out")]
     SerialTwice(String),
     /// A mailbox without room.
@@ -84,7 +84,7 @@ pub enum ConfigError {
     /// Not a multicast group.
     #[error(transparent)]
     Group(InvalidGroup),
-    /// The id of a peer is none.
+    /// The id of a peer is invalid.
     #[error("the id of a peer: {0}")]
     PeerId(ParseIdError),
     /// Not the address of a peer.

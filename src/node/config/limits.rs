@@ -1,5 +1,6 @@
-//! The sections `[routing]` and `[limits]`: whether a node passes messages on, and how much it takes
-//! from others. Who may speak to it is in `[access]`, which is [`Access`](crate::endpoint::Access).
+//! The sections `[routing]` and `[limits]`: whether a node forwards messages, and how much it
+//! accepts from others. The section `[access]`, which senders it accepts, is
+//! [`Access`](crate::endpoint::Access).
 //!
 //! ```toml
 //! [routing]
@@ -20,19 +21,19 @@
 use super::ConfigError;
 use crate::endpoint::{self, Rate, Rates};
 
-/// The most peers that can be asked for.
+/// The largest valid `max_peers`.
 const MOST_PEERS: usize = 65_536;
 
-/// Whether and how much a node passes on between its links. By default it does not, also with
-/// several links: to join two networks is a decision.
+/// Whether and how much a node forwards between its links. By default it does not, even with
+/// several links: joining two networks is a deliberate decision.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 #[non_exhaustive]
 pub struct Routing {
-    /// Whether messages for others are passed on.
+    /// Whether to forward messages for other nodes.
     pub forward: bool,
-    /// How many messages that go to many, or for ids that are not known, are passed on in all.
+    /// The total rate of forwarded messages with many receivers or an unknown destination.
     pub broadcasts: Rate,
 }
 
@@ -46,19 +47,19 @@ impl Default for Routing {
     }
 }
 
-/// How much a node takes from others.
+/// Limits of what a node accepts from others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 #[non_exhaustive]
 pub struct Limits {
-    /// The most peers that are remembered, 1 to 65536.
+    /// Limit of known peers, 1 to 65536.
     pub max_peers: usize,
-    /// Ids heard for the first time, from each network address.
+    /// Rate of new ids from each network address.
     pub new_ids_per_address: Rate,
-    /// Messages from each network address; not limited if it is left out.
+    /// Rate of messages from each network address; unlimited if omitted.
     pub messages_per_address: Option<Rate>,
-    /// Messages from each id; not limited if it is left out.
+    /// Rate of messages from each id; unlimited if omitted.
     pub messages_per_id: Option<Rate>,
 }
 
@@ -84,7 +85,7 @@ impl Limits {
     }
 }
 
-/// Checks what nothing would be left by.
+/// Rejects limits that would block everything, or are too large.
 pub(super) fn validate(routing: &Routing, limits: &Limits) -> Result<(), ConfigError> {
     if !(1..=MOST_PEERS).contains(&limits.max_peers) {
         return Err(ConfigError::MaxPeers(limits.max_peers));

@@ -1,5 +1,5 @@
-//! What a node is told before it starts: from code, from flags, or (feature `serde`) from a TOML
-//! file such as
+//! The configuration of a node: from code, from flags, or (feature `serde`) from a TOML file such
+//! as
 //!
 //! ```toml
 //! subsystem = 101
@@ -34,7 +34,7 @@
 //! baud = 115200                        # the default
 //! ```
 //!
-//! Each section has a file of its own here.
+//! Each section has its own file here.
 
 mod delivery;
 mod error;
@@ -64,10 +64,10 @@ use crate::link::{Group, Group6, Interfaces, Ip};
 use crate::peer::Assignment;
 
 const LONGEST_MESSAGE: usize = 16 << 20;
-/// Sequence numbers have 16 bits, and 0 is left out.
+/// Sequence numbers have 16 bits, and 0 is not used.
 const MOST_FRAGMENTS: usize = u16::MAX as usize;
 
-/// Everything that can be set about a node. All but the id has a default.
+/// All settings of a node. Everything except the id has a default.
 ///
 /// ```
 /// use jaus::node::Config;
@@ -85,43 +85,43 @@ pub struct Config {
     pub subsystem: u16,
     /// The node number within the subsystem, 1 to 254.
     pub node: u8,
-    /// The interfaces to open UDP links on. With none of them, an empty list, there is no UDP, which
-    /// is allowed beside TCP connections or serial lines.
+    /// The interfaces to open UDP links on. An empty list disables UDP, which is allowed with TCP
+    /// connections or serial lines.
     pub interfaces: Interfaces,
-    /// The versions of IP that are used on them.
+    /// The IP versions to use on them.
     pub ip: Ip,
-    /// The UDP port of this node; 0 takes any free one.
+    /// The UDP port of this node; 0 selects any free one.
     pub port: u16,
     /// What to do if the port is taken.
     pub port_taken: PortTaken,
-    /// The multicast group, by which nodes find each other.
+    /// The multicast group with which nodes find each other.
     pub group: Group,
     /// The same with IPv6.
     pub group6: Group6,
-    /// When the broadcast address of a network is used instead of the group, or beside it.
+    /// When to use a network's broadcast address instead of the group, or in addition to it.
     pub broadcast: Broadcasts,
-    /// How many routers multicast may pass.
+    /// The limit of routers that multicast may pass.
     pub ttl: u8,
-    /// How many octets of received datagrams the kernel is asked to hold for each socket.
+    /// The receive buffer to request from the kernel for each socket, in octets.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub receive_buffer: usize,
-    /// Peers to whom everything for the group is sent by unicast too.
+    /// Peers that also get all multicast traffic by unicast.
     pub peers: Vec<Peer>,
-    /// The most octets of payload in one packet, 64 to 4079. The default, 1425, keeps a packet
+    /// The limit of payload octets in one packet, 64 to 4079. The default, 1425, keeps a packet
     /// within one Ethernet frame.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub payload_limit: usize,
-    /// The longest message, in octets, that is sent or received, up to 16 MiB. Above
-    /// `payload_limit` it travels in fragments.
+    /// The longest message to send or receive, in octets, up to 16 MiB. Messages longer than
+    /// `payload_limit` travel in fragments.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "units::read_size"))]
     pub max_message: usize,
-    /// How much may wait for each component.
+    /// The mailbox limits of each component.
     pub mailbox: MailboxLimits,
-    /// Where component processes of this host may attach, if at all.
+    /// The local address where component processes of this host may attach, if any.
     pub local: Local,
-    /// The folder of Junior's sockets, `/tmp` as it comes. With it the components are clients of
-    /// the node manager of a Junior on this host, and there is no UDP of our own: interfaces,
-    /// port, group and peers are Junior's business.
+    /// The folder of Junior's sockets, `/tmp` in a default installation. If set, the components are
+    /// clients of the node manager of a Junior on this host, and the node opens no UDP itself:
+    /// Junior determines interfaces, port, group and peers.
     #[cfg(unix)]
     pub junior: Option<PathBuf>,
     /// TCP connections, to and from other nodes.
@@ -129,15 +129,15 @@ pub struct Config {
     /// Serial lines.
     #[cfg(feature = "serial")]
     pub serial: Vec<SerialLine>,
-    /// Acknowledged messages, and how datagrams leave.
+    /// Acknowledged messages, packing and pacing.
     pub delivery: Delivery,
-    /// What peers are that cannot be recognised by what they send.
+    /// The profiles of peers that cannot be recognised by what they send.
     pub profile: Vec<Assignment>,
-    /// Whether messages for others are passed on between the links.
+    /// Whether to forward messages for other nodes between the links.
     pub routing: Routing,
-    /// Who may speak to this node.
+    /// Which senders this node accepts.
     pub access: Access,
-    /// How much is taken from others.
+    /// Limits of what this node accepts from others.
     pub limits: Limits,
 }
 
@@ -148,7 +148,7 @@ impl Default for Config {
 }
 
 impl Config {
-    /// The usual settings: all interfaces, port 3794, group 239.255.0.1:3794.
+    /// The default settings: all interfaces, port 3794, group 239.255.0.1:3794.
     #[must_use]
     pub fn new(subsystem: u16, node: u8) -> Self {
         let udp = udp::Settings::default();
@@ -183,8 +183,8 @@ impl Config {
         }
     }
 
-    /// A node that stays on this host, on any free port: needs no network and no rights, and any
-    /// number of them run side by side.
+    /// A node that stays on this host, on any free port. It needs no network and no privileges, and
+    /// any number of them run side by side.
     #[must_use]
     pub fn loopback(subsystem: u16, node: u8) -> Self {
         Self {
@@ -194,28 +194,28 @@ impl Config {
         }
     }
 
-    /// Uses only these interfaces, each by name or address.
+    /// Uses only these interfaces, each given by name or address.
     #[must_use]
     pub fn interfaces<S: Into<String>>(mut self, only: impl IntoIterator<Item = S>) -> Self {
         self.interfaces = Interfaces::Only(only.into_iter().map(Into::into).collect());
         self
     }
 
-    /// Uses these versions of IP on the interfaces.
+    /// Uses these IP versions on the interfaces.
     #[must_use]
     pub const fn ip(mut self, ip: Ip) -> Self {
         self.ip = ip;
         self
     }
 
-    /// Uses this UDP port; 0 takes any free one.
+    /// Uses this UDP port; 0 selects any free one.
     #[must_use]
     pub const fn port(mut self, port: u16) -> Self {
         self.port = port;
         self
     }
 
-    /// Takes any free port if the wanted one is taken.
+    /// Uses any free port if the configured one is taken.
     #[must_use]
     pub const fn or_any_free_port(mut self) -> Self {
         self.port_taken = PortTaken::UseFree;
@@ -229,14 +229,14 @@ impl Config {
         self
     }
 
-    /// Serves the component processes of this host there.
+    /// Serves component processes of this host at this address.
     #[must_use]
     pub fn local(mut self, address: Address) -> Self {
         self.local = Local::At(address);
         self
     }
 
-    /// Makes the components clients of the Junior on this host whose sockets are in this folder.
+    /// Makes the components clients of the Junior on this host with its sockets in this folder.
     #[cfg(unix)]
     #[must_use]
     pub fn junior(mut self, folder: impl Into<PathBuf>) -> Self {
@@ -244,14 +244,13 @@ impl Config {
         self
     }
 
-    /// Uses no UDP at all, but the TCP connections, the serial lines and the address for components
-    /// of this host that are configured.
+    /// Disables UDP. The node uses the configured TCP connections, serial lines and local address.
     #[must_use]
     pub fn without_udp(self) -> Self {
         self.interfaces::<String>([])
     }
 
-    /// Lets others connect to this address by TCP.
+    /// Accepts TCP connections at this address.
     #[must_use]
     pub fn tcp_listen(mut self, at: Listen) -> Self {
         self.tcp.listen = Some(at);
@@ -273,17 +272,17 @@ impl Config {
         self
     }
 
-    /// Adds a peer that is also spoken to by unicast.
+    /// Adds a peer that is also sent to by unicast.
     #[must_use]
     pub fn peer(mut self, peer: Peer) -> Self {
         self.peers.push(peer);
         self
     }
 
-    /// Whether a node can be started with this, as far as can be told without trying.
+    /// Checks the settings, as far as possible without opening anything.
     ///
     /// # Errors
-    /// The first setting that is out of its range, and the range.
+    /// The first setting that is out of range, and the range.
     pub fn validate(&self) -> Result<(), ConfigError> {
         if !(1..JausId::ANY_SUBSYSTEM).contains(&self.subsystem) {
             return Err(ConfigError::Subsystem(self.subsystem));
@@ -320,7 +319,7 @@ impl Config {
         self.udp().validate().map_err(ConfigError::Group)
     }
 
-    /// The endpoint's settings; its bounds leave room for two of the longest messages.
+    /// The endpoint's settings. Its limits leave room for two of the longest messages.
     pub(super) fn endpoint(&self, first_sequence: u16) -> endpoint::Config {
         let usual = endpoint::Config::default();
         self.delivery.apply(endpoint::Config {
@@ -338,7 +337,7 @@ impl Config {
         })
     }
 
-    /// Whether other links than UDP are wanted.
+    /// Whether links other than UDP are configured.
     pub(super) const fn has_streams(&self) -> bool {
         #[cfg(feature = "serial")]
         if !self.serial.is_empty() {
@@ -347,8 +346,8 @@ impl Config {
         self.tcp.is_used()
     }
 
-    /// Whether UDP is wanted: Junior takes its place, and an empty list of interfaces turns it off,
-    /// if there is another way.
+    /// Whether UDP is in use. Junior replaces it, and an empty list of interfaces disables it if
+    /// another link is configured.
     pub(super) fn uses_udp(&self) -> bool {
         #[cfg(unix)]
         if self.junior.is_some() {

@@ -1,4 +1,4 @@
-//! Peers that a node is told of: where they are and, if that is known, who.
+//! Configured peers: an address and, if known, an id.
 
 use std::fmt;
 use std::net::{SocketAddr, SocketAddrV4};
@@ -9,11 +9,11 @@ use crate::address::JausId;
 use crate::as_text::serde_as_text;
 use crate::link::Place;
 
-/// A peer that is spoken to by unicast from the start: `10.0.0.2`, which means port 3794,
-/// `10.0.0.2:3795`, `[fe80::2%eth0]:3794`, or with its id in front `102.1.1@10.0.0.2`.
+/// A peer to send to by unicast from the start: `10.0.0.2`, which means port 3794, `10.0.0.2:3795`,
+/// `[fe80::2%eth0]:3794`, or with its id in front `102.1.1@10.0.0.2`.
 ///
-/// With an id (which may hold the wildcards 65535 and 255) its messages go there before it was
-/// heard, and its address is never learned anew.
+/// With an id (which may have the wildcards 65535 and 255), messages for it go there before it has
+/// sent any, and its address is never learned again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Peer {
     id: Option<JausId>,
@@ -21,13 +21,14 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// The id, or pattern of ids, that lives at the address, if that is known.
+    /// The id, or pattern of ids, at this address, if known.
     #[must_use]
     pub const fn id(self) -> Option<JausId> {
         self.id
     }
 
-    /// The address and port. With an interface (`%eth0`) it holds as long as that interface does.
+    /// The address and port. With an interface (`%eth0`) it is valid as long as that interface
+    /// exists.
     #[must_use]
     pub fn address(self) -> SocketAddr {
         self.place.address()

@@ -12,7 +12,7 @@
 use super::ConfigError;
 use crate::link::serial::Settings;
 
-/// Whether the lines can be, as far as can be told without opening them.
+/// Checks the settings of the lines, without opening them.
 pub(super) fn validate(lines: &[Settings]) -> Result<(), ConfigError> {
     for (index, line) in lines.iter().enumerate() {
         let device = || line.device.clone();

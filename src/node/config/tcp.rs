@@ -9,7 +9,7 @@ use crate::as_text::serde_as_text;
 use crate::endpoint::Access;
 use crate::link::{STANDARD_PORT, tcp};
 
-/// TCP connections of a node. By default there are none.
+/// TCP connections of a node. The default is none.
 ///
 /// ```toml
 /// [tcp]
@@ -21,14 +21,15 @@ use crate::link::{STANDARD_PORT, tcp};
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 #[non_exhaustive]
 pub struct Tcp {
-    /// Where others may connect to; nowhere if it is left out.
+    /// The address to accept connections at; none if omitted.
     pub listen: Option<Listen>,
     /// Peers to connect to. With an id (or a pattern of ids) in front, messages for it go there
-    /// before it was heard.
+    /// before it has sent any.
     pub connect: Vec<Peer>,
-    /// The most connections that others may open.
+    /// Limit of accepted connections.
     pub max_accepted: usize,
-    /// The most of them from one IPv4 address, or from the 64-bit network of an IPv6 address.
+    /// Limit of accepted connections from one IPv4 address, or from the 64-bit network of an IPv6
+    /// address.
     pub max_per_address: usize,
 }
 
@@ -45,12 +46,12 @@ impl Default for Tcp {
 }
 
 impl Tcp {
-    /// Whether connections are wanted at all.
+    /// Whether TCP is in use.
     pub(in crate::node) const fn is_used(&self) -> bool {
         self.listen.is_some() || !self.connect.is_empty()
     }
 
-    /// How the link is set up, on which only these may connect.
+    /// The settings of the link; `access` limits which addresses may connect.
     pub(in crate::node) fn settings(&self, access: &Access) -> tcp::Settings {
         tcp::Settings {
             listen: self.listen.map(|listen| listen.0),
@@ -62,8 +63,8 @@ impl Tcp {
     }
 }
 
-/// Where a node accepts connections: `10.0.0.5`, which means port 3794, `10.0.0.5:3795`, `0.0.0.0`
-/// for every address of the host, port 0 for any free one.
+/// The address where a node accepts connections: `10.0.0.5`, which means port 3794,
+/// `10.0.0.5:3795`, `0.0.0.0` for all addresses of the host, port 0 for any free one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Listen(SocketAddr);
 

@@ -1,13 +1,12 @@
-//! Sizes and times as people write them in settings and flags: `4MiB`, `64 KiB`, `5ms`, `1.5s`,
-//! `2 min`.
+//! Parses sizes and times in settings and flags: `4MiB`, `64 KiB`, `5ms`, `1.5s`, `2 min`.
 //!
-//! The parser is our own: the rules fit on a page, and its errors say what would be right. A size
-//! may be a bare number, which means octets; a time may not, because one person's seconds are the
-//! next one's milliseconds.
+//! This is a parser of our own: the rules fit on a page, and its errors say what would be valid. A
+//! size may be a bare number, which means octets. A time may not, because it would be unclear
+//! whether it means seconds or milliseconds.
 
 use std::time::Duration;
 
-/// A text that is no size or no time.
+/// A text that is not a valid size or time.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidUnit {
     /// Not a size.
@@ -45,13 +44,13 @@ const TIMES: [(&str, f64); 6] = [
     ("h", 3600.0),
 ];
 
-/// The longest time that is taken for meant: a year, in seconds.
+/// The longest plausible time: a year, in seconds.
 const LONGEST: f64 = 365.0 * 86_400.0;
 
-/// Reads a size in octets: `1500`, `64 KiB`, `1.5MiB`.
+/// Parses a size in octets: `1500`, `64 KiB`, `1.5MiB`.
 ///
 /// # Errors
-/// [`InvalidUnit::Size`]: no number, a unit that is none, less than nothing, or not whole octets.
+/// [`InvalidUnit::Size`]: no number, an unknown unit, a negative size, or not whole octets.
 pub fn size(text: &str) -> Result<usize, InvalidUnit> {
     let wrong = || InvalidUnit::Size(text.to_owned());
     let (number, unit) = split(text);
@@ -64,15 +63,16 @@ pub fn size(text: &str) -> Result<usize, InvalidUnit> {
         return usize::try_from(octets).map_err(|_| wrong());
     }
     let octets = number.parse::<f64>().map_err(|_| wrong())? * *factor as f64;
-    // Beyond 2^53 a fraction cannot be told from none.
+    // Above 2^53 an `f64` has no fraction.
     let whole = octets.fract() == 0.0 && (0.0..9e15).contains(&octets);
     whole.then_some(octets as usize).ok_or_else(wrong)
 }
 
-/// Reads a time: `5ms`, `1.5s`, `2 min`; at most a year.
+/// Parses a time: `5ms`, `1.5s`, `2 min`; at most a year.
 ///
 /// # Errors
-/// [`InvalidUnit::Duration`]: no number, no unit or one that is none, or less than nothing.
+/// [`InvalidUnit::Duration`]: no number, no unit or an unknown one, a negative time, or more than a
+/// year.
 pub fn duration(text: &str) -> Result<Duration, InvalidUnit> {
     let wrong = || InvalidUnit::Duration(text.to_owned());
     let (number, unit) = split(text);
@@ -87,7 +87,7 @@ pub fn duration(text: &str) -> Result<Duration, InvalidUnit> {
     Duration::try_from_secs_f64(seconds).map_err(|_| wrong())
 }
 
-/// Number and unit.
+/// Splits a text into number and unit.
 fn split(text: &str) -> (&str, &str) {
     let text = text.trim();
     let end = text
@@ -97,20 +97,20 @@ fn split(text: &str) -> (&str, &str) {
     (number, unit.trim_start())
 }
 
-/// For fields of settings that hold a size: an integer is a number of octets, a text may have a
+/// Deserializes a setting that is a size: an integer is a number of octets, a string may have a
 /// unit.
 ///
 /// # Errors
-/// Those of [`size`], and what is neither integer nor text.
+/// Those of [`size`], and values that are neither integer nor string.
 #[cfg(feature = "serde")]
 pub fn read_size<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<usize, D::Error> {
     deserializer.deserialize_any(SizeVisitor)
 }
 
-/// For fields of settings that hold a time, as a text with a unit.
+/// Deserializes a setting that is a time, as a string with a unit.
 ///
 /// # Errors
-/// Those of [`duration`], and what is no text.
+/// Those of [`duration`], and values that are not strings.
 #[cfg(feature = "serde")]
 pub fn read_duration<'de, D: serde::Deserializer<'de>>(
     deserializer: D,

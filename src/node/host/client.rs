@@ -1,5 +1,5 @@
-//! The connection of a component to its host's node: what senders share with the task that reads and
-//! writes, and reaches the node again when it is lost.
+//! A component's connection to its host's node: the state that senders share with the task that
+//! reads and writes, and the reconnection after a loss.
 
 use std::collections::HashMap;
 use std::convert::Infallible;
@@ -21,21 +21,22 @@ use crate::link::local::record::{Head, Outcome, Record, RecordError};
 use crate::link::local::{Error, Reader, Writer};
 use crate::wire::{Acknowledgement, Flags};
 
-/// Octets that may wait for the node. A single larger message is accepted when nothing else waits.
+/// Limit of octets that wait for the node. A single larger message is accepted if nothing else
+/// waits.
 const MAX_WAITING: usize = 4 << 20;
-/// Messages that may wait for an acknowledgement.
+/// Limit of messages that wait for an acknowledgement.
 const MAX_AWAITED: usize = 4096;
-/// Messages that one read may bring at most, nearly: before it, so many must fit.
+/// Required room in the mailbox before a read: nearly the largest number of messages in one read.
 const ROOM: usize = 1024;
-/// How long a component that reads nothing holds up what comes behind, such as the outcomes of the
-/// messages that it has sent.
+/// How long a component that does not read delays what follows, such as the outcomes of its own
+/// messages.
 const PATIENCE: Duration = Duration::from_millis(100);
 /// How long a node may take to read that a component leaves.
 const LEAVE: Duration = Duration::from_secs(1);
-/// The pauses between two attempts to reach the node again, the first and the longest.
+/// The first and the longest pause between attempts to reconnect to the node.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(10), Duration::from_secs(1));
 
-/// The component's connection.
+/// A component's connection to its host's node.
 #[derive(Debug)]
 pub(in super::super) struct Client {
     id: JausId,
@@ -43,7 +44,7 @@ pub(in super::super) struct Client {
     mailbox: Arc<Mailbox>,
     events: EventSender<HostEvent>,
     status: watch::Sender<Status>,
-    /// Signalled when nothing waits any more: all is written, or there is no connection.
+    /// Signalled when the queue is empty: all is written, or there is no connection.
     emptied: Notify,
 }
 
@@ -55,13 +56,13 @@ struct Inner {
     awaited: HashMap<u64, oneshot::Sender<Result<(), Undelivered>>>,
 }
 
-/// Whether component and node are there. It changes under the lock of [`Inner`].
+/// The state of the connection. It changes under the lock of [`Inner`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Status {
     Connected,
     /// There is no node.
     Lost,
-    /// The component has been dropped; the node is to be told.
+    /// The component was dropped; the node must be notified.
     Leaving,
     /// The component is gone.
     Left,
@@ -102,8 +103,8 @@ impl Client {
         self.events.subscribe()
     }
 
-    /// Sends a message: it is on its way to the node. `waiter` gets the outcome, if the message
-    /// wants an acknowledgement.
+    /// Sends a message to the node. If the message requests an acknowledgement, `waiter` gets the
+    /// outcome.
     pub(in super::super) fn send(
         &self,
         message: Outgoing,
@@ -135,7 +136,7 @@ impl Client {
         Ok(MessageHandle(handle))
     }
 
-    /// Finds what is wrong with a message without asking the node.
+    /// Checks a message without asking the node.
     fn check(&self, inner: &Inner, message: &Outgoing) -> Result<(), SendError> {
         let (length, limit) = (message.payload.len(), inner.max_message);
         if matches!(*self.status.borrow(), Status::Leaving | Status::Left) {
@@ -157,10 +158,10 @@ impl Client {
         Ok(())
     }
 
-    /// Ready when the node has taken all that was sent, or is lost.
+    /// Ready when the node has taken all messages sent so far, or is lost.
     pub(in super::super) async fn flushed(&self) {
-        // Created before the look, so that nothing is missed; once nothing waits, what was sent
-        // before is written, whatever others have added since.
+        // Created before the check, so that no signal is missed. An empty queue means that
+        // everything sent before is written, even if others have added more since.
         let emptied = self.emptied.notified();
         let waits = !self.lock().writer.is_empty();
         if waits {
@@ -168,12 +169,12 @@ impl Client {
         }
     }
 
-    /// Ready when there is no connection, or none any more.
+    /// Ready when there is no connection.
     pub(in super::super) async fn disconnected(&self) {
         self.reached(|status| !status.is_connected()).await;
     }
 
-    /// The component leaves.
+    /// Detaches the component.
     pub(in super::super) fn leave(&self) {
         let mut inner = self.lock();
         inner.awaited.clear();
@@ -185,7 +186,7 @@ impl Client {
 
     async fn reached(&self, wanted: impl Fn(Status) -> bool) {
         let mut status = self.status.subscribe();
-        // An error cannot be: the sender is here.
+        // This cannot fail: `self` holds the sender.
         let _ = status.wait_for(|status| wanted(*status)).await;
     }
 
@@ -222,8 +223,7 @@ impl Client {
         self.handle_lost(Status::Left);
     }
 
-    /// There is no connection any more. What was not written is lost, and no outcome will come of
-    /// what was.
+    /// Handles the loss of the connection. Queued messages are lost, and sent ones get no outcome.
     fn handle_lost(&self, status: Status) {
         let mut inner = self.lock();
         inner.writer.close();
@@ -238,7 +238,7 @@ impl Client {
         });
     }
 
-    /// Tries until the node, or its successor, has the component again.
+    /// Retries until the node, or its successor, has attached the component again.
     async fn reach(&self, host: &Host) -> Reader {
         let mut pause = PAUSES.0;
         let mut refused = None;
@@ -268,7 +268,7 @@ impl Client {
         }
     }
 
-    /// Writes what senders leave. Ready when the component has left and all is written.
+    /// Writes queued records. Ready when the component has left and all is written.
     fn poll_write(&self, cx: &mut Context<'_>) -> Poll<Result<(), Error>> {
         let mut inner = self.lock();
         ready!(inner.writer.poll_flush(cx))?;
@@ -279,7 +279,7 @@ impl Client {
         }
     }
 
-    /// Reads what the node writes, until it is gone.
+    /// Reads the node's records until the connection is lost.
     async fn read(&self, reader: &mut Reader) -> Result<Infallible, Error> {
         let mut stalled_at = None;
         loop {
@@ -291,8 +291,9 @@ impl Client {
         }
     }
 
-    /// Lets a component that reads, if slowly, catch up before more is read for it. One that reads
-    /// nothing is not waited for a second time: the result says how much it had read then.
+    /// Waits for a component that reads slowly before more is read for it. It does not wait twice
+    /// for a component that does not read at all: the result is the number of messages it had read
+    /// then.
     async fn catch_up(&self, stalled_at: Option<u64>) -> Option<u64> {
         let room = || poll_fn(|cx| self.mailbox.poll_room(cx, ROOM));
         let mut taken = stalled_at;
@@ -302,7 +303,7 @@ impl Client {
                 return now;
             }
             taken = now;
-            // Whether there is room then is seen above.
+            // The loop condition checks the room again.
             let _ = timeout(PATIENCE, room()).await;
         }
         None
@@ -353,7 +354,7 @@ impl Client {
         };
         let waiter = self.lock().awaited.remove(&handle);
         if let Some(waiter) = waiter {
-            // An error means that the sender waits no more.
+            // An error means that the sender no longer waits.
             let _ = waiter.send(outcome);
         } else if let Err(Undelivered::Rejected(why)) = outcome {
             tracing::debug!(id = %self.id, why, "message not sent");

@@ -1,5 +1,5 @@
-//! The component's side of the [local link](crate::link::local): a component on the node of this
-//! host, which another process runs.
+//! The component's side of the [local link](crate::link::local): attaches a component to the node
+//! of this host, which another process runs.
 //!
 //! ```no_run
 //! use jaus::component::{Component, Kind};
@@ -13,9 +13,9 @@
 //! # }
 //! ```
 //!
-//! A port to a host's node is used like one to a node of the same process. It outlives the node: when
-//! that ends or crashes, the component goes on, with all that it knows; sending is an error
-//! meanwhile, and as soon as a node is back it has its id there again.
+//! A port to a host's node is used like one to a node of the same process. It outlives the node: if
+//! the node ends or crashes, the component continues and keeps its state. Until a node is back,
+//! sending returns an error; then the component attaches again with its id.
 #![expect(
     clippy::disallowed_methods,
     reason = "the connection to the node has a task and timeouts"
@@ -37,7 +37,7 @@ use crate::link::local::{Address, Error, Reader, Writer, connect};
 /// How long a node may take to answer a component's first record.
 const HANDSHAKE: Duration = Duration::from_secs(5);
 
-/// The node of this host, as a component of another process reaches it.
+/// The node of this host, for a component of another process.
 #[derive(Clone, Debug, Default)]
 pub struct Host {
     address: Address,
@@ -49,29 +49,29 @@ pub struct Host {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum HostEvent {
-    /// The node is gone. The component tries to reach it again, or its successor.
+    /// The node is gone. The component tries to reach it or its successor.
     Lost {
-        /// As far as is known.
+        /// The reason, as far as known.
         why: String,
     },
-    /// A node is there and refuses the component, for instance because another one has taken its
-    /// id. The component goes on trying.
+    /// A node refuses the component, for instance because another component has taken its id. The
+    /// component keeps trying.
     Refused {
-        /// In the node's words.
+        /// The node's reason.
         why: String,
     },
     /// The component is attached again.
     Back,
-    /// The node did not send a message that the component had sent without waiting for delivery.
+    /// The node rejected a message that the component had sent without waiting for delivery.
     Rejected {
         /// The message.
         message: MessageHandle,
-        /// In the node's words.
+        /// The node's reason.
         why: String,
     },
 }
 
-/// A listener to [`HostEvent`]s, until the component is detached.
+/// A stream of [`HostEvent`]s, until the component is detached.
 pub type HostEvents = EventStream<HostEvent>;
 
 /// A connection on which the node has attached the component.
@@ -84,7 +84,7 @@ struct Attached {
 }
 
 impl Host {
-    /// The node that serves components there; [`Host::default`] is at the usual place.
+    /// The node that serves components at this address; [`Host::default`] uses the default address.
     #[must_use]
     pub fn at(address: Address) -> Self {
         Self {
@@ -93,30 +93,30 @@ impl Host {
         }
     }
 
-    /// The name of the component's process, for people; the default is the program's.
+    /// The name of the component's process, for people. The default is the program's name.
     #[must_use]
     pub fn name(mut self, name: impl Into<String>) -> Self {
         self.name = Some(name.into());
         self
     }
 
-    /// How much may wait in this process until the component reads it.
+    /// The limits of the mailbox in this process.
     #[must_use]
     pub const fn mailbox(mut self, limits: MailboxLimits) -> Self {
         self.limits = limits;
         self
     }
 
-    /// Attaches a component, by its number within the node, 1 to 254. Its full id is the
-    /// [port's](Port::id).
+    /// Attaches a component, by its number within the node, 1 to 254. The [port](Port::id) has its
+    /// full id.
     ///
     /// # Errors
-    /// [`HostError`] says why the node cannot be reached, or refuses the component.
+    /// [`HostError`] gives the reason why the node cannot be reached or refuses the component.
     pub async fn attach(&self, component: u8) -> Result<Port, HostError> {
         self.attach_as(JausId::new(0, 0, component)).await
     }
 
-    /// Attaches a component by its full id, which must be one of the node's.
+    /// Attaches a component by its full id, which must belong to the node.
     ///
     /// # Errors
     /// Those of [`attach`](Self::attach).

@@ -1,8 +1,8 @@
-//! The node's side of the [local link](crate::link::local): which components attach, and as whom.
+//! The node's side of the [local link](crate::link::local): accepts component processes and assigns
+//! their ids.
 //!
-//! One task accepts connections; each component has a [session] in a task of its own, so that a
-//! stuck one holds up no other. To the endpoint they are components like those of the node's own
-//! process.
+//! One task accepts connections. Each component has a [session] in its own task, so that a stuck
+//! one does not delay others. To the endpoint they are like components of the node's own process.
 #![expect(
     clippy::disallowed_methods,
     reason = "sessions get tasks, and components little time for their first record"
@@ -27,12 +27,12 @@ use crate::link::local::record::{
 };
 use crate::link::local::{Error, Listener, Process, Reader, Stream, Writer};
 
-/// Connections whose component has not been attached yet.
+/// Limit of connections whose component is not attached yet.
 const UNATTACHED: usize = 32;
-/// How long a component may take to write its first record, and to read why it is refused.
+/// How long a component may take to send its first record, and to read a refusal.
 const HANDSHAKE: Duration = Duration::from_secs(5);
 /// How long the id of a component that has just died may still seem taken: its end and its
-/// successor's first record can be noticed in either order.
+/// successor's first record may be noticed in either order.
 const OVERLAP: Duration = Duration::from_millis(200);
 
 /// Accepts components until the node has stopped.
@@ -43,7 +43,7 @@ pub(super) struct Server {
     _closed: SignalClosed,
 }
 
-/// What is to be known of the node to attach a component.
+/// The node data needed to attach a component.
 #[derive(Clone, Debug)]
 struct Registrar {
     shared: Arc<Shared>,
@@ -52,8 +52,8 @@ struct Registrar {
     max_message: u32,
 }
 
-/// Signals that the listener is closed, after which it is dropped: the next node of this host may
-/// want its place.
+/// Signals that the listener is closed. It is dropped after the listener, because the next node of
+/// this host may need the same address.
 #[derive(Debug)]
 struct SignalClosed(Arc<Shared>);
 
@@ -102,7 +102,7 @@ impl Server {
                 }
                 Err(error) => {
                     tracing::warn!(%error, "a component could not be accepted");
-                    // Such as too many open files: not at once again.
+                    // For instance too many open files: do not retry at once.
                     if matches!(error, Error::Io { .. }) {
                         tokio::time::sleep(OVERLAP).await;
                     }
@@ -113,7 +113,8 @@ impl Server {
 }
 
 impl Registrar {
-    /// Attaches the component at the other end of a connection, or tells it why not.
+    /// Attaches the component at the other end of a connection, or sends it the reason for a
+    /// refusal.
     async fn attach(&self, stream: Stream) -> Option<(Session, Reader)> {
         let Stream { read, write, pid } = stream;
         let (mut reader, mut writer) = (Reader::new(read, LONGEST_HELLO), Writer::new(write));
@@ -150,7 +151,7 @@ impl Registrar {
                 writer.queue(&Record::refused(reason, &why));
                 let event = ComponentEvent::Refused { process, why };
                 self.shared.lock().attendance.events.send(event);
-                // A component that does not read it cannot be told.
+                // A component that does not read misses the reason.
                 let _ = timeout(HANDSHAKE, writer.flush()).await;
                 None
             }
@@ -182,7 +183,7 @@ impl Registrar {
         }
     }
 
-    /// The id that a component is to have.
+    /// The id to assign to a component.
     fn full_id(&self, version: u8, wanted: JausId) -> Result<JausId, Refusal> {
         if version != VERSION {
             let why = format!(

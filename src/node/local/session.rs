@@ -1,9 +1,11 @@
-//! One component of another process: its messages go to the endpoint, its mailbox goes to it.
+//! A session with one component process: passes its messages to the endpoint, and its mailbox to
+//! it.
 //!
-//! Both happen in one task, without a queue in between: the socket is read where the endpoint is
-//! called, and written where the mailbox is read. A component that does not read fills the socket;
-//! then its mailbox fills, and drops by [its rule](crate::node::MailboxLimits). Its messages are
-//! not read either while too many answers to them wait, so that nothing here grows without bound.
+//! Both directions run in one task, without a queue in between: the socket is read where the
+//! endpoint is called, and written where the mailbox is read. A component that does not read fills
+//! the socket, and then its mailbox, which drops messages by [its
+//! rule](crate::node::MailboxLimits). Its messages are not read either while too many replies to
+//! them wait, so nothing here grows without bound.
 
 use std::future::{pending, poll_fn};
 use std::sync::Arc;
@@ -23,9 +25,9 @@ use crate::wire::{Acknowledgement, Flags};
 
 /// Octets collected for one write.
 const FULL: usize = 64 << 10;
-/// Octets that may wait before nothing more is read: answers, besides what is collected.
+/// Limit of queued octets before reading stops: replies, besides the collected messages.
 const MAX_WAITING: usize = 1 << 20;
-/// How long a component may read nothing before that is an event.
+/// How long a component may not read before that is reported as an event.
 const STUCK: Duration = Duration::from_secs(2);
 
 /// An attached component.
@@ -59,7 +61,7 @@ impl Session {
     pub(super) async fn run(self, mut reader: Reader) {
         let end = async {
             let mut stopped = self.shared.stopped.subscribe();
-            // An error would mean that the node is gone, and that is what is waited for.
+            // An error would mean that the node is gone, which is what this waits for.
             let _ = stopped.wait_for(|stopped| *stopped).await;
             tokio::time::sleep(LAST_WORDS).await;
         };
@@ -76,12 +78,12 @@ impl Session {
         self.shared.lock().detach(self.id, &self.mailbox, why);
     }
 
-    /// Writes what waits until the node has stopped and all is written.
+    /// Writes queued records until the node has stopped and all is written.
     async fn write(&self) {
         while poll_fn(|cx| self.poll_collect(cx)).await {
             if let Err(error) = self.flush().await {
-                // The component takes nothing more. What it has written before is still read, and
-                // reading finds the end.
+                // The component reads no more. Its earlier records are still read, and reading
+                // detects the end.
                 tracing::debug!(id = %self.id, %error, "nothing more can be written");
                 self.answers.lock().close();
                 return pending().await;
@@ -89,8 +91,8 @@ impl Session {
         }
     }
 
-    /// Collects messages. Ready with `true` when something waits to be written, with `false` when
-    /// nothing ever will.
+    /// Collects messages. Ready with `true` when there is something to write, with `false` when
+    /// there never will be.
     fn poll_collect(&self, cx: &mut Context<'_>) -> Poll<bool> {
         let mut writer = self.answers.lock();
         let drained = self.mailbox.poll_drain(cx, |message| {
@@ -104,7 +106,8 @@ impl Session {
         drained.map(|()| false)
     }
 
-    /// Writes what is collected, and announces it if the component does not read for long.
+    /// Writes the collected records, and publishes an event if the component does not read for
+    /// long.
     async fn flush(&self) -> Result<(), Error> {
         let mut is_stuck = false;
         loop {
@@ -139,19 +142,19 @@ impl Session {
         self.shared.lock().attendance.events.send(event);
     }
 
-    /// Reads what the component sends until it is gone.
+    /// Reads the component's records until it is gone.
     async fn read(&self, reader: &mut Reader) -> Result<Departure, Error> {
         while !self.handle_records(reader)? {
-            // Outcomes of what was read leave before more is read.
+            // Send the outcomes of these records before reading more.
             self.answers.lock().flush_now();
-            // Writing has its turn before each look, and goes on when the component reads.
+            // Writing has its turn before each check, and continues when the component reads.
             let may_read = || self.answers.lock().len() < MAX_WAITING;
             reader.fill(may_read).await?;
         }
         Ok(Departure::Left)
     }
 
-    /// Handles what was read; whether the component leaves.
+    /// Handles the records read so far; returns whether the component leaves.
     fn handle_records(&self, reader: &mut Reader) -> Result<bool, RecordError> {
         let mut core = None;
         while let Some(Record { head, payload }) = reader.next_record()? {
@@ -179,7 +182,7 @@ impl Session {
         Ok(false)
     }
 
-    /// Sends a message; what is wrong with it is the component's to know.
+    /// Sends a message, and reports an error to the component.
     fn transmit(&self, core: &mut Core, message: Outgoing, handle: u64) {
         let waiter = message.acknowledge.then(|| Waiter::There {
             answers: self.answers.clone(),
@@ -192,7 +195,7 @@ impl Session {
 }
 
 impl Drop for Session {
-    /// Also when the runtime ends under it.
+    /// Also runs when the runtime ends.
     fn drop(&mut self) {
         self.depart(Departure::Stopped);
     }

@@ -1,5 +1,4 @@
-//! Control over other components: asked for, renewed before it ends, known to be lost when it is,
-//! and given back.
+//! Control over other components: requests, renewals, detection of loss, and release.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -13,24 +12,24 @@ use crate::messages::core::{
 };
 use crate::service::{Handled, NoAnswer, Outbox, Patience, code_of, read};
 
-/// Names one request for control of a component.
+/// Identifies one request for control of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ControlId(u64);
 
-/// What becomes of a request for control.
+/// The progress of a request for control.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ControlNews {
     /// The peer has granted it.
     Granted,
-    /// The peer has not granted it, and it is over.
+    /// The peer has not granted it, and the request is over.
     Refused(ControlRefused),
-    /// The peer, under control, has reported another status than before, by its code in Report
+    /// The peer, under control, has reported a different status than before, by its code in Report
     /// Status.
     Status(u8),
-    /// It was granted and is lost, for good: it is not requested again automatically.
+    /// It was granted and is lost for good: it is not requested again automatically.
     Lost(ControlLost),
-    /// It was given back: the peer has confirmed that, or its control has timed out since, or the
-    /// peer is controlled anew.
+    /// It was released: the peer has confirmed the release, or its control has timed out since, or
+    /// control of the peer was requested again.
     Released,
 }
 
@@ -44,16 +43,16 @@ pub enum ControlRefused {
     /// Confirm Control with INSUFFICIENT_AUTHORITY.
     #[error("the authority {0} is too low for it, or no greater than that of who controls it")]
     InsufficientAuthority(u8),
-    /// Confirm Control with a code that has no meaning.
+    /// Confirm Control with an undefined code.
     #[error("it answered ConfirmControl with the code {0}, which has no meaning")]
     Code(u8),
-    /// The peer has said nothing.
+    /// The peer has not answered.
     #[error(
         "it did not answer RequestControl with ConfirmControl: asked {} times in {:.1} s",
         .0.tries, .0.waited.as_secs_f64()
     )]
     NoAnswer(NoAnswer),
-    /// The application controls this peer already.
+    /// The application already controls this peer.
     #[error("this component controls it already, or is asking for it")]
     Already,
     /// The id has a wildcard or a zero.
@@ -65,29 +64,29 @@ pub enum ControlRefused {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ControlLost {
-    /// Reject Control with CONTROL_RELEASED: somebody with a greater authority has it, or the peer
-    /// has reset or timed it out.
+    /// Reject Control with CONTROL_RELEASED: a client with a greater authority has it, or the peer
+    /// has reset it or timed it out.
     #[error("the peer took it back, for another client or because it was not renewed in time")]
     TakenBack,
-    /// The peer has become unavailable, for instance by an emergency.
+    /// The peer has become unavailable, for instance because of an emergency.
     #[error("the peer cannot be controlled any more, for instance because of an emergency")]
     NotAvailable,
     /// Another client with a greater authority has it: the renewal was refused.
     #[error("another client with a greater authority has it")]
     Outranked,
-    /// The peer was started again and knows nothing of it.
+    /// The peer has restarted and lost the control.
     #[error("the peer was started again, or has dropped control without notice")]
     Restarted,
-    /// The peer has not confirmed it for longer than it lasts.
+    /// The peer has not confirmed it within its lifetime.
     #[error("the peer has not confirmed it since {:.1} s", .0.as_secs_f64())]
     Silent(Duration),
 }
 
-/// What one component controls.
+/// The control that one component has or requests.
 #[derive(Debug, Default)]
 pub(in crate::service) struct Controls {
     last: u64,
-    /// By peer, because Confirm Control says nothing else about what it confirms.
+    /// By peer, because Confirm Control does not identify the request that it confirms.
     all: BTreeMap<JausId, Control>,
     news: VecDeque<(ControlId, ControlNews)>,
 }
@@ -98,19 +97,19 @@ struct Control {
     authority: u8,
     patience: Patience,
     state: State,
-    /// How long control lasts, once the peer has told; zero is for ever.
+    /// How long control lasts, once the peer has reported it. Zero means for ever.
     lifetime: Option<Duration>,
-    /// How often it was asked for that.
+    /// How often the peer was asked for its lifetime.
     lifetime_asked: u32,
     /// Requests since the last answer, and when the first of them was sent.
     asked: u32,
     first_asked: Instant,
     /// Whether the peer has refused to renew it.
     denied: bool,
-    /// When the peer had to begin to count the lifetime, at the latest known.
+    /// The earliest time at which the peer may have started to count the lifetime.
     confirmed: Instant,
     next: Instant,
-    /// When it was last given back, by this request or the one before it.
+    /// When it was last released, by this request or the previous one.
     released: Option<Instant>,
     status: Status,
 }
@@ -128,12 +127,12 @@ struct Status {
 enum State {
     Asking,
     Held,
-    /// The application has not let go yet.
+    /// Lost, but not yet released by the application.
     Lost(ControlLost),
-    /// Since when it is being given back.
+    /// Being released since this time.
     Releasing(Instant),
-    /// The application knows that it has ended. It is kept for as long as the peer may still answer
-    /// a release.
+    /// The application knows that it has ended. The entry stays for as long as the peer may still
+    /// answer a release.
     Over,
 }
 
@@ -181,7 +180,7 @@ impl Controls {
         Ok(id)
     }
 
-    /// Gives control back, or stops asking for it.
+    /// Releases control, or cancels the request.
     pub(in crate::service) fn release(&mut self, now: Instant, id: ControlId, out: &mut Outbox) {
         let found = self.all.iter_mut().find(|(_, it)| it.id == id);
         let Some((&peer, control)) = found else {
@@ -193,7 +192,7 @@ impl Controls {
                 self.news.push_back((id, ControlNews::Released));
             }
             State::Releasing(_) | State::Over => {}
-            // Else the peer may hold its end for as long as nobody tells it.
+            // Otherwise the peer may keep its side of the control until it receives a release.
             State::Asking | State::Held | State::Lost(_) => {
                 control.state = State::Releasing(now);
                 control.give_back(now, peer, out);
@@ -201,13 +200,13 @@ impl Controls {
         }
     }
 
-    /// Whether something is being given back, and its peer has not confirmed that.
+    /// Whether a release still waits for its peer's confirmation.
     pub(in crate::service) fn is_releasing(&self) -> bool {
         let mut all = self.all.values();
         all.any(|it| matches!(it.state, State::Releasing(_)))
     }
 
-    /// Gives everything back.
+    /// Releases everything.
     pub(in crate::service) fn farewell(&mut self, now: Instant, out: &mut Outbox) {
         let held: Vec<_> = self.all.values().map(|it| it.id).collect();
         for id in held {
@@ -282,29 +281,29 @@ impl ControlNews {
 }
 
 impl Control {
-    /// The longest time between two renewals. JAUS++ renews every 1.25 s.
+    /// The longest interval between renewals. JAUS++ renews every 1.25 s.
     const RENEWAL: Duration = Duration::from_secs(1);
-    /// Between two queries for the peer's status: often enough to be a sign of life, too, for a peer
-    /// that stops when its client has been silent for a second.
+    /// Interval of status queries. Short enough to serve as a sign of life for a peer that stops
+    /// when its client has been silent for a second.
     const STATUS: Duration = Duration::from_millis(200);
-    /// A peer without Management does not report its status, and is asked no more after so many
-    /// queries.
+    /// A peer without Management does not report its status. After this many unanswered queries
+    /// they stop.
     const STATUS_TRIES: u32 = 10;
-    /// A renewal that is not confirmed is repeated after this time, so that a few lost confirmations
-    /// in a row do not cost control.
+    /// An unconfirmed renewal is repeated after this time, so that a few lost confirmations in a
+    /// row do not cost control.
     const RETRY: Duration = Duration::from_millis(250);
-    /// Between renewals while it is not known how long control lasts.
+    /// Interval of renewals while the lifetime of control is unknown.
     const HASTE: Duration = Duration::from_millis(200);
-    /// How often the peer is asked how long control lasts.
+    /// How often the peer is asked for the lifetime of control.
     const LIFETIME_TRIES: u32 = 4;
-    /// Control that is not confirmed for so long is lost, however long it lasts; and so long it
-    /// lasts if the peer does not say. It is JAUS++'s time-out.
+    /// Control that is not confirmed for this time is lost, whatever its lifetime. It is also the
+    /// lifetime if the peer does not report one. It is JAUS++'s timeout.
     const LIFETIME: Duration = Duration::from_secs(5);
-    /// A release that is not confirmed is repeated for so long: by then control has timed out. For
-    /// so long after it, an answer may come.
+    /// An unconfirmed release is repeated for this time; by then control has timed out. An answer
+    /// may arrive for the same time after the last release.
     const RELEASE_LIMIT: Duration = Duration::from_secs(5);
 
-    /// For how long a confirmation is good.
+    /// How long a confirmation is valid.
     fn lifetime(&self) -> Duration {
         match self.lifetime {
             Some(told) if !told.is_zero() => told.min(Self::LIFETIME),
@@ -312,7 +311,7 @@ impl Control {
         }
     }
 
-    /// The time between two renewals: a few may be lost before control is.
+    /// The interval between renewals. Several may be lost before control is.
     fn renewal(&self) -> Duration {
         let most = match self.wonders() {
             true => Self::HASTE,
@@ -321,7 +320,7 @@ impl Control {
         (self.lifetime() / 4).min(most)
     }
 
-    /// Whether it is still to be found out how long control lasts.
+    /// Whether the lifetime of control is still being queried.
     const fn wonders(&self) -> bool {
         self.lifetime.is_none() && self.lifetime_asked < Self::LIFETIME_TRIES
     }
@@ -335,8 +334,8 @@ impl Control {
     }
 
     fn renew(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
-        // Before the request: its answer shows whether the peer still knows of its client, which
-        // one that was started again does not.
+        // Sent before the request: the answer shows whether the peer still knows its client. A
+        // restarted peer does not.
         out.send(peer, &QueryControl {});
         self.ask(now, peer, out);
     }
@@ -361,8 +360,8 @@ impl Control {
         self.next = now + self.patience.interval;
     }
 
-    /// Whether the peer may still answer a release. That answer does not end what was requested
-    /// after it: a network may deliver the request first.
+    /// Whether the peer may still answer a release. That answer does not end control requested
+    /// after the release: the network may deliver the request first.
     fn awaits_answer_to_release(&self, now: Instant) -> bool {
         self.released
             .is_some_and(|released| now < released + Self::RELEASE_LIMIT)
@@ -377,7 +376,8 @@ impl Control {
     ) -> Option<ControlNews> {
         match (self.state, code) {
             (State::Asking | State::Held, 0) => {
-                // Which request it answers is not said: it may be the first, and the others lost.
+                // The confirmation does not say which request it answers. It may be the first, and
+                // the others lost.
                 self.confirmed = self.first_asked;
                 self.asked = 0;
                 self.denied = false;
@@ -393,15 +393,15 @@ impl Control {
                 code => ControlRefused::Code(code),
             })),
             (State::Held, 2) => self.lose(ControlLost::Outranked),
-            // An emergency, for instance: control is not renewed, and may yet be kept.
+            // For instance an emergency: control is not renewed, but may still be kept.
             (State::Held, _) => {
                 self.denied = true;
                 self.asked = 0;
                 out.send(peer, &QueryControl {});
                 None
             }
-            // A renewal was on its way when control was lost, and has brought it back behind the
-            // application's back.
+            // A renewal that was in flight when control was lost has regained it without the
+            // application's knowledge.
             (State::Lost(_), 0) => {
                 self.give_back(now, peer, out);
                 None
@@ -410,15 +410,15 @@ impl Control {
         }
     }
 
-    /// The peer reports its status.
+    /// Handles a report of the peer's status.
     fn handle_status(&mut self, status: u8) -> Option<ControlNews> {
         self.status.asked = 0;
         let is_news = self.status.reported.replace(status) != Some(status);
         (is_news && self.state == State::Held).then_some(ControlNews::Status(status))
     }
 
-    /// The peer reports who controls it. What it does not renew lasts on if it lasts for ever, and
-    /// ends with its lifetime otherwise.
+    /// Handles a report of the peer's controller. Control whose renewal was denied continues if its
+    /// lifetime is unlimited, and ends with its lifetime otherwise.
     fn handle_report(
         &mut self,
         now: Instant,
@@ -452,14 +452,14 @@ impl Control {
             (State::Held, 0) => self.lose_or_ask_again(now, peer, ControlLost::TakenBack, out),
             (State::Held, _) => self.lose(ControlLost::NotAvailable),
             (State::Releasing(_), _) => Some(ControlNews::Released),
-            // The end of a control before this one.
+            // The end of an earlier control.
             (State::Asking | State::Lost(_) | State::Over, _) => None,
         }
     }
 
-    /// The peer says that this client no longer controls it. If a release may have arrived after the
-    /// request that was granted, that release ended it, and control is requested again. Another
-    /// client that has control by now keeps it, and the answer says so.
+    /// Handles a report that this client no longer controls the peer. If a release may have arrived
+    /// after the granted request, that release ended it, and control is requested again. If another
+    /// client has control by now, it keeps it, and the answer says so.
     fn lose_or_ask_again(
         &mut self,
         now: Instant,
@@ -504,7 +504,7 @@ impl Control {
                     tries: self.asked,
                     waited: now.saturating_duration_since(self.first_asked),
                 };
-                // Its answers may be what was lost.
+                // Perhaps only the answers were lost, and the peer has granted control.
                 self.give_back(now, peer, out);
                 Some(ControlNews::Refused(ControlRefused::NoAnswer(no_answer)))
             }
@@ -535,7 +535,7 @@ impl Control {
         }
     }
 
-    /// Asks for the status of a peer under control, if it is time to.
+    /// Queries the status of a peer under control if a query is due.
     fn ask_status(&mut self, now: Instant, peer: JausId, out: &mut Outbox) {
         if self.state != State::Held || self.status.next.is_none_or(|next| next > now) {
             return;

@@ -1,8 +1,8 @@
-//! The client's half of Events and Access Control: subscriptions that outlive a peer's restart, and
+//! The client side of Events and Access Control: subscriptions that survive a peer's restart, and
 //! control that renews itself.
 //!
-//! Both are tables of small state machines, one for each thing that the application holds. They
-//! hear what the component hears, and send in its name; a [`Stack`](super::Stack) owns them.
+//! Both are tables of small state machines, one per subscription or controlled peer. They see the
+//! component's incoming messages and send on its behalf. A [`Stack`](super::Stack) owns them.
 
 mod control;
 mod news;

@@ -1,4 +1,4 @@
-//! What becomes of a subscription, as its holder is told.
+//! Notifications about a subscription.
 
 use std::fmt;
 use std::time::Instant;
@@ -8,29 +8,29 @@ use bytes::Bytes;
 use super::Rejection;
 use crate::service::NoAnswer;
 
-/// What becomes of a subscription.
+/// A notification about a subscription.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SubscriptionNews {
-    /// The peer has confirmed the event: for the first time, after it was down, or at another rate.
+    /// The peer has confirmed the event: for the first time, after an outage, or at another rate.
     Up {
         /// The confirmed rate in hertz; `None` for reports on change.
         hz: Option<f64>,
     },
-    /// A report has come.
+    /// A report has arrived.
     Report {
-        /// The report from its message code on.
+        /// The report, starting with its message code.
         report: Bytes,
-        /// How many reports before this one have been lost on the way.
+        /// The number of reports lost just before this one.
         lost: u8,
     },
-    /// Nothing comes at present; the event is being created again.
+    /// No reports arrive at present; the event is being created again.
     Down {
-        /// When the last sign of the event came.
+        /// Time of the last sign of the event.
         since: Instant,
-        /// What is the matter.
+        /// The cause.
         why: Outage,
     },
-    /// It is over, and nothing will come any more.
+    /// It is over; no more reports will arrive.
     Ended(SubscriptionEnd),
 }
 
@@ -38,13 +38,13 @@ pub enum SubscriptionNews {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Outage {
-    /// No report has come for four periods, nor for half a second.
+    /// No report has arrived for four periods and at least half a second.
     Silent,
     /// The peer does not confirm that the event still exists.
     Unconfirmed,
     /// Discovery has lost the peer.
     PeerLost,
-    /// The peer does not know the event any more, and refuses to create it again.
+    /// The peer no longer knows the event, and refuses to create it again.
     Refused(Rejection),
 }
 
@@ -59,7 +59,7 @@ impl fmt::Display for Outage {
     }
 }
 
-/// Why a subscription is over, or never came to be.
+/// Why a subscription has ended or was never established.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SubscriptionEnd {
@@ -72,12 +72,12 @@ pub enum SubscriptionEnd {
         .0.tries, .0.waited.as_secs_f64()
     )]
     NoAnswer(NoAnswer),
-    /// The peer is slower than is of use.
+    /// The peer confirmed a lower rate than required.
     #[error("only {hz:.2} Hz were confirmed, and at least {least_hz:.2} Hz are wanted")]
     TooSlow {
         /// The confirmed rate in hertz.
         hz: f64,
-        /// The least wanted rate in hertz.
+        /// The required rate in hertz.
         least_hz: f64,
     },
 }

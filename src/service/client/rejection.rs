@@ -1,5 +1,5 @@
-//! Why a peer refuses an event, read from Reject Event Request (01F4h) in the layouts that peers
-//! write.
+//! A peer's reason for refusing an event, read from Reject Event Request (01F4h) in the layouts
+//! that peers use.
 
 use std::fmt;
 
@@ -13,12 +13,12 @@ use crate::messages::core::RejectEventRequest;
 pub struct Rejection {
     /// The response code of AS5710, 1 to 6, if the peer gave one.
     pub code: Option<u8>,
-    /// What the peer says to people, if anything.
+    /// The peer's text for people, if any.
     pub text: Option<String>,
 }
 
 impl Rejection {
-    /// The number of the refused request, and the reason.
+    /// Reads the number of the refused request and the reason.
     pub(super) fn read(payload: &Bytes) -> Option<(u8, Self)> {
         if let Ok(reject) = RejectEventRequest::decode(payload) {
             let text = reject.error_message.as_ref().map(Text::to_string_lossy);

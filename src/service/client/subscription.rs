@@ -1,5 +1,5 @@
-//! One subscription: the event of a peer that brings a report again and again. It is created,
-//! renewed, found to be down and created again, until the application has had enough of it.
+//! One subscription: the event of a peer that repeats a report. It is created, renewed, and created
+//! again after an outage, until the application ends it.
 
 use std::time::{Duration, Instant};
 
@@ -12,10 +12,10 @@ use crate::address::JausId;
 use crate::messages::core::{ConfirmEventRequest, Event, QueryEventTimeout};
 use crate::service::{NoAnswer, Outbox, Patience, code_of};
 
-/// Where a subscription stands.
+/// State of a subscription.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// Never confirmed yet.
+    /// Not yet confirmed.
     New,
     Up,
     Down,
@@ -25,45 +25,45 @@ enum State {
 #[derive(Debug)]
 pub(super) struct Subscription {
     pub(super) peer: JausId,
-    /// The code of the report that is waited for.
+    /// The code of the expected report.
     report: u16,
     when: When,
     patience: Patience,
-    /// The Create Event, always the same, so that a peer can tell a repetition.
+    /// The Create Event message. It never changes, so that a peer can recognise a retransmission.
     create: Bytes,
     pub(super) request: u8,
     query: Bytes,
     state: State,
-    /// The number that the peer gave to the event.
+    /// The peer's number of the event.
     pub(super) event: Option<u8>,
     hz: Option<f64>,
     first_asked: Instant,
-    /// Requests without an answer so far.
+    /// Requests since the last answer.
     asked: u32,
     last_asked: Instant,
-    /// When to ask, be it for the first time, in vain, or to renew what is there.
+    /// When to send the next request: the first one, a repetition, or a renewal.
     next_ask: Option<Instant>,
-    /// How long the peer keeps an event that nobody renews, once it has told; zero is for ever.
+    /// How long the peer keeps an event that is not renewed, once reported. Zero means for ever.
     lifetime: Option<Duration>,
-    /// How often it was asked for that.
+    /// How often the peer was asked for its lifetime.
     lifetime_asked: u32,
-    /// When the last sign of the event came.
+    /// Time of the last sign of the event.
     heard: Instant,
     /// When the peer first confirmed the event, or another rate for it.
     begun: Instant,
-    /// When the peer said anything last.
+    /// Time of the peer's last message of any kind.
     peer_heard: Instant,
-    /// The last report's number, since the last confirmation.
+    /// The sequence number of the last report since the last confirmation.
     sequence: Option<u8>,
-    /// An event that came before its confirmation.
+    /// An event that arrived before its confirmation.
     early: Option<Event>,
     /// The last report on change.
     last: Option<Bytes>,
-    /// Whether the event was renewed since, which brings the last report once more.
+    /// Whether the event was renewed since the last report, so that the peer repeats that report.
     renewed: bool,
 }
 
-/// What a new [`Subscription`] is made of.
+/// The parameters of a new [`Subscription`].
 pub(super) struct Order {
     pub(super) peer: JausId,
     pub(super) report: u16,
@@ -75,25 +75,26 @@ pub(super) struct Order {
 }
 
 impl Subscription {
-    /// The longest time between two renewals of what is sent on change: so late a restart of the
-    /// peer is noticed that nobody else has noticed. Events of version 1.1 end after a time that is
-    /// told in whole minutes; it is a third of the shortest.
+    /// The longest interval between renewals of an event on change. It bounds how late a restart of
+    /// the peer is detected if nothing else shows it. It is a third of the shortest lifetime of
+    /// events in version 1.1, which is given in whole minutes.
     const REFRESH: Duration = Duration::from_secs(20);
-    /// How often a peer is asked how long its events last. Version 1.0 does not know the question.
+    /// How often a peer is asked for the lifetime of its events. Version 1.0 does not have this
+    /// query.
     const LIFETIME_TRIES: u32 = 3;
-    /// A periodic event is down when so many periods have brought nothing …
+    /// A periodic event is down when this many periods have brought no report …
     const SILENT_PERIODS: f64 = 4.0;
-    /// … but not sooner than this after its last report.
+    /// … but not earlier than this after its last report …
     const LEAST_SILENCE: Duration = Duration::from_millis(500);
-    /// … nor sooner than this after it was first confirmed: JAUS++ sends a first report at once, and begins
-    /// with its periods some time later.
+    /// … nor earlier than this after its first confirmation: JAUS++ sends a first report at once,
+    /// and starts its periods some time later.
     const SETTLING: Duration = Duration::from_secs(2);
-    /// Numbers may be so far ahead of what the rate explains: JAUS++ sends at the fastest rate of all
-    /// clients. A greater gap is another numbering.
+    /// How far sequence numbers may run ahead of the rate: JAUS++ sends at the fastest rate of all
+    /// clients. A larger gap means that the peer has restarted its numbering.
     const UNEXPLAINED: f64 = 16.0;
-    /// The longest pause between two attempts to bring an event back.
+    /// The longest pause between two attempts to restore an event.
     const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-    /// A peer that says something after so long a silence may have been away.
+    /// A peer that sends a message after this much silence may have been away.
     const ABSENCE: Duration = Duration::from_secs(1);
 
     pub(super) fn new(now: Instant, order: Order, out: &mut Outbox) -> Self {
@@ -126,19 +127,19 @@ impl Subscription {
         new
     }
 
-    /// Whether this subscription waits for a confirmation that an event with such a report may be
-    /// ahead of.
+    /// Whether this subscription waits for a confirmation, which an event with such a report may
+    /// have overtaken.
     pub(super) fn expects(&self, event: &Event) -> bool {
         self.asked > 0 && code_of(&event.report_message) == Some(self.report)
     }
 
-    /// Whether an event is this subscription's. Its number alone does not say so: JAUS++ counts
-    /// them anew for each query.
+    /// Whether an event belongs to this subscription. Its number alone does not tell: JAUS++
+    /// numbers events separately for each query.
     pub(super) fn owns(&self, event: &Event) -> bool {
         self.event == Some(event.event_id) && code_of(&event.report_message) == Some(self.report)
     }
 
-    /// Whether a peer that tells its events apart would take the two for the same.
+    /// Whether a peer would treat the two as the same event.
     pub(super) fn equals(&self, topic: &Topic) -> bool {
         let same_type = matches!(
             (self.when, topic.when),
@@ -147,8 +148,8 @@ impl Subscription {
         same_type && self.peer == topic.peer && self.query == topic.query
     }
 
-    /// Whether this subscription's event and the one that `other` was just told cannot both be
-    /// there.
+    /// Whether the peer has just given this subscription's event number to `other`, so that only
+    /// one of the two events can exist.
     pub(super) fn is_displaced_by(&self, other: &Self) -> bool {
         self.peer == other.peer
             && code_of(&self.query) == code_of(&other.query)
@@ -156,10 +157,11 @@ impl Subscription {
             && self.event == other.event
     }
 
-    /// The peer has given this event's number to another one, or may have cancelled it with that.
+    /// Requests the event again: the peer has given its number to another event, or may have
+    /// cancelled it together with another event.
     pub(super) fn doubt(&mut self, now: Instant) {
         self.event = None;
-        // A peer that gives everything the same number is not to be asked without end.
+        // A peer that gives every event the same number must not cause endless requests.
         self.next_ask = Some(now.max(self.last_asked + self.patience.interval));
     }
 
@@ -187,7 +189,8 @@ impl Subscription {
         self.sequence = None;
         self.next_ask = self.refresh().map(|pause| now + pause);
         if unasked {
-            // It was sent twice; or it says that the event has ended, because it was not renewed.
+            // A duplicate, or the peer's notice that the event has ended because it was not
+            // renewed.
             self.next_ask = Some(now.max(self.last_asked + self.patience.interval));
         }
         if let Some(end) = self.too_slow() {
@@ -204,8 +207,8 @@ impl Subscription {
         }
     }
 
-    /// The time between two renewals. What is periodic needs none unless its peer forgets: silence
-    /// tells that it has ended, and a renewal brings a report that is out of turn.
+    /// The interval between renewals. A periodic event needs none unless the peer lets it expire:
+    /// silence shows its end, and a renewal causes an extra report.
     fn refresh(&self) -> Option<Duration> {
         let forgotten = self.lifetime.filter(|lifetime| !lifetime.is_zero());
         let third = forgotten.map(|lifetime| lifetime / 3);
@@ -215,7 +218,7 @@ impl Subscription {
         }
     }
 
-    /// The peer has told how long it keeps an event that nobody renews.
+    /// Handles the peer's report of how long it keeps an event that is not renewed.
     pub(super) fn handle_lifetime(&mut self, now: Instant, lifetime: Duration) {
         self.lifetime = Some(lifetime);
         if self.state == State::Up && self.asked == 0 {
@@ -258,15 +261,15 @@ impl Subscription {
             .sequence
             .map(|last| event.sequence_number.wrapping_sub(last));
         if ahead.is_some_and(|ahead| ahead == 0 || ahead > u8::MAX / 2) {
-            // It was sent twice, or overtaken by a newer one; or it is another event's that a
-            // restarted peer gives the number to, and is no sign of this one.
+            // A duplicate, or overtaken by a newer report. Or it belongs to another event to which
+            // a restarted peer gave this number, and is no sign of this one.
             return;
         }
         let lost = ahead.map_or(0, |ahead| self.lost(now, ahead));
         self.heard = now;
         self.sequence = Some(event.sequence_number);
         if self.state == State::Down {
-            // It was only the network.
+            // Only the network was down.
             self.state = State::Up;
             self.next_ask = Some(now);
             news.push(SubscriptionNews::Up { hz: self.hz });
@@ -284,7 +287,7 @@ impl Subscription {
         });
     }
 
-    /// Keeps an event whose confirmation may be still to come.
+    /// Keeps an event that may have overtaken its confirmation.
     pub(super) fn keep(&mut self, event: Event) {
         self.early = Some(event);
     }
@@ -302,8 +305,8 @@ impl Subscription {
         }
     }
 
-    /// The peer has said something, whatever it was: if it was silent, it is asked at once rather
-    /// than when the next attempt is due. Only then, for a peer may talk all the time and not answer.
+    /// Handles any message from the peer. If the peer was silent before, the next request is sent
+    /// at once. Only then, because a peer may send all the time without answering.
     pub(super) fn handle_sign_of_life(&mut self, now: Instant) {
         let silence = now.saturating_duration_since(self.peer_heard);
         self.peer_heard = now;
@@ -337,7 +340,7 @@ impl Subscription {
                 )));
                 return;
             }
-            // Periodic reports that come are confirmation enough.
+            // Periodic reports that still arrive are confirmation enough.
             State::Up if exhausted && self.hz.is_none() => {
                 self.fall(now, Outage::Unconfirmed, news);
             }
@@ -350,7 +353,7 @@ impl Subscription {
         self.silent_at().into_iter().chain(self.next_ask).min()
     }
 
-    /// When a periodic event has been silent for too long.
+    /// When a periodic event will have been silent for too long.
     fn silent_at(&self) -> Option<Instant> {
         let hz = self.hz.filter(|_| self.state == State::Up)?;
         let periods = Duration::try_from_secs_f64(Self::SILENT_PERIODS / hz).ok()?;
@@ -358,8 +361,8 @@ impl Subscription {
         Some(silent.max(self.begun + Self::SETTLING))
     }
 
-    /// How many reports were lost if the next one's number is so far ahead: none if there cannot have
-    /// been so many, because the peer counts anew.
+    /// The number of lost reports if the next sequence number is `ahead` of the last one. 0 if the
+    /// rate cannot explain that many, because then the peer has restarted its numbering.
     fn lost(&self, now: Instant, ahead: u8) -> u8 {
         let passed = now.saturating_duration_since(self.heard).as_secs_f64();
         let explained = self.hz.map(|hz| hz * passed * 1.25 + Self::UNEXPLAINED);
@@ -382,7 +385,7 @@ impl Subscription {
         news.push(SubscriptionNews::Down { since, why });
     }
 
-    /// Asks for the event; a peer that has it already takes it for a renewal.
+    /// Requests the event. A peer that already has it takes the request as a renewal.
     fn ask(&mut self, now: Instant, out: &mut Outbox) {
         if self.lifetime.is_none() && self.lifetime_asked < Self::LIFETIME_TRIES {
             self.lifetime_asked += 1;
@@ -391,7 +394,7 @@ impl Subscription {
         out.send_octets(self.peer, self.create.clone());
         let pause = match self.state {
             State::New => self.patience.interval,
-            // Ever longer, so that whoever does not answer is not pestered.
+            // Exponential backoff, to spare a peer that does not answer.
             State::Up | State::Down => self
                 .patience
                 .interval

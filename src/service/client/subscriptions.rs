@@ -1,5 +1,5 @@
-//! All subscriptions of one component: who gets which message of Events, and what becomes of
-//! events that nobody wants any more.
+//! All subscriptions of one component: dispatches the messages of Events, and cancels events
+//! without a subscription.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -16,14 +16,14 @@ use crate::messages::core::{
 };
 use crate::service::{Change, Handled, Outbox, Patience, code_of, read};
 
-/// Names one subscription of a component.
+/// Identifies one subscription of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SubscriptionId(u64);
 
 /// The subscriptions of one component.
 ///
-/// Once the application has subscribed to anything, every Event message is this table's business:
-/// one that belongs to no subscription is cancelled. Before that, they are left alone.
+/// After the application's first subscription this table consumes every Event message, and cancels
+/// events that belong to no subscription. Before that it ignores them.
 #[derive(Debug, Default)]
 pub(in crate::service) struct Subscriptions {
     last: u64,
@@ -31,7 +31,7 @@ pub(in crate::service) struct Subscriptions {
     alive: BTreeMap<SubscriptionId, Subscription>,
     leaving: VecDeque<Leaving>,
     news: VecDeque<(SubscriptionId, SubscriptionNews)>,
-    /// When the next event that belongs to nobody may be cancelled.
+    /// When the next stray event may be cancelled.
     next_stray: Option<Instant>,
 }
 
@@ -46,16 +46,17 @@ struct Leaving {
 }
 
 impl Subscriptions {
-    /// Subscriptions of one component.
+    /// Limit of subscriptions of one component.
     const MOST: usize = 1024;
-    /// Subscriptions to one peer, which are told apart by one octet.
+    /// Limit of subscriptions to one peer, which one octet identifies.
     const MOST_PER_PEER: usize = 200;
-    /// Events that can be in the course of cancellation; strays are cancelled when they come.
+    /// Limit of cancellations in progress. Events beyond it are cancelled as strays when they
+    /// arrive.
     const MOST_LEAVING: usize = 256;
-    /// How often a Cancel Event is sent, and with what pause.
+    /// How often a Cancel Event is sent, and the pause between.
     const CANCEL_TRIES: u32 = 4;
     const CANCEL_PAUSE: Duration = Duration::from_millis(500);
-    /// The least time between two cancellations of events that belong to nobody.
+    /// The shortest interval between cancellations of stray events.
     const STRAY_PAUSE: Duration = Duration::from_millis(100);
 
     pub(in crate::service) fn subscribe(
@@ -88,7 +89,7 @@ impl Subscriptions {
         Ok(id)
     }
 
-    /// A number that no request to this peer has at present.
+    /// A request number that is not in use with this peer.
     fn free_request(&mut self, peer: JausId) -> Result<u8, CannotSubscribe> {
         let to_peer = self.alive.values().filter(|it| it.peer == peer);
         let most = Self::MOST_PER_PEER.min(Self::MOST);
@@ -102,12 +103,12 @@ impl Subscriptions {
         };
         let candidates = (1..=u8::MAX).map(|step| self.last_request.wrapping_add(step));
         let free = candidates.into_iter().find(|&request| !used(request));
-        // Cancellations are few, and repeating the number of one does no harm.
+        // Cancellations are few, and reusing the number of one does no harm.
         self.last_request = free.unwrap_or_else(|| self.last_request.wrapping_add(1));
         Ok(self.last_request)
     }
 
-    /// Ends a subscription, and has the peer end its event.
+    /// Ends a subscription, and cancels its event at the peer.
     pub(in crate::service) fn unsubscribe(
         &mut self,
         now: Instant,
@@ -117,13 +118,13 @@ impl Subscriptions {
         let Some(ended) = self.alive.remove(&id) else {
             return;
         };
-        // An event whose number nobody told yet is cancelled when it comes.
+        // An event whose number is not known yet is cancelled when it arrives.
         if let Some(event) = ended.event {
             self.leave(now, ended.peer, event, out);
         }
     }
 
-    /// Ends all subscriptions with one word to each peer, because there will be no time for more.
+    /// Ends all subscriptions. There will be no time to repeat the cancellations.
     pub(in crate::service) fn farewell(&mut self, now: Instant, out: &mut Outbox) {
         while let Some((&id, _)) = self.alive.first_key_value() {
             self.unsubscribe(now, id, out);
@@ -151,7 +152,7 @@ impl Subscriptions {
         self.leaving.push_back(leaving);
     }
 
-    /// A component has said something.
+    /// Handles a sign of life of a component.
     pub(in crate::service) fn hear(&mut self, now: Instant, peer: JausId) {
         for subscription in self.alive.values_mut().filter(|it| it.peer == peer) {
             subscription.handle_sign_of_life(now);
@@ -226,7 +227,7 @@ impl Subscriptions {
         }
         let leaving = |it: &Leaving| it.peer == source && it.event == event.event_id;
         let may = self.next_stray.is_none_or(|next| next <= now);
-        // Where two events share the number, this may hit the wrong one: see `has_left`.
+        // If two events share the number, this may cancel the wrong one: see `has_left`.
         if may && !self.leaving.iter().any(leaving) {
             self.next_stray = Some(now + Self::STRAY_PAUSE);
             tracing::debug!(%source, event = event.event_id, "event that nobody subscribed to");
@@ -252,7 +253,8 @@ impl Subscriptions {
         confirmed.handle_confirm(now, confirm, &mut news);
         self.doubt_the_displaced(now, id);
         let same = |it: &&mut Leaving| it.peer == source && it.event == confirm.event_id;
-        // The number is wanted again. A cancellation that is on its way is noticed yet.
+        // The number is in use again: send no more cancellations. The entry stays for one more
+        // pause, to match the answer to a cancellation in flight.
         self.leaving
             .iter_mut()
             .filter(same)
@@ -261,7 +263,7 @@ impl Subscriptions {
         Handled::Yes
     }
 
-    /// A peer that gives a number twice has restarted, and forgotten the event that had it first.
+    /// A peer that assigns a number twice has restarted and lost the event that had it first.
     fn doubt_the_displaced(&mut self, now: Instant, id: SubscriptionId) {
         let Some(confirmed) = self.alive.remove(&id) else {
             return;
@@ -281,7 +283,7 @@ impl Subscriptions {
         reason: Rejection,
         out: &mut Outbox,
     ) -> Handled {
-        // An event that is not there needs no cancelling.
+        // An event that does not exist needs no cancellation.
         if self.has_left(now, source, request) {
             return Handled::Yes;
         }
@@ -295,8 +297,8 @@ impl Subscriptions {
         Handled::Yes
     }
 
-    /// Takes an answered cancellation off the list; says whether there was one. Where numbers are
-    /// not unique, it may have hit another subscription, which is asked for again.
+    /// Removes an answered cancellation; returns whether there was one. If numbers are not unique,
+    /// it may have hit another subscription, which is then requested again.
     fn has_left(&mut self, now: Instant, source: JausId, request: u8) -> bool {
         let found = self
             .leaving
@@ -359,7 +361,7 @@ impl Subscriptions {
         self.news.pop_front()
     }
 
-    /// Tells the news, and takes leave of a subscription that is over.
+    /// Queues the news, and cancels the event of a subscription that has ended.
     fn settle(
         &mut self,
         now: Instant,

@@ -1,4 +1,4 @@
-//! What a subscription is for: whose report, how often, and whether that can be asked for at all.
+//! The topic of a subscription: peer, report and rate, and the check that the wire can carry it.
 
 use bytes::Bytes;
 
@@ -7,28 +7,28 @@ use crate::codec::{EncodeError, Message};
 use crate::messages::core::CreateEvent;
 use crate::messages::core::create_event::EventType;
 
-/// When a subscribed report is to come.
+/// When the peer sends a subscribed report.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum When {
-    /// Again and again, whether or not anything has changed.
+    /// Periodically, whether or not anything has changed.
     Periodic {
-        /// The wanted rate in hertz, above 0 and up to 1092.
+        /// The requested rate in hertz, above 0 and up to 1092.
         hz: f64,
-        /// The least rate in hertz that is of use; a peer that cannot keep it is refused.
+        /// The lowest useful rate in hertz. The subscription ends if the peer confirms less.
         least_hz: f64,
     },
-    /// Whenever it has changed.
+    /// On every change.
     OnChange,
 }
 
 impl When {
-    /// At a rate in hertz, or whatever lower rate the peer can keep.
+    /// At a rate in hertz, or the lower rate that the peer confirms.
     #[must_use]
     pub const fn hz(hz: f64) -> Self {
         Self::Periodic { hz, least_hz: 0.0 }
     }
 
-    /// Refuses a peer that cannot keep `least_hz`.
+    /// Ends the subscription if the peer confirms less than `least_hz`.
     #[must_use]
     pub const fn at_least(self, least_hz: f64) -> Self {
         match self {
@@ -38,12 +38,12 @@ impl When {
     }
 }
 
-/// What is subscribed to.
+/// What a subscription is for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Topic {
-    /// Whose reports.
+    /// The component that sends the reports.
     pub peer: JausId,
-    /// The query from its message code on, whose answer the report is.
+    /// The query whose answer is the report, starting with its message code.
     pub query: Bytes,
     /// The message code of the report.
     pub report: u16,
@@ -52,16 +52,16 @@ pub struct Topic {
 }
 
 impl Topic {
-    /// Whether the wire can carry what is asked for.
+    /// Checks that the wire can carry this request.
     ///
     /// # Errors
-    /// What can not be, as [`Stack::subscribe`](crate::service::Stack::subscribe) would say.
+    /// The reason if it cannot, as from [`Stack::subscribe`](crate::service::Stack::subscribe).
     pub fn check(&self) -> Result<(), CannotSubscribe> {
         self.create_event(0)?.encode()?;
         Ok(())
     }
 
-    /// The request that is sent for it.
+    /// The Create Event message for it.
     pub(super) fn create_event(&self, request: u8) -> Result<CreateEvent, CannotSubscribe> {
         let mut create = CreateEvent {
             request_id: request,
@@ -72,7 +72,7 @@ impl Topic {
         if let When::Periodic { hz, .. } = self.when {
             create.event_type = EventType::PERIODIC_SC;
             let set = create.set_requested_periodic_rate_hz(hz);
-            // What is rounded to 0 would be no rate.
+            // A rate that rounds to 0 is no rate.
             if set.is_err() || create.requested_periodic_rate == Default::default() {
                 return Err(CannotSubscribe::Rate { hz });
             }
@@ -81,26 +81,26 @@ impl Topic {
     }
 }
 
-/// Why a subscription cannot even be tried.
+/// Why a subscription cannot even be requested.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CannotSubscribe {
-    /// Only one component can be subscribed to at a time.
+    /// A subscription is to exactly one component.
     #[error("{0} is not one component, and an event is one component's")]
     NotOneComponent(JausId),
     /// The wire carries rates up to 1092 Hz in steps of 1/60 Hz.
     #[error("{hz} Hz cannot be asked for: a rate is from 1/60 to 1092 Hz")]
     Rate {
-        /// The wanted rate in hertz.
+        /// The requested rate in hertz.
         hz: f64,
     },
     /// The wire cannot carry the query.
     #[error(transparent)]
     Encode(#[from] EncodeError),
-    /// The peer would take both for one event.
+    /// The peer would treat both as one event.
     #[error("this component subscribes to it already: use that subscription, or drop it first")]
     Already,
-    /// There is no room.
+    /// The limit of subscriptions is reached.
     #[error("there are {0} subscriptions already, and no more are possible: drop some")]
     TooMany(usize),
 }

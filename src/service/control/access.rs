@@ -1,4 +1,4 @@
-//! Access Control: who is in control, and who may be.
+//! Access Control: grants, renews and ends control.
 
 use std::time::Instant;
 
@@ -72,7 +72,7 @@ impl Control {
     ) {
         let client = message.source;
         match self.standing.controller {
-            // It has made itself too weak to keep control.
+            // It has lowered its authority too far to keep control.
             Some(controller) if controller.id == client && authority < access.authority => {
                 return self.drop_controller(out);
             }
@@ -80,8 +80,8 @@ impl Control {
             Some(controller) if authority <= controller.authority => {
                 return confirm(message, Confirmation::INSUFFICIENT_AUTHORITY, out);
             }
-            // Whoever is stronger than the controller takes over. Its rank is not less than the
-            // default authority, as the controller's is not.
+            // A client with a higher authority takes over. Its authority is at least the default
+            // one, as the controller's is.
             Some(controller) => reject(controller, Rejection::CONTROL_RELEASED, out),
             None if authority < access.authority => {
                 return confirm(message, Confirmation::INSUFFICIENT_AUTHORITY, out);
@@ -107,12 +107,12 @@ impl Control {
         } else if self.is_controller(client) {
             self.drop_controller(out);
         } else if self.standing.controller.is_none() {
-            // A client that asks again, because the answer was lost, gets it again.
+            // Answer again a client that repeats its release because the answer was lost.
             out.reply(message, &answer(Rejection::CONTROL_RELEASED));
         }
     }
 
-    /// Any rank from the default authority up to the present one.
+    /// Accepts any authority from the default one up to the current one.
     fn set_authority(&mut self, access: AccessControl, authority: u8, message: &Received) {
         let emergency = self.standing.state == State::Emergency;
         if let Some(controller) = &mut self.standing.controller
@@ -135,8 +135,8 @@ impl Control {
             })
     }
 
-    /// Whether control can be had at all: also in an emergency that only the client in control can
-    /// clear, while there is none.
+    /// Whether control can be requested at all. In an emergency only if all clients that set one
+    /// are dead, so that a new client in control can clear it.
     fn is_available(&self, is_alive: impl Fn(JausId) -> bool) -> bool {
         match self.standing.state {
             State::Ready | State::Standby => true,
@@ -147,7 +147,7 @@ impl Control {
         }
     }
 
-    /// Ends control and says so; what was ready falls back to standby.
+    /// Ends control and notifies the client. A ready component falls back to standby.
     pub(in crate::service) fn drop_controller(&mut self, out: &mut Outbox) {
         self.deadline = None;
         if let Some(controller) = self.standing.controller.take() {

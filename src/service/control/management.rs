@@ -10,8 +10,8 @@ use crate::messages::core::{
 };
 use crate::service::{Handled, Outbox, State};
 
-/// The most clients whose emergencies are remembered. One more takes the place of one that shows no life;
-/// if there is none, its emergency is cleared by the client in control.
+/// Limit of remembered clients with an emergency. The next one replaces one that shows no life. If
+/// there is none, it is only noted, and the client in control clears it.
 const MOST_EMERGENCIES: usize = 1024;
 
 impl Condition {
@@ -39,7 +39,7 @@ impl Control {
             Standby::CODE => self.stand_by(client),
             Reset::CODE => self.reset(client, out),
             Shutdown::CODE => self.shut_down(client, out),
-            // Whatever the code of the emergency is: stopping is always right.
+            // The emergency code does not matter: stopping is always right.
             SetEmergency::CODE => self.set_emergency(client, is_alive),
             ClearEmergency::CODE => self.clear_emergency(client, is_alive, out),
             _ => return Handled::No,
@@ -47,7 +47,7 @@ impl Control {
         Handled::Yes
     }
 
-    /// The application tells how it is.
+    /// Handles the application's report of its condition.
     pub(in crate::service) fn handle_condition(&mut self, condition: Condition, out: &mut Outbox) {
         if self.management.is_none() {
             return;
@@ -58,7 +58,7 @@ impl Control {
             self.more_emergencies = false;
             self.end_emergency(out);
         }
-        // Told during an emergency, the others count afterwards.
+        // During an emergency, other reports take effect afterwards.
         let state = match &mut self.standing.state {
             State::Emergency => &mut self.resting,
             state => state,
@@ -132,7 +132,7 @@ impl Control {
         }
     }
 
-    /// Clears the emergency of a client; for the client in control also those of the dead.
+    /// Clears the emergency of a client. The client in control also clears those of dead clients.
     fn clear_emergency(
         &mut self,
         client: JausId,
@@ -157,8 +157,8 @@ impl Control {
         }
     }
 
-    /// Control may have been had to clear the emergency; what cannot be controlled otherwise is not
-    /// controlled afterwards.
+    /// Control may have been granted only to clear the emergency. It ends if the next state does
+    /// not allow control.
     fn end_emergency(&mut self, out: &mut Outbox) {
         if self.standing.state == State::Emergency {
             if !matches!(self.resting, State::Standby | State::Ready) {

@@ -1,34 +1,36 @@
-//! Who may command a component, and what it is fit for: the services Access Control and Management
-//! (AS5710) as one machine, because the second only adds states to the first.
+//! Control of a component and its states: the services Access Control and Management (AS5710) as
+//! one state machine, because Management only adds states to Access Control.
 //!
 //! | state | controlled by a client | what a component does |
 //! |---|---|---|
-//! | [`Initialize`](State::Initialize) | never | gets ready, if it [said so](Management::initializes) |
-//! | [`Standby`](State::Standby) | or not | nothing; where it starts, and where it falls back to |
+//! | [`Initialize`](State::Initialize) | never | starts up, if [configured](Management::initializes) |
+//! | [`Standby`](State::Standby) | maybe | nothing; the initial state, and the one to fall back to |
 //! | [`Ready`](State::Ready) | always | acts |
-//! | [`Emergency`](State::Emergency) | or not | nothing, until each client that set one clears it |
+//! | [`Emergency`](State::Emergency) | maybe | nothing, until each client that set one clears it |
 //! | [`Failure`](State::Failure), [`Shutdown`](State::Shutdown) | never | nothing any more |
 //!
-//! A component with Access Control alone is always ready. Losing control (released, timed out, taken
-//! by nobody else, its client gone) leads from Ready to Standby.
+//! A component with Access Control alone is always ready. Losing control (release, timeout, dead
+//! client; not a takeover by another client) leads from Ready to Standby.
 //!
-//! # Where sources disagree
+//! # Where the sources disagree
 //!
-//! * **During an emergency** the published machines forget that the application has become fit or
-//!   has failed. Here it counts when the emergency is over, for nobody would tell it again.
-//! * **After an emergency** the published machines of 1.1 go back to where they were, so that
-//!   clearing sets a vehicle in motion; others (fkie) go to Standby. We go to Standby: whoever is in
-//!   control must say Resume. Control itself is kept, as 1.1 has it.
-//! * **Release in an emergency** is refused with Not Available whether the client was in control or
-//!   not, as the public contests' judges expect it.
-//! * **The timeout** is 4 s by default, and ends control a quarter of it late, so that a client that
-//!   does not renew controls nothing after 5 s. JAUS++ clients renew four times in its course. The
-//!   public contests' judging tool requests control once and never renews: for that, set it to 0.
-//! * **An emergency** ends when each client that set one clears it, as the standard has it. A client
-//!   that is dead, or that never existed because its id was forged, cannot: an emergency whose setter
-//!   shows no life for 4 s may also be cleared by the client in control, and if nobody is, control
-//!   can be had again for that purpose. The application on the vehicle may end all of them
-//!   ([`Condition::Safe`]).
+//! * **During an emergency** the published state machines lose the application's report that it is
+//!   initialized or has failed. Here the report takes effect after the emergency, because the
+//!   application will not repeat it.
+//! * **After an emergency** the published state machines of 1.1 return to the previous state, so
+//!   that clearing sets a vehicle in motion; others (fkie) go to Standby. This one goes to Standby:
+//!   the client in control must send Resume. Control itself is kept, as in 1.1.
+//! * **Release in an emergency** is refused with Not Available whether or not the client is in
+//!   control, as the judges of the public competitions expect.
+//! * **The timeout** is 4 s by default and has a quarter of it as grace, so that a client that does
+//!   not renew loses control after 5 s. JAUS++ clients renew every 1.25 s, four times in that
+//!   period. The public competitions' judging tool requests control once and never renews: for
+//!   that, set the timeout to 0.
+//! * **An emergency** ends when each client that set one has cleared it, as in the standard. A dead
+//!   client cannot, nor one that never existed because its id was forged. So the client in control
+//!   may also clear emergencies whose setter has shown no life for 4 s. If no client is in control,
+//!   control can be requested for that purpose. The application on the vehicle can end all
+//!   emergencies ([`Condition::Safe`]).
 
 mod access;
 mod management;
@@ -44,7 +46,7 @@ use crate::codec::{Message, ServiceId};
 use crate::endpoint::Received;
 use crate::messages::core::{self, report_timeout};
 
-/// How a component can be controlled.
+/// Settings of Access Control.
 ///
 /// ```
 /// use jaus::service::AccessControl;
@@ -58,11 +60,11 @@ pub struct AccessControl {
 }
 
 impl AccessControl {
-    /// After how many seconds control ends by default that its client does not request again.
+    /// The default of [`timeout`](Self::timeout), in seconds.
     pub const TIMEOUT: u8 = 4;
 
-    /// Obeys any client with an authority of at least 1, until it has not requested control for
-    /// [`TIMEOUT`](Self::TIMEOUT) and a quarter of it.
+    /// Obeys any client with an authority of at least 1. Control ends when the client has not
+    /// requested it again for 1.25 × [`TIMEOUT`](Self::TIMEOUT).
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -71,17 +73,17 @@ impl AccessControl {
         }
     }
 
-    /// The default authority: clients with less do not get control.
+    /// The default authority. Clients with a lower one do not get control.
     #[must_use]
     pub const fn authority(mut self, code: u8) -> Self {
         self.authority = code;
         self
     }
 
-    /// After how many seconds control ends unless its client requests it again; 0 for never. A
-    /// client that has answered Query Heartbeat Pulse before and answers no more loses control
-    /// after 4 s in any case; for one that never did, 0 means that only standby, release or an
-    /// emergency stops the component.
+    /// The timeout of control in seconds, counted from the client's last request; 0 disables it.
+    /// Control ends a quarter of it late. A client that has answered Query Heartbeat Pulse before
+    /// and no longer does loses control after 4 s in any case. For a client that never did, 0 means
+    /// that only standby, release or an emergency stops the component.
     #[must_use]
     pub const fn timeout(mut self, seconds: u8) -> Self {
         self.timeout = seconds;
@@ -95,7 +97,7 @@ impl Default for AccessControl {
     }
 }
 
-/// The life of a component that clients start and stop, which includes Access Control.
+/// Settings of Management, which includes Access Control: clients start and stop the component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Management {
     access: AccessControl,
@@ -103,7 +105,7 @@ pub struct Management {
 }
 
 impl Management {
-    /// In standby from the beginning, with the usual [`AccessControl`].
+    /// Starts in standby, with the default [`AccessControl`].
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -112,15 +114,15 @@ impl Management {
         }
     }
 
-    /// How it can be controlled.
+    /// Sets the settings of Access Control.
     #[must_use]
     pub const fn access_control(mut self, access: AccessControl) -> Self {
         self.access = access;
         self
     }
 
-    /// Begins in [`State::Initialize`], and returns there at each reset, until the application says
-    /// that it is done.
+    /// Starts in [`State::Initialize`], and returns there on each reset, until the application
+    /// reports [`Condition::Initialized`].
     #[must_use]
     pub const fn initializes(mut self) -> Self {
         self.initializes = true;
@@ -128,20 +130,20 @@ impl Management {
     }
 }
 
-/// What the application tells about its own state.
+/// The application's report of its own condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Condition {
-    /// It has become fit to work: has done what [`State::Initialize`] is for, or mended what had
-    /// led to [`State::Failure`]. Without effect in other states.
+    /// It is ready for work: it has finished [`State::Initialize`], or repaired the cause of
+    /// [`State::Failure`]. Has no effect in other states.
     Initialized,
-    /// Something is broken; without effect while shutting down.
+    /// Something is broken. Has no effect during shutdown.
     Failed,
-    /// Whoever is responsible for the component on the spot has seen to it: every emergency is over,
-    /// also those of clients that have gone and will not clear theirs.
+    /// The person responsible for the component on site has checked it. All emergencies end,
+    /// including those of clients that are gone and will not clear theirs.
     Safe,
 }
 
-/// The control over one component. Without settings anyone is obeyed, and no message is answered.
+/// The control over one component. Without settings it obeys anyone and answers no message.
 #[derive(Debug, Default)]
 pub(super) struct Control {
     access: Option<AccessControl>,
@@ -151,9 +153,9 @@ pub(super) struct Control {
     deadline: Option<Instant>,
     /// The clients that have set an emergency and not cleared it.
     emergencies: BTreeSet<JausId>,
-    /// Whether there were more than can be remembered.
+    /// Whether more emergencies were set than the table holds.
     more_emergencies: bool,
-    /// Where an emergency leads back to.
+    /// The state to return to after an emergency.
     resting: State,
 }
 
@@ -191,7 +193,7 @@ impl Control {
         offers
     }
 
-    /// Handles a message; `is_alive` says whether a client shows life.
+    /// Handles a message; `is_alive` tells whether a client shows life.
     pub(super) fn handle_message(
         &mut self,
         now: Instant,
@@ -222,7 +224,7 @@ impl Control {
             return;
         }
         if self.standing.state == State::Emergency {
-            // Control is kept over an emergency.
+            // Control continues through an emergency.
             self.renew(now);
         } else {
             tracing::info!(id = %out.source(), "control has timed out");
@@ -234,7 +236,7 @@ impl Control {
         self.deadline
     }
 
-    /// A client is gone, as far as discovery can tell.
+    /// Handles the loss of a client, as far as discovery can tell.
     pub(super) fn forget(&mut self, client: JausId, out: &mut Outbox) {
         if self.is_controller(client) {
             tracing::info!(id = %out.source(), %client, "the client in control is gone");
@@ -252,22 +254,22 @@ impl Control {
         self.management.is_some()
     }
 
-    /// Whether control ends that is not renewed.
+    /// Whether control has a timeout.
     pub(super) fn has_timeout(&self) -> bool {
         self.access.is_some_and(|access| access.timeout > 0)
     }
 
-    /// Whether a client has set an emergency that is not over.
+    /// Whether a client has set an emergency and not cleared it.
     pub(super) fn has_emergency_of(&self, client: JausId) -> bool {
         self.emergencies.contains(&client)
     }
 
-    /// Whether the application is still getting ready, also beneath an emergency.
+    /// Whether the application is still initializing, including during an emergency.
     pub(super) fn is_initializing(&self) -> bool {
         self.beneath_emergency() == State::Initialize
     }
 
-    /// Whether something is broken, also beneath an emergency.
+    /// Whether the component has failed, including during an emergency.
     pub(super) fn has_failed(&self) -> bool {
         self.beneath_emergency() == State::Failure
     }
@@ -279,7 +281,7 @@ impl Control {
         }
     }
 
-    /// The component ends: nobody is in control any more, and with Management nobody can be.
+    /// Ends all control because the component ends. With Management nobody can get it again.
     pub(super) fn end(&mut self, out: &mut Outbox) {
         self.drop_controller(out);
         if self.management.is_some() {
@@ -287,7 +289,7 @@ impl Control {
         }
     }
 
-    /// Begins the timeout anew.
+    /// Restarts the timeout.
     fn renew(&mut self, now: Instant) {
         let seconds = self.access.map_or(0, |access| access.timeout);
         let timeout = Duration::from_secs(seconds.into());
@@ -295,12 +297,12 @@ impl Control {
     }
 }
 
-/// The octet of Report Timeout.
+/// The timeout field of Report Timeout.
 fn timeout_field(seconds: u8) -> report_timeout::Timeout {
     report_timeout::Timeout(seconds)
 }
 
-/// Reads a message and does something with it, if it can be read.
+/// Decodes a message and acts on it if it decodes.
 fn with<M: Message>(message: &Received, act: impl FnOnce(M)) -> Handled {
     if let Some(message) = read(message) {
         act(message);

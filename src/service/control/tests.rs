@@ -1,4 +1,4 @@
-//! Each row of Access Control and Management, with a whole component and under virtual time.
+//! Each row of Access Control and Management, with a whole component and in virtual time.
 
 mod stopping;
 
@@ -39,8 +39,8 @@ impl Rig {
         rig
     }
 
-    /// In a state, under the control of `FIRST` where that can be, with an emergency of `THIRD`
-    /// where one is meant.
+    /// In the given state, controlled by `FIRST` if the state allows control, with an emergency of
+    /// `THIRD` if the state is Emergency.
     fn brought_to(state: State) -> Self {
         let mut rig = Self::with(|stack| stack.management(Management::new().initializes()));
         if state != State::Initialize {
@@ -208,7 +208,7 @@ fn by_default_control_ends_within_5_s_of_the_last_request() {
     assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
 }
 
-/// A component whose client need not renew control.
+/// A component whose clients need not renew control.
 fn lasting() -> Rig {
     let access = AccessControl::new().timeout(0);
     let mut rig = Rig::with(|stack| stack.management(Management::new().access_control(access)));
@@ -404,7 +404,7 @@ fn a_failure_that_is_mended_leads_to_standby() {
     assert_eq!(rig.request(FIRST, 100), [granted]);
 }
 
-/// What each message of a client leads to, in each state, by who sends it.
+/// The effect of each message, in each state, for each kind of sender.
 #[test]
 fn every_message_in_every_state_leads_where_the_clause_says_and_nowhere_else() {
     use State::{Emergency, Failure, Initialize, Ready, Shutdown as Down, Standby as Idle};
@@ -581,7 +581,7 @@ fn a_flood_of_forged_emergencies_hides_no_real_one_and_is_cleared_by_the_client_
     rig.hear(FIRST, &CLEAR);
     assert_eq!(rig.state(), State::Emergency, "THIRD is alive");
     rig.hear(THIRD, &CLEAR);
-    // There were more than can be remembered: those are left to the client in control.
+    // There were more than the table holds; the client in control clears those.
     rig.hear(FIRST, &CLEAR);
     assert_eq!(rig.state(), State::Standby);
 }

@@ -1,4 +1,4 @@
-//! The answering side: what we tell about ourselves and those we know.
+//! The answering side: reports about this component and the components it knows.
 
 use std::time::Instant;
 
@@ -15,12 +15,12 @@ use crate::messages::core::{
 };
 use crate::service::{Component, Directory, Level, Node, Outbox, Subsystem, read};
 
-/// A list of services is cut into several reports so that each stays under this many octets: one
+/// Lists of services are split into several reports, so that each stays under this many octets: one
 /// packet, which every peer can read.
 const REPORT_LIMIT: usize = 1300;
 
 impl Discovery {
-    /// Whether there is something left of the answers that we may give.
+    /// Whether the budget allows another answer.
     fn may_answer(&mut self, now: Instant, received: &Received) -> bool {
         if self.quoted {
             return true;
@@ -43,7 +43,7 @@ impl Discovery {
             return;
         };
         if !self.quoted {
-            // A call is also news about the caller.
+            // A call also announces its sender.
             self.known.lock().admit(now, received);
         }
         let told = match query.query_type.0 {
@@ -53,7 +53,7 @@ impl Discovery {
             4 => self.profile.identification(Level::Component),
             _ => return,
         };
-        // Who has no name for what it belongs to leaves the answer to those who have.
+        // A component without a configured name leaves the answer to others.
         if !told.name.is_empty() && self.may_answer(now, received) {
             let report = ReportIdentification {
                 query_type: query.query_type.0.into(),
@@ -119,7 +119,7 @@ impl Discovery {
             node_id: id.node(),
             component_id: id.component(),
         });
-        // The count is one octet.
+        // The count field is one octet.
         let subsystem_list = subsystems.take(usize::from(u8::MAX)).collect();
         out.reply(received, &ReportSubsystemList { subsystem_list });
     }
@@ -133,7 +133,7 @@ impl Discovery {
         let directory = self.directory();
         let mut asked = self.speaks_for(&directory, together);
         asked.retain(|component| wanted(component.id));
-        // Who reads one report only gets that of the component it asked.
+        // The own component first: some clients read only one report.
         asked.sort_by_key(|component| component.id != self.own);
         let mut reports = Vec::new();
         for component in asked {
@@ -184,7 +184,7 @@ impl Discovery {
         }
     }
 
-    /// The components that we speak for: ourselves, or all that we know of our subsystem.
+    /// The components to answer for: this one, or all known directly in its subsystem.
     fn speaks_for<'d>(&self, directory: &'d Directory, together: bool) -> Vec<&'d Component> {
         let own = self.own;
         let known = self.known.lock();
@@ -195,7 +195,7 @@ impl Discovery {
     }
 }
 
-/// Tells a component's services to every peer that may have asked for them.
+/// Reports a component's services to every peer that may have queried them.
 pub(super) fn tell_services(
     directory: &Directory,
     own: JausId,
@@ -213,7 +213,7 @@ pub(super) fn tell_services(
     }
 }
 
-/// What we know ourselves of a node; `None` if that is nothing.
+/// The components of a node that are known directly; `None` if there are none.
 fn configuration_of(id: u8, node: &Node, known: &Known) -> Option<report_configuration::NodeSeq> {
     let components = node.components().filter(|it| known.is_heard(it.id));
     let components = components.map(|component| report_configuration::ComponentRec {
@@ -227,8 +227,7 @@ fn configuration_of(id: u8, node: &Node, known: &Known) -> Option<report_configu
     })
 }
 
-/// Whether a Query Services asks for this component. An empty list asks for everything, and so
-/// does the number 255.
+/// Whether a Query Services covers this component. An empty list or the number 255 covers all.
 fn query_services_wants(query: &QueryServices, id: JausId) -> bool {
     let component_wanted = |node: &query_services::NodeSeq| {
         let wanted = |number: u8| [JausId::ANY_COMPONENT, id.component()].contains(&number);
@@ -245,8 +244,8 @@ fn query_services_wants(query: &QueryServices, id: JausId) -> bool {
         })
 }
 
-/// The text filters with which a Query Service List asks for this component; `None` if it does
-/// not ask for it, an empty filter if it asks for all its services.
+/// The text filters of a Query Service List for this component: `None` if the query does not cover
+/// it, an empty filter if it covers all its services.
 fn service_list_filters(query: &QueryServiceList, id: JausId) -> Option<Vec<String>> {
     if query.subsystem_list.is_empty() {
         return Some(vec![String::new()]);
@@ -290,7 +289,7 @@ fn component_filters(
     everything.into_iter().chain(filters)
 }
 
-/// Adds a component to the last report, or to a new one if there is no room in it.
+/// Adds a component to the last report, or to a new one if it does not fit.
 fn add_services(reports: &mut Vec<ReportServices>, component: &Component) {
     use report_services::{ComponentRec, ComponentSeq, NodeRec, NodeSeq, ServiceRec};
 
@@ -308,7 +307,7 @@ fn add_services(reports: &mut Vec<ReportServices>, component: &Component) {
             component_id: number,
             instance_id: 0,
         },
-        // The count is one octet.
+        // The count field is one octet.
         service_list: services.take(usize::from(u8::MAX)).collect(),
     };
     let room =
@@ -338,8 +337,8 @@ fn add_services(reports: &mut Vec<ReportServices>, component: &Component) {
     }
 }
 
-/// Adds those services of a component that pass one of the filters, as a report of its own:
-/// Report Service List is rare, and simple beats short.
+/// Adds the services of a component that pass one of the filters, as a separate report: Report
+/// Service List is rare, and simple beats short.
 fn add_filtered(reports: &mut Vec<ReportServiceList>, component: &Component, filters: &[String]) {
     use report_service_list::{
         ComponentRec, ComponentSeq, NodeRec, NodeSeq, ServiceRec, SubsystemRec, SubsystemSeq,

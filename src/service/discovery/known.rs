@@ -1,5 +1,5 @@
-//! What the components of one node know together of the others: one directory, and one search that
-//! keeps it.
+//! The shared discovery state of the components of one node: one directory, and one search that
+//! maintains it.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -15,20 +15,19 @@ use crate::service::{Directory, Level};
 
 /// The directory that the components of one node share, and the search behind it.
 ///
-/// Each component [joins](Discovery::join) it. One of them, the one with the lowest id, calls and asks
-/// for all; what any of them hears is known to all.
+/// Each component [joins](Discovery::join) it. The one with the lowest id sends calls and queries
+/// for all. All share what any of them receives.
 #[derive(Debug)]
 pub struct NodeDirectory(Mutex<Known>);
 
-/// What discovery has left out because of its limits.
+/// Counts of what discovery has refused because of its limits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Refused {
-    /// Components, and questions about components, for which the share of their network address had
-    /// no room.
+    /// Components, and queries about components, beyond the share of their network address.
     pub no_room: u64,
-    /// Messages that were longer than any of their kind has to be.
+    /// Messages longer than any valid one of their kind.
     pub too_long: u64,
-    /// Lists of services that were cut, or left out, because they were too long.
+    /// Lists of services that were truncated or dropped because they were too long.
     pub cut: u64,
     /// Names and lists of services that changed too often.
     pub too_often: u64,
@@ -42,38 +41,38 @@ pub(super) struct Known {
     pub(super) directory: Arc<Directory>,
     pub(super) peers: Peers,
     pub(super) questions: Questions,
-    /// For each subsystem, the component that is asked for its configuration.
+    /// For each subsystem, the component that is queried for its configuration.
     pub(super) reporters: BTreeMap<u16, JausId>,
-    /// For questions that were never asked, and for those that were, probes among them.
+    /// Budgets for first queries, and for repeated queries and probes.
     pub(super) first: Budget,
     pub(super) again: Budget,
     pub(super) calls: u32,
     pub(super) next_call: Option<Instant>,
-    /// The components of this node, with the number of the change that each reads next.
+    /// The components of this node, with the number of the next change for each to read.
     members: BTreeMap<JausId, u64>,
     log: VecDeque<Change>,
     /// The number of the first change in the log.
     log_start: u64,
-    /// The length at which the log is looked through for what everybody has read.
+    /// The log length at which changes that every member has read are removed.
     log_limit: usize,
     refused: Refused,
     next_warning: Option<Instant>,
 }
 
 impl NodeDirectory {
-    /// An empty directory for the components of one node. `seed` is for the jitter of its times.
+    /// An empty directory for the components of one node. `seed` is for the jitter.
     #[must_use]
     pub fn new(scope: Scope, timing: Timing, seed: u64) -> Self {
         Self(Mutex::new(Known::new(scope, timing, seed)))
     }
 
-    /// Everybody who is known, the components of the node included.
+    /// All known components, including those of the node.
     #[must_use]
     pub fn directory(&self) -> Arc<Directory> {
         self.lock().directory.clone()
     }
 
-    /// How many changes there were: while this stays the same there is nothing for the members to read.
+    /// The number of changes so far. While it stays the same, members have nothing new to read.
     #[must_use]
     pub fn change_count(&self) -> u64 {
         let known = self.lock();
@@ -86,17 +85,17 @@ impl NodeDirectory {
 }
 
 impl Known {
-    /// Questions that were never asked: a burst of so many, for a network that is found at once, then
-    /// one in this time. JAUS++ takes some 900 messages a second.
+    /// Budget of first queries: a burst, to find a whole network at once, then one per interval.
+    /// JAUS++ handles some 900 messages per second.
     const FIRST_BURST: u32 = 96;
     const FIRST_REFILL: Duration = Duration::from_millis(5);
-    /// Questions that were asked before, and probes.
+    /// Budget of repeated queries and probes.
     const AGAIN_BURST: u32 = 64;
     const AGAIN_REFILL: Duration = Duration::from_millis(31);
-    /// Changes that are kept for components that have not read them.
+    /// Limits of changes that are kept for components that have not read them.
     const LONGEST_LOG: usize = 8192;
     const SHORTEST_LOG: usize = 64;
-    /// Between two warnings about what is left out.
+    /// The shortest interval between warnings about refused entries.
     const WARNING_INTERVAL: Duration = Duration::from_secs(30);
 
     fn new(scope: Scope, timing: Timing, seed: u64) -> Self {
@@ -125,12 +124,12 @@ impl Known {
         self.refused
     }
 
-    /// The tree, for changes; copied first if an application holds it.
+    /// The tree, for changes. It is copied first if an application holds it.
     pub(super) fn tree(&mut self) -> &mut Directory {
         Arc::make_mut(&mut self.directory)
     }
 
-    /// Takes in a component of this node. What it belongs to keeps the name that it has.
+    /// Adds a component of this node. Its subsystem and node keep the names that they have.
     pub(super) fn join(&mut self, own: JausId, profile: &Profile) {
         self.questions.forget(own);
         self.peers.remove(own);
@@ -153,19 +152,19 @@ impl Known {
         self.skip(own);
     }
 
-    /// A component of this node is gone.
+    /// Removes a component of this node.
     pub(super) fn leave(&mut self, own: JausId) {
         self.members.remove(&own);
         self.tree().remove(own);
         self.tell(Change::Lost(own, Loss::Unlisted));
     }
 
-    /// Whether a component calls and asks for all.
+    /// Whether a component sends calls and queries for all.
     pub(super) fn is_leader(&self, id: JausId) -> bool {
         self.members.keys().next() == Some(&id)
     }
 
-    /// Whether `id` is somebody to know and not of this node.
+    /// Whether `id` is a component in scope that is not of this node.
     pub(super) fn covers(&self, id: JausId) -> bool {
         let mut members = self.members.keys();
         let in_scope = match self.scope {
@@ -176,14 +175,14 @@ impl Known {
         in_scope && id.is_unicast() && !self.members.contains_key(&id)
     }
 
-    /// Whether a component is of this node or was heard itself. Only those are told to others: two nodes
-    /// that repeat what the other lists would keep the dead alive for ever.
+    /// Whether a component is of this node or was heard directly. Only those are reported to
+    /// others: two nodes that repeat each other's lists would keep dead components alive for ever.
     pub(super) fn is_heard(&self, id: JausId) -> bool {
         let speaks = |peer: &super::peers::Peer| peer.listed_by.is_none();
         self.members.contains_key(&id) || self.peers.get(id).is_some_and(speaks)
     }
 
-    /// Wants to know something, as far as the share of the component's address goes.
+    /// Queues a query, as far as the share of the component's address allows.
     pub(super) fn wonder(&mut self, now: Instant, about: JausId, what: What, share: Share) {
         let is_wanted = self.scope != Scope::Nobody;
         if is_wanted && !self.questions.wonder(now, Question { about, what }, share) {
@@ -191,7 +190,7 @@ impl Known {
         }
     }
 
-    /// Leaves something out: it is counted, and now and then logged.
+    /// Counts something that exceeds the limits, with a warning from time to time.
     pub(super) fn refuse(&mut self, now: Instant, count: impl FnOnce(&mut Refused) -> &mut u64) {
         *count(&mut self.refused) += 1;
         if self.next_warning.is_none_or(|due| due <= now) {
@@ -212,7 +211,7 @@ impl Known {
         }
     }
 
-    /// Notes a change for all components of this node.
+    /// Logs a change for all components of this node.
     pub(super) fn tell(&mut self, change: Change) {
         if self.log.len() >= self.log_limit {
             self.trim();
@@ -230,7 +229,7 @@ impl Known {
         Some(change)
     }
 
-    /// Takes all changes so far for read.
+    /// Marks all changes so far as read.
     pub(super) fn skip(&mut self, own: JausId) {
         let end = self.log_start + self.log.len() as u64;
         if let Some(next) = self.members.get_mut(&own) {
@@ -238,7 +237,7 @@ impl Known {
         }
     }
 
-    /// Drops the changes that everybody has read, and the oldest if there are too many.
+    /// Drops the changes that every member has read, and the oldest ones if there are too many.
     fn trim(&mut self) {
         let end = self.log_start + self.log.len() as u64;
         let oldest = self.members.values().copied().min().unwrap_or(end);

@@ -1,4 +1,5 @@
-//! What others say about themselves and their subsystem, and what it changes in the directory.
+//! Reports from other components about themselves and their subsystem, and the resulting changes of
+//! the directory.
 
 use std::collections::BTreeSet;
 use std::collections::btree_map::Entry;
@@ -17,15 +18,15 @@ use crate::messages::core::{
 use crate::service::share::Share;
 use crate::service::{Identification, Kind, Level, Offer, read};
 
-/// A component may offer so many services, each in several versions …
+/// Limit of services of a component, counting each version …
 const MOST_SERVICES: usize = 128;
-/// … whose names have so many octets together.
+/// … and of the octets of their names together.
 const MOST_URN_OCTETS: usize = 6 * 1024;
-/// What a service takes in memory beside its name.
+/// Memory of a service without its name, in octets.
 const OFFER_OCTETS: usize = size_of::<Offer>() + 16;
 
 impl Known {
-    /// Any message is a sign of life, and a stranger's is a reason to ask who it is.
+    /// Notes a sign of life. A message from an unknown component triggers a query for its name.
     pub(super) fn hear(&mut self, now: Instant, received: &Received) {
         let source = received.source;
         if self.covers(source) && !self.peers.hear(now, source) {
@@ -34,14 +35,14 @@ impl Known {
         }
     }
 
-    /// The sender of a message that belongs to discovery is in the tree, if there is room. Says whether
-    /// it is.
+    /// Adds the sender of a discovery message to the tree if there is room. Returns whether it is
+    /// in the tree.
     pub(super) fn admit(&mut self, now: Instant, received: &Received) -> bool {
         self.admit_as(now, received.source, None, Share::of(received))
     }
 
-    /// Takes a component into the tree, and wonders what there is to know about it. Says whether
-    /// it is in the tree then.
+    /// Adds a component to the tree, and queues the queries about it. Returns whether it is in the
+    /// tree.
     fn admit_as(
         &mut self,
         now: Instant,
@@ -59,7 +60,7 @@ impl Known {
                 self.peers.hear(now, id);
                 self.appoint(now, id, share);
                 if known.is_some() {
-                    // Only now is there somebody to ask.
+                    // Only now can it be queried itself.
                     self.peers.speak(look, id);
                     self.ask_who_it_is(now, id, share);
                 }
@@ -107,8 +108,8 @@ impl Known {
         true
     }
 
-    /// Asks a component for the names that are missing; for that of its subsystem if it has the say,
-    /// and for that of its node if no other is being asked.
+    /// Queries a component for missing names: that of its subsystem if it is the reporter, and that
+    /// of its node if no other component is being queried for it.
     pub(super) fn ask_who_it_is(&mut self, now: Instant, id: JausId, share: Share) {
         let has_the_say = self.reporters.get(&id.subsystem()) == Some(&id);
         for level in [Level::Subsystem, Level::Node, Level::Component] {
@@ -124,8 +125,7 @@ impl Known {
         }
     }
 
-    /// Makes a component the one that is asked for its subsystem's configuration, if there is
-    /// none yet.
+    /// Makes a component the reporter of its subsystem if there is none.
     fn appoint(&mut self, now: Instant, id: JausId, share: Share) {
         if let Entry::Vacant(vacant) = self.reporters.entry(id.subsystem()) {
             vacant.insert(id);
@@ -133,7 +133,7 @@ impl Known {
         }
     }
 
-    /// Takes a component out of the tree, and those with it that it had listed.
+    /// Removes a component from the tree, together with the components that it had listed.
     pub(super) fn lose(&mut self, now: Instant, id: JausId, loss: Loss) {
         let subsystem = id.subsystem();
         let orphans: Vec<_> = self.peers.listed_by(id).collect();
@@ -161,7 +161,7 @@ impl Known {
         self.tell(Change::Lost(id, loss));
     }
 
-    /// A question is answered; says whether it was asked.
+    /// Removes an answered query; returns whether it had been sent.
     fn settle(&mut self, about: JausId, what: What) -> bool {
         let asked = self.questions.settle(Question { about, what });
         if asked {
@@ -192,7 +192,7 @@ impl Known {
         self.settle(source, What::Name(level));
         let reporter = self.reporters.get(&source.subsystem());
         if level == Level::Subsystem && reporter != Some(&source) {
-            // Every component answers a call. Should they disagree, one has the say.
+            // Every component answers a call. If the answers differ, only the reporter's counts.
             return;
         }
         if knows_better(level, source, own, profile) {
@@ -218,7 +218,7 @@ impl Known {
         }
     }
 
-    /// Asks a component anew who it is and what it offers: another program may have taken its id.
+    /// Queries the names and services of a component again: another program may have taken its id.
     fn doubt(&mut self, now: Instant, id: JausId, share: Share) {
         let names = [Level::Node, Level::Component].map(What::Name);
         for what in [What::Services].into_iter().chain(names) {
@@ -246,7 +246,7 @@ impl Known {
                 self.admit_as(now, id, Some(source), Share::of(received));
             }
         }
-        // Only what we asked for is known to be the whole subsystem.
+        // Only the answer to a query is known to cover the whole subsystem.
         if self.settle(source, What::Configuration) {
             let known = self.peers.listed_by(source);
             let gone: Vec<_> = known.filter(|id| !listed.contains(id)).collect();
@@ -292,7 +292,7 @@ impl Known {
         }
     }
 
-    /// Sets what a component offers, as far as the limits allow.
+    /// Sets the services of a component, as far as the limits allow.
     fn set_services<'r>(
         &mut self,
         now: Instant,
@@ -325,8 +325,8 @@ impl Known {
     }
 }
 
-/// Whether we have told others ourselves what is called how, namely our own subsystem or node.
-/// A component that joins them may have another idea, or be a tool that passes by.
+/// Whether this component itself names the subsystem or node in question. Another component that
+/// joins it may give a different name, or be a tool that is there for a short time.
 fn knows_better(level: Level, source: JausId, own: JausId, profile: &Profile) -> bool {
     let same_subsystem = source.subsystem() == own.subsystem();
     let ours = match level {
@@ -337,7 +337,7 @@ fn knows_better(level: Level, source: JausId, own: JausId, profile: &Profile) ->
     ours && !profile.identification(level).name.is_empty()
 }
 
-/// A list of services in order, without repetitions; whether it had to be cut.
+/// A sorted list of services without repetitions, and whether it was truncated.
 fn offers<'r>(services: impl Iterator<Item = (&'r Text, (u8, u8))>) -> (Vec<Offer>, bool) {
     let (mut offers, mut octets, mut is_cut) = (Vec::new(), 0, false);
     for (uri, (major, minor)) in services {

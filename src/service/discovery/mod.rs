@@ -1,47 +1,49 @@
-//! The Discovery service: says who we are and what we offer, and finds out the same of others.
+//! The Discovery service: announces this component and its services, and finds those of others.
 //!
-//! # What it asks, and when
+//! # Queries
 //!
-//! The components of one node share a [`NodeDirectory`]; one of them calls and asks for all. It calls
-//! Query Identification (2B00h, subsystem) to everybody when it starts, after one second, after two
-//! more, and then every [`Timing::call`]. Whoever answers, calls itself, or is heard in any other way
-//! is asked once, directly, for its name (2B00h) and services (2B03h), and one component of each
-//! subsystem for the subsystem's name and configuration (2B01h). Components that only stand in a
-//! configuration, because they have no Discovery service, are listed on the word of the one that named
-//! them, which is asked for the services of up to 128 of them with one query. What was asked is asked
-//! again every [`Timing::refresh`], so that services that come and go are noticed; a component whose
-//! own services change tells its peers at once.
+//! The components of one node share a [`NodeDirectory`]; one of them sends the calls and queries
+//! for all. It broadcasts Query Identification (2B00h, subsystem) as a call at start, after one
+//! second, after two more, and then every [`Timing::call`]. A component that answers, sends a call
+//! itself, or sends any other message is queried once, directly, for its name (2B00h) and services
+//! (2B03h). One component of each subsystem, its reporter, is also queried for the subsystem's name
+//! and configuration (2B01h). Components without Discovery appear only in a configuration. They are
+//! listed on the word of its sender, which is queried for the services of up to 128 of them at once.
+//! Queries are repeated every [`Timing::refresh`], to notice services that come and go. A component
+//! whose own services change notifies its peers at once.
 //!
-//! # When a peer is gone
+//! # Loss of a peer
 //!
-//! A component from which nothing came for one and a half calls, or for [`Timing::longest_silence`],
-//! is asked directly, [`Timing::probes`] times; if it stays silent it leaves the tree. With the
-//! standard timing and one or two peers that is 8 s + 3 × 1 s, so a death is noticed within 12 s; with
-//! more peers it takes 2.25 s longer for each, up to 33 s in all. One that has never answered leaves
-//! without being asked; one that could not be asked because too many are silent leaves another 33 s
-//! later. A component that was only listed leaves when its subsystem lists it no more, or with the one
-//! that listed it.
+//! A component that was silent for one and a half call intervals, or for
+//! [`Timing::longest_silence`], is queried directly, [`Timing::probes`] times. If it stays silent
+//! it leaves the directory. With the default timing and one or two peers that is 8 s + 3 × 1 s, so
+//! a death is noticed within 12 s. Each further peer adds 2.25 s, up to 33 s in all. A component
+//! that has never answered leaves without probes. One that could not be probed because too many are
+//! silent leaves another 33 s later. A component that was only listed leaves when its subsystem no
+//! longer lists it, or together with the component that listed it.
 //!
-//! # How much it says
+//! # Network load
 //!
-//! At most one packet a second in the long run with up to a dozen peers, answers to peers of its own
-//! kind included: the intervals grow with the number of peers that have answered. (Measured: 720
-//! packets an hour alone, 1900 with one peer, 3150 with many.) Budgets hold for all questions: 200 a
-//! second about newcomers, after a burst, by turns of their network addresses, and 32 a second that
-//! were asked before or are probes. Answers to others have a budget too, so that nobody can use us to
-//! flood a third party. Times are spread by a jitter from a seed.
+//! At most one packet per second in the long run with up to a dozen peers, including answers to
+//! peers with the same implementation: the intervals grow with the number of peers that have
+//! answered. (Measured: 720 packets per hour alone, 1900 with one peer, 3150 with many.) Budgets
+//! limit all queries: 200 per second for newcomers, after a burst, round robin over their network
+//! addresses, and 32 per second for repeated queries and probes. Answers to other components have a
+//! budget too, so that an attacker cannot use this component to flood a third party. A seeded
+//! jitter spreads the packets in time.
 //!
-//! # How much it keeps
+//! # Limits
 //!
-//! Components, their services and the questions about them are limited for each network address, and
-//! so are the length of a message and of a component's list of services. What is left out is
+//! Components, their services and the queries about them are limited per network address. So are
+//! the length of a message and of a component's list of services. What exceeds a limit is
 //! [counted](Refused) and logged.
 //!
-//! # What it answers
+//! # Answers
 //!
-//! Every query of AS5710, always by unicast to the asker. Asked alone, a component speaks for all
-//! that it knows of its subsystem; asked together with others (a wildcard in the destination), it
-//! lists only its own services, so that the answers add up without repetitions.
+//! Every query of AS5710 is answered by unicast to its sender. A query to this component alone is
+//! answered for all known components of its subsystem. A query to several components (a wildcard in
+//! the destination) is answered with its own services only, so that the answers add up without
+//! repetitions.
 
 mod answer;
 mod known;
@@ -77,23 +79,24 @@ pub struct Discovery {
     profile: Profile,
     known: Arc<NodeDirectory>,
     answers: Budget,
-    /// Whether the query in hand was not sent now, but subscribed to before.
+    /// Whether the current query comes from a subscription rather than from a message just
+    /// received.
     quoted: bool,
-    /// Whether this component has learnt something since it was woken, so that there may be something
-    /// to ask.
+    /// Whether this component has learnt something since it was last woken, so that queries may be
+    /// due.
     has_news: bool,
 }
 
-/// Something that has become different in the [`Directory`].
+/// A change of the [`Directory`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Change {
-    /// The first component of a subsystem has come.
+    /// The first component of a subsystem was found.
     SubsystemFound(u16),
-    /// A component has come. Its name and its services follow.
+    /// A component was found. Its name and its services follow.
     Found(JausId),
-    /// A subsystem, a node or a component has told its kind and name, or other ones than before.
+    /// The kind or name of a subsystem, a node or a component is known, or has changed.
     Identified(Level, JausId),
-    /// A component has told its services, or other ones than before.
+    /// The services of a component are known, or have changed.
     Services(JausId),
     /// A component is gone.
     Lost(JausId, Loss),
@@ -101,26 +104,27 @@ pub enum Change {
     SubsystemLost(u16),
 }
 
-/// How we know that a component is gone.
+/// How the loss of a component was detected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Loss {
-    /// It has been silent, also when it was asked directly.
+    /// It stayed silent, even when probed.
     Silent,
-    /// Its subsystem does not list it any more.
+    /// Its subsystem no longer lists it.
     Unlisted,
-    /// We knew it only from a component that is gone.
+    /// It was known only from a component that is gone.
     WithItsReporter,
-    /// It was only listed, and the share of its network address was needed for one that speaks.
+    /// It was only listed, and its entry was needed for a component at the same network address
+    /// that sends messages itself.
     NoRoom,
 }
 
 impl Discovery {
     /// Answers are limited to a burst of this many …
     const ANSWER_BURST: u32 = 256;
-    /// … and then to one in this time.
+    /// … and then to one in this interval.
     const ANSWER_REFILL: std::time::Duration = std::time::Duration::from_millis(10);
 
-    /// The queries whose answers are others when the directory has changed.
+    /// The queries whose answers change with the directory.
     pub(super) const QUERIES: [u16; 5] = [
         QueryIdentification::CODE,
         QueryConfiguration::CODE,
@@ -129,20 +133,19 @@ impl Discovery {
         QueryServiceList::CODE,
     ];
 
-    /// The longest report that is read, in octets: what 254 components with a dozen services each need.
+    /// The longest accepted report in octets: enough for 254 components with a dozen services each.
     const LONGEST_REPORT: usize = 128 * 1024;
-    /// The longest query.
+    /// The longest accepted query in octets.
     const LONGEST_QUERY: usize = 4096;
 
-    /// The discovery of the component `own`, which presents itself as `profile` says, with a directory
-    /// of its own.
+    /// The discovery of the component `own`, presented as in `profile`, with its own directory.
     #[must_use]
     pub fn new(own: JausId, profile: Profile, scope: Scope, timing: Timing, seed: u64) -> Self {
         let known = Arc::new(NodeDirectory::new(scope, timing, seed));
         Self::join(known, own, profile)
     }
 
-    /// The discovery of the component `own`, with the directory of its node.
+    /// The discovery of the component `own`, with the shared directory of its node.
     #[must_use]
     pub fn join(known: Arc<NodeDirectory>, own: JausId, profile: Profile) -> Self {
         known.lock().join(own, &profile);
@@ -162,20 +165,19 @@ impl Discovery {
         self.own
     }
 
-    /// Everybody who is known, the own component included.
+    /// All known components, including the own one.
     #[must_use]
     pub fn directory(&self) -> Arc<Directory> {
         self.known.directory()
     }
 
-    /// What was left out because of the limits.
+    /// What was refused because of the limits.
     #[must_use]
     pub fn refused(&self) -> Refused {
         self.known.lock().refused()
     }
 
-    /// Says what the component offers beside Discovery. Peers are told if it is something else
-    /// than before.
+    /// Sets the services of the component other than Discovery. Peers are notified of a change.
     pub fn set_offers(&mut self, others: impl IntoIterator<Item = ServiceId>, out: &mut Outbox) {
         let offers = others.into_iter().chain(self.offers()).map(Offer::from);
         let offers = offers.collect();
@@ -199,7 +201,7 @@ impl Discovery {
     }
 }
 
-/// What a [`Stack`](super::Stack) does with it.
+/// The interface for a [`Stack`](super::Stack).
 impl Discovery {
     pub(super) fn offers(&self) -> Vec<ServiceId> {
         vec![core::discovery::V1_1, core::discovery::V1_0]
@@ -258,8 +260,8 @@ impl Discovery {
         }
     }
 
-    /// A query that a client has subscribed to: it shows nothing about the client now, and has its
-    /// own limits.
+    /// Handles a query of a subscription. It is no sign of life of the client, and has limits of
+    /// its own.
     pub(super) fn handle_quoted(
         &mut self,
         now: Instant,

@@ -1,9 +1,9 @@
-//! How often discovery speaks: a seeded jitter, so that components that start together do not
-//! speak together, and a budget that no mistake and no peer can exceed.
+//! The pace of discovery: a seeded jitter, so that components that start together do not send
+//! together, and a budget that limits mistakes and malicious peers alike.
 
 use std::time::{Duration, Instant};
 
-/// Random numbers from a seed (SplitMix64): for spreading packets in time, not for secrets.
+/// Pseudo-random numbers (SplitMix64) to spread packets in time. Not for secrets.
 #[derive(Debug, Clone)]
 pub(super) struct Jitter(u64);
 
@@ -20,25 +20,25 @@ impl Jitter {
         mixed ^ (mixed >> 31)
     }
 
-    /// A duration from 0 up to `most`.
+    /// A duration between 0 and `most`.
     pub(super) fn up_to(&mut self, most: Duration) -> Duration {
         most.mul_f64((self.next() >> 11) as f64 / (1_u64 << 53) as f64)
     }
 
-    /// A duration from 90 % to 110 % of `middle`.
+    /// A duration between 90 % and 110 % of `middle`.
     pub(super) fn around(&mut self, middle: Duration) -> Duration {
         middle.mul_f64(0.9) + self.up_to(middle.mul_f64(0.2))
     }
 }
 
-/// A token bucket: a burst now and then, and a rate in the long run.
+/// A token bucket: allows a burst, and a rate in the long run.
 #[derive(Debug, Clone)]
 pub(in crate::service) struct Budget {
     burst: u32,
-    /// The time in which one token comes back.
+    /// The interval at which a token is added.
     refill: Duration,
     tokens: u32,
-    /// When the newest token came.
+    /// When the newest token was added.
     since: Option<Instant>,
 }
 
@@ -61,7 +61,7 @@ impl Budget {
         is_any
     }
 
-    /// When there is a token again; `None` if there is one.
+    /// When the next token is added; `None` if there is one already.
     pub(super) fn next(&self) -> Option<Instant> {
         let since = self.since.filter(|_| self.tokens == 0)?;
         Some(since + self.refill)

@@ -1,5 +1,4 @@
-//! The components of other nodes, with what is due for each: no question is answered by looking at all
-//! of them.
+//! The components of other nodes and their deadlines, indexed so that no lookup scans all of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
@@ -8,20 +7,20 @@ use super::pace::Budget;
 use crate::address::JausId;
 use crate::service::share::{Share, Shares};
 
-/// A component of which we know.
+/// A known component.
 #[derive(Debug)]
 pub(super) struct Peer {
-    /// When it was heard last, or listed if it does not speak for itself.
+    /// When it last sent a message, or was last listed if it never sent one.
     pub(super) heard: Instant,
-    /// Who listed it; `None` if it speaks for itself.
+    /// The component that listed it; `None` if it sends messages itself.
     pub(super) listed_by: Option<JausId>,
-    /// Which address pays for it.
+    /// The share of the network address that it counts against.
     pub(super) share: Share,
-    /// Whether it has answered a question.
+    /// Whether it has answered a query.
     pub(super) is_confirmed: bool,
-    /// How often it has been asked since it was heard.
+    /// Probes since its last message.
     pub(super) probes: u32,
-    /// What its services take of its share, in octets.
+    /// The octets of its services, counted against its share.
     octets: usize,
     look: Instant,
     refresh: Instant,
@@ -30,23 +29,23 @@ pub(super) struct Peer {
 #[derive(Debug)]
 pub(super) struct Peers {
     all: BTreeMap<JausId, Peer>,
-    /// Those that speak for themselves, by when to see whether they are silent.
+    /// Components that send messages themselves, by the time of the next check for silence.
     looks: BTreeSet<(Instant, JausId)>,
     refreshes: BTreeSet<(Instant, JausId)>,
-    /// Those that are only listed, by who listed them.
+    /// Components that are only listed, by the component that listed them.
     listed: BTreeSet<(JausId, JausId)>,
     entries: Shares,
     octets: Shares,
-    /// How often the peers of a share may say that something known is different.
+    /// Budget of each share for changes of known facts.
     news: BTreeMap<Share, Budget>,
-    /// How many speak for themselves and have answered.
+    /// The number of components that send messages themselves and have answered.
     confirmed: usize,
 }
 
 impl Peers {
-    /// What the lists of services of one network address may take, in octets.
+    /// Limit of the lists of services of one network address, in octets.
     const MOST_OCTETS: usize = 512 * 1024;
-    /// Of one network address so many news at once are taken in, then one in this time.
+    /// Changes accepted from one network address: a burst, then one per interval.
     const NEWS_BURST: u32 = 128;
     const NEWS_REFILL: std::time::Duration = std::time::Duration::from_millis(50);
 
@@ -67,14 +66,14 @@ impl Peers {
         self.all.get(&id)
     }
 
-    /// How many speak for themselves and have answered. The intervals grow with them alone: ids that
-    /// somebody makes up change nothing.
+    /// The number of components that have answered. Only these lengthen the intervals, so that
+    /// forged ids change nothing.
     pub(super) const fn confirmed(&self) -> usize {
         self.confirmed
     }
 
-    /// Whether there is room for one more. One that speaks for itself takes the place of one of the same
-    /// address that is only listed; this one is returned then.
+    /// Whether there is room for one more. A component that sends messages itself may replace one
+    /// of the same address that is only listed, which is then returned.
     pub(super) fn room(&self, share: Share, speaks: bool) -> Result<Option<JausId>, NoRoom> {
         if self.entries.has_room(share, 1) {
             return Ok(None);
@@ -128,7 +127,7 @@ impl Peers {
         self.confirmed -= usize::from(gone.is_confirmed);
     }
 
-    /// Something came from a component itself; says whether it is known.
+    /// Notes a message from a component; returns whether the component is known.
     pub(super) fn hear(&mut self, now: Instant, id: JausId) -> bool {
         let Some(peer) = self.all.get_mut(&id) else {
             return false;
@@ -141,14 +140,14 @@ impl Peers {
         true
     }
 
-    /// A component is listed once more.
+    /// Notes that a component was listed again.
     pub(super) fn list(&mut self, now: Instant, id: JausId) {
         if let Some(peer) = self.all.get_mut(&id).filter(|it| it.listed_by.is_some()) {
             peer.heard = now;
         }
     }
 
-    /// A component that was only listed speaks for itself.
+    /// Notes that a component that was only listed sends messages itself.
     pub(super) fn speak(&mut self, look: Instant, id: JausId) {
         if let Some(peer) = self.all.get_mut(&id)
             && let Some(reporter) = peer.listed_by.take()
@@ -159,7 +158,7 @@ impl Peers {
         }
     }
 
-    /// A component has answered a question.
+    /// Notes that a component has answered a query.
     pub(super) fn confirm(&mut self, id: JausId) {
         if let Some(peer) = self.all.get_mut(&id)
             && !std::mem::replace(&mut peer.is_confirmed, true)
@@ -168,7 +167,7 @@ impl Peers {
         }
     }
 
-    /// The component that is to be looked at first, and since when.
+    /// The component with the earliest check for silence, and its time.
     pub(super) fn first_look(&self) -> Option<(Instant, JausId)> {
         self.looks.first().copied()
     }
@@ -182,7 +181,7 @@ impl Peers {
         }
     }
 
-    /// A component is probed, and to be looked at again then.
+    /// Counts a probe of a component, and sets the time of its next check.
     pub(super) fn probe(&mut self, next: Instant, id: JausId) {
         if let Some(peer) = self.all.get_mut(&id) {
             peer.probes += 1;
@@ -202,18 +201,18 @@ impl Peers {
         }
     }
 
-    /// The components that stand in the tree on the word of this one.
+    /// The components that are listed on the word of this one.
     pub(super) fn listed_by(&self, reporter: JausId) -> impl Iterator<Item = JausId> {
         let all = (reporter, JausId::from_u32(0))..=(reporter, JausId::from_u32(u32::MAX));
         self.listed.range(all).map(|&(_, id)| id)
     }
 
-    /// The peers that speak for themselves.
+    /// The peers that send messages themselves.
     pub(super) fn speakers(&self) -> impl Iterator<Item = JausId> {
         self.looks.iter().map(|&(_, id)| id)
     }
 
-    /// The first peer of a subsystem that speaks for itself.
+    /// The first peer of a subsystem that sends messages itself.
     pub(super) fn speaker_of(&self, subsystem: u16) -> Option<JausId> {
         let all = JausId::new(subsystem, 0, 0)..=JausId::new(subsystem, u8::MAX, u8::MAX);
         let mut members = self.all.range(all);
@@ -228,7 +227,7 @@ impl Peers {
             .map(|(&id, _)| id)
     }
 
-    /// Charges a component for its services; says whether its share allows that.
+    /// Charges a component's services to its share; returns whether they fit.
     pub(super) fn charge(&mut self, id: JausId, octets: usize) -> bool {
         let Some(peer) = self.all.get_mut(&id) else {
             return false;
@@ -240,7 +239,7 @@ impl Peers {
         fits
     }
 
-    /// Whether one more change of something known may be taken in of this component's address.
+    /// Whether the budget of the component's address allows one more change of a known fact.
     pub(super) fn may_change(&mut self, now: Instant, id: JausId) -> bool {
         let Some(peer) = self.all.get(&id) else {
             return false;
@@ -250,6 +249,6 @@ impl Peers {
     }
 }
 
-/// The share of a component's address is used up.
+/// The share of the component's address is used up.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct NoRoom;

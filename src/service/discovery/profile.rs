@@ -1,27 +1,26 @@
-//! What an application chooses about discovery: how it presents itself, whom it looks for, and
-//! how often.
+//! The application's settings of discovery: names, scope and timing.
 
 use std::time::Duration;
 
 use super::super::{Identification, Kind, Level};
 
-/// How a component presents itself and the things it belongs to.
+/// How a component presents itself, its node and its subsystem.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Profile {
-    /// The name of the whole system; the subsystem's if empty.
+    /// The name of the whole system. If empty, that of the subsystem.
     pub system: String,
-    /// What the subsystem is.
+    /// The kind of the subsystem.
     pub kind: Kind,
-    /// The name of the subsystem. Empty: this component does not say, and learns it from others.
+    /// The name of the subsystem. If empty, this component reports none and learns it from others.
     pub subsystem: String,
-    /// The name of the node; the subsystem's if empty.
+    /// The name of the node. If empty, that of the subsystem.
     pub node: String,
-    /// The name of the component; the subsystem's if empty.
+    /// The name of the component. If empty, that of the subsystem.
     pub component: String,
 }
 
 impl Profile {
-    /// A profile with one name for everything.
+    /// A profile with the same name at every level.
     #[must_use]
     pub fn new(kind: Kind, name: impl Into<String>) -> Self {
         Self {
@@ -58,45 +57,45 @@ impl Profile {
     }
 }
 
-/// Whom a component looks for.
+/// The components that discovery searches for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scope {
-    /// Everybody.
+    /// All components.
     #[default]
     System,
     /// The components of its own subsystem.
     Subsystem,
-    /// Nobody: it answers, and knows only itself.
+    /// None: it only answers, and knows only itself.
     Nobody,
 }
 
-/// How often discovery speaks, and when it gives a peer up.
+/// The pace of discovery, and its timeouts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timing {
-    /// Between two calls to everybody, ± 10 %. With more than one peer it is at least
-    /// [`call_per_peer`](Self::call_per_peer) for each of them and for oneself.
+    /// Interval between calls (broadcast queries), ± 10 %. It is at least
+    /// [`call_per_peer`](Self::call_per_peer) for each peer and for this component itself.
     pub call: Duration,
-    /// What each peer adds to the interval between calls, because each peer answers them.
+    /// What each peer adds to the call interval, because each peer answers calls.
     pub call_per_peer: Duration,
-    /// Between two questions to the same peer for what it has told already, ± 10 %; at least
+    /// Interval between repeated queries to the same peer, ± 10 %. It is at least
     /// [`refresh_per_peer`](Self::refresh_per_peer) for each peer.
     pub refresh: Duration,
     /// What each peer adds to the refresh interval.
     pub refresh_per_peer: Duration,
-    /// How often a silent peer is asked before it is given up.
+    /// The number of probes to a silent peer before it is lost.
     pub probes: u32,
-    /// Between two such questions.
+    /// Interval between probes.
     pub probe_interval: Duration,
-    /// The longest that a peer may be silent before it is asked, however many there are.
+    /// The longest silence of a peer before the first probe, however many peers there are.
     pub longest_silence: Duration,
-    /// The most components of one network address that are kept. Of all addresses together it is
-    /// twice as many, of which the second half is for newcomers; more are ignored.
+    /// Limit of known components per network address. The limit for all addresses together is twice
+    /// this, with the second half reserved for newcomers. Components beyond it are ignored.
     pub max_components: usize,
 }
 
 impl Default for Timing {
-    /// Calls every 5 s, refreshes every 30 s, three probes a second apart after 30 s of silence at
-    /// most, 1024 components.
+    /// Calls every 5 s, refreshes every 30 s, three probes at intervals of 1 s after at most 30 s
+    /// of silence, 1024 components.
     fn default() -> Self {
         Self {
             call: Duration::from_secs(5),
@@ -116,13 +115,13 @@ impl Timing {
         self.call.max(times(self.call_per_peer, peers + 1))
     }
 
-    /// How long a peer may be silent before it is asked directly.
+    /// How long a peer may be silent before it is probed.
     pub(super) fn patience(&self, peers: usize) -> Duration {
         let patience = self.call_interval(peers).mul_f64(1.5) + self.probe_interval / 2;
         patience.min(self.longest_silence)
     }
 
-    /// How long a silent peer is kept that could not be asked because there are so many.
+    /// How long a silent peer is kept if it cannot be probed because too many are silent.
     pub(super) fn longest_search(&self) -> Duration {
         self.probe_interval * self.probes + self.longest_silence
     }

@@ -1,5 +1,5 @@
-//! What is still to be found out: new questions, by turns of the addresses that they are about, and
-//! those that were asked in vain.
+//! The queue of discovery queries: first queries, round robin over the network addresses that they
+//! are about, and repeated queries.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Bound;
@@ -9,25 +9,25 @@ use crate::address::JausId;
 use crate::service::Level;
 use crate::service::share::{Share, Shares};
 
-/// Something to be found out.
+/// A fact to query.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Question {
-    /// The component in question.
+    /// The component that it is about.
     pub(super) about: JausId,
     pub(super) what: What,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum What {
-    /// Kind and name, asked of the component itself.
+    /// Kind and name, queried from the component itself.
     Name(Level),
-    /// Its services, asked of itself or of the one that listed it.
+    /// Its services, queried from the component itself or from the one that listed it.
     Services,
     /// The components of its subsystem.
     Configuration,
 }
 
-/// How often a question has been asked, and when it is due again.
+/// The tries of a query, and when the next one is due.
 #[derive(Debug)]
 struct Attempts {
     made: u32,
@@ -39,20 +39,20 @@ struct Attempts {
 #[derive(Debug)]
 pub(super) struct Questions {
     all: BTreeMap<Question, Attempts>,
-    /// Those that were never asked, by share and age.
+    /// Queries that were never sent, by share and age.
     fresh: BTreeSet<(Share, u64, Question)>,
-    /// The others, by when they are due.
+    /// The others, by due time.
     asked: BTreeSet<(Instant, Question)>,
-    /// The share whose question was asked last.
+    /// The share whose query was sent last.
     turn: Share,
     last: u64,
     shares: Shares,
 }
 
 impl Questions {
-    /// A question is asked at most so often before the next refresh …
+    /// A query is sent at most this often before the next refresh …
     const TRIES: u32 = 3;
-    /// … again after this time, then after twice as long, and so on.
+    /// … with this pause after the first try, twice as long after the second, and so on.
     const RETRY: Duration = Duration::from_secs(1);
 
     pub(super) const fn new(most: usize) -> Self {
@@ -66,8 +66,8 @@ impl Questions {
         }
     }
 
-    /// Puts a question on the list, unless it is there: also one that was asked in vain stays for
-    /// a while, so that a component without Discovery is not asked for ever. Says whether it is there.
+    /// Queues a query unless it is in the queue. An unanswered query stays for a while, so that a
+    /// component without Discovery is not queried for ever. Returns whether it is in the queue.
     pub(super) fn wonder(&mut self, now: Instant, question: Question, share: Share) -> bool {
         if self.all.contains_key(&question) {
             return true;
@@ -88,13 +88,13 @@ impl Questions {
         true
     }
 
-    /// Whether somebody of these is being asked this.
+    /// Whether this is being queried for any of these components.
     pub(super) fn is_open(&self, what: What, about: impl IntoIterator<Item = JausId>) -> bool {
         let mut about = about.into_iter();
         about.any(|about| self.all.contains_key(&Question { about, what }))
     }
 
-    /// Takes a question off the list; says whether it was on it and asked.
+    /// Removes a query; returns whether it was in the queue and had been sent.
     pub(super) fn settle(&mut self, question: Question) -> bool {
         let Some(attempts) = self.all.remove(&question) else {
             return false;
@@ -104,7 +104,7 @@ impl Questions {
         attempts.made > 0
     }
 
-    /// Forgets all that was to be asked about a component.
+    /// Removes all queries about a component.
     pub(super) fn forget(&mut self, id: JausId) {
         let levels = [Level::Subsystem, Level::Node, Level::Component];
         let names = levels.into_iter().map(What::Name);
@@ -122,7 +122,7 @@ impl Questions {
         }
     }
 
-    /// The question that was never asked and whose turn it is.
+    /// The next first query, round robin over the shares.
     pub(super) fn next_fresh(&self) -> Option<Question> {
         let end = Question {
             about: JausId::from_u32(u32::MAX),
@@ -134,12 +134,12 @@ impl Questions {
         Some(*question)
     }
 
-    /// Since when a question waits that was never asked.
+    /// Since when the next first query has been due.
     pub(super) fn fresh_since(&self) -> Option<Instant> {
         Some(self.all.get(&self.next_fresh()?)?.next)
     }
 
-    /// A question that is to be asked once more. Those asked often enough leave the list.
+    /// The next query to repeat. Queries without tries left are removed.
     pub(super) fn next_due(&mut self, now: Instant) -> Option<Question> {
         loop {
             let &(next, question) = self.asked.first()?;
@@ -153,18 +153,18 @@ impl Questions {
         }
     }
 
-    /// When the first question that was asked before is due.
+    /// When the first query to repeat is due.
     pub(super) fn first_due(&self) -> Option<Instant> {
         self.asked.first().map(|&(next, _)| next)
     }
 
-    /// How often a question that is due has been asked.
+    /// The number of tries of a query that is due.
     pub(super) fn made(&self, now: Instant, question: Question) -> Option<u32> {
         let attempts = self.all.get(&question).filter(|it| it.next <= now)?;
         (attempts.made < Self::TRIES).then_some(attempts.made)
     }
 
-    /// A question is asked now. After the last try it rests for `rest`.
+    /// Notes that a query is sent now. After the last try it rests for `rest`.
     pub(super) fn ask(&mut self, now: Instant, question: Question, rest: Duration) {
         let Some(mut attempts) = self.all.remove(&question) else {
             return;

@@ -1,4 +1,4 @@
-//! The asking side: whom to ask what, when, how often, and whom to give up.
+//! The querying side of discovery: which peer to query for what and when, and which to give up.
 
 use std::time::{Duration, Instant};
 
@@ -10,11 +10,11 @@ use crate::messages::core::query_services::{ComponentRec, NodeRec, NodeSeq};
 use crate::messages::core::{QueryConfiguration, QueryIdentification, QueryServices};
 use crate::service::{Level, Outbox};
 
-/// The first call comes within this time, so that a fleet switched on together spreads out.
+/// Limit of the delay of the first call. Spreads out a fleet that is switched on together.
 const FIRST_CALL: Duration = Duration::from_millis(50);
-/// One query asks for the services of so many components at most, if one of them speaks for them.
+/// Limit of components in one query for services to a component that answers for them.
 const MOST_TOGETHER: usize = 128;
-/// A listed component leaves when whoever listed it was asked so often and did not list it again.
+/// A listed component is lost after this many intervals in which it was not listed again.
 const LISTED_IN_VAIN: u32 = 4;
 
 impl Known {
@@ -36,7 +36,7 @@ impl Known {
         all.into_iter().flatten().min()
     }
 
-    /// Calls everybody if it is time to.
+    /// Broadcasts a call if one is due.
     fn call(&mut self, now: Instant, out: &mut Outbox) {
         if self.scope == Scope::Nobody {
             return;
@@ -62,9 +62,9 @@ impl Known {
         self.next_call = Some(now + interval);
     }
 
-    /// Asks those from whom nothing has come for too long, and drops those that do not answer. One that
-    /// has never answered anything is not asked again, and nobody is kept because there are too many
-    /// to be asked.
+    /// Probes peers that have been silent for too long, and drops those that do not answer. A peer
+    /// that has never answered is dropped without probes. No silent peer stays only because too
+    /// many others are being probed.
     fn drop_the_silent(&mut self, now: Instant, out: &mut Outbox) {
         let patience = self.timing.patience(self.peers.confirmed());
         while let Some((due, id)) = self.peers.first_look()
@@ -88,7 +88,8 @@ impl Known {
         }
     }
 
-    /// Asks again what may have changed, and whoever lists a component whether it still does.
+    /// Repeats queries for facts that may have changed, and asks reporters whether they still list
+    /// their components.
     fn refresh(&mut self, now: Instant) {
         let refresh = self.timing.refresh_interval(self.peers.confirmed());
         while let Some((due, id)) = self.peers.first_refresh()
@@ -115,7 +116,7 @@ impl Known {
         }
     }
 
-    /// Asks what is due, as far as the budgets go.
+    /// Sends the queries that are due, as far as the budgets allow.
     fn ask_due(&mut self, now: Instant, out: &mut Outbox) {
         while let Some(question) = self.questions.next_fresh()
             && self.first.take(now)
@@ -157,8 +158,8 @@ impl Known {
         self.questions.ask(now, question, self.timing.refresh);
     }
 
-    /// The components whose services the same reporter is to be asked for, as often as it was asked for
-    /// these.
+    /// The components whose services the same reporter is to be queried for, with the same number
+    /// of tries.
     fn asked_together(&self, now: Instant, first: Question, reporter: JausId) -> Vec<JausId> {
         let made = |about| {
             let what = What::Services;
@@ -173,7 +174,7 @@ impl Known {
     }
 }
 
-/// The question for the services of components, in the order of their ids.
+/// The query for the services of components, in the order of their ids.
 fn query_services(about: &[JausId]) -> QueryServices {
     let nodes = about.chunk_by(|one, other| one.node() == other.node());
     let node_list = nodes.map(|components| NodeSeq {

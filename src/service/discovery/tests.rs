@@ -1,4 +1,4 @@
-//! Discovery against floods of components, real and made up, under virtual time.
+//! Discovery against floods of components, real and forged, in virtual time.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::sync::Arc;
@@ -19,14 +19,14 @@ const ATTACKER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 0, 0, 66));
 const OTHER: IpAddr = IpAddr::V4(Ipv4Addr::new(10, 0, 0, 9));
 const SECOND: Duration = Duration::from_secs(1);
 
-/// A component, and peers that answer its questions.
+/// A component, and peers that answer its queries.
 struct Rig {
     discovery: Discovery,
     now: Instant,
     start: Instant,
-    /// Those that live, and where.
+    /// The live peers and their addresses.
     lively: Vec<(JausId, IpAddr)>,
-    /// How many messages it has sent.
+    /// The number of messages it has sent.
     sent: usize,
 }
 
@@ -71,7 +71,7 @@ impl Rig {
         self.hear(source, ip, &query(2));
     }
 
-    /// Lets time pass; the lively answer.
+    /// Advances the time; live peers answer.
     fn run(&mut self, time: Duration) {
         let end = self.now + time;
         while let Some(wake) = self.discovery.poll_timeout().filter(|wake| *wake <= end) {
@@ -105,7 +105,7 @@ impl Rig {
         self.discovery.directory().component(id).is_some()
     }
 
-    /// How many components it knows beside itself.
+    /// The number of other components it knows.
     fn len(&self) -> usize {
         self.discovery.directory().len() - 1
     }
@@ -138,7 +138,7 @@ fn configuration(ids: impl IntoIterator<Item = JausId>) -> ReportConfiguration {
     }
 }
 
-/// So many services for each component, named after it.
+/// Services for each component, with the given number, named after it.
 fn services(ids: impl IntoIterator<Item = (JausId, u8)>, urn: &str) -> ReportServices {
     let service = |id: JausId, number: u8| report_services::ServiceRec {
         uri: format!("{urn}:{id}:{number}").as_str().into(),
@@ -171,7 +171,7 @@ fn many(subsystem: u16, nodes: u8) -> impl Iterator<Item = JausId> {
     (1..=nodes).flat_map(ids)
 }
 
-/// What the services in the directory take in memory, about.
+/// The approximate memory of the services in the directory.
 fn octets(rig: &Rig) -> usize {
     let directory = rig.discovery.directory();
     let mut lists: Vec<_> = directory.components().collect();
@@ -233,7 +233,7 @@ fn whatever_is_reported_the_services_of_an_address_take_a_megabyte_at_most() {
     let all = many(7, 1).map(|id| (id, 255));
     rig.hear(liar, ATTACKER, &services(all, "urn:a"));
     assert_eq!((rig.discovery.refused().too_long, rig.len()), (1, 0));
-    // As much as passes, in many of the longest messages.
+    // As much as the limits allow, in many messages of the maximum length.
     let filler = "x".repeat(100);
     let all: Vec<_> = many(7, 8).map(|id| (id, 200)).collect();
     for some in all.chunks(5) {
@@ -288,7 +288,7 @@ fn the_dead_leave_within_seventy_seconds_however_many_they_are() {
     assert!(directory.subsystem(7).is_none(), "they have never answered");
     rig.run(35 * SECOND);
     assert_eq!(rig.len(), 0);
-    // New questions about 300, one refresh of the 700, and probes and repetitions within their limit.
+    // New queries about 300, one refresh of the 700, and probes and repetitions within their limit.
     let sent = rig.sent - before;
     assert!(sent <= 2 * 700 + 64 + 70 * 33, "{sent} packets in 70 s");
 }
@@ -332,11 +332,11 @@ fn the_services_of_two_hundred_listed_components_are_asked_for_with_two_queries(
     rig.hear(manager, OTHER, &configuration(many(8, 1).take(201)));
     rig.sent = 0;
     rig.run(SECOND / 2);
-    // Of the manager its services, its configuration and three names.
+    // The manager's services, configuration and three names.
     assert_eq!(rig.sent, 2 + 5);
 }
 
-/// A node with two components that share a directory, and what they have said.
+/// A node with two components that share a directory, and their messages.
 struct TwoOfANode {
     known: Arc<NodeDirectory>,
     first: Discovery,

@@ -1,7 +1,7 @@
-//! Command events (1.1): a client has a command carried out, and is told of its end.
+//! Command events (1.1): a client has a command run, and is notified of its end.
 //!
-//! Only one command of a code is carried out at a time, because one client is in control. Another
-//! one of the same code takes the place of the first, which then has not succeeded.
+//! Only one command per code runs at a time, because only one client is in control. Another command
+//! with the same code replaces the first one, which then counts as unsuccessful.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -15,10 +15,10 @@ use crate::messages::core::reject_event_request::ResponseCode;
 use crate::messages::core::{CommandEvent, CreateCommandEvent};
 use crate::service::{Outbox, code_of};
 
-/// Commands that may run for all clients; there are no more codes whose end services tell.
+/// Limit of commands that run for all clients. Services do not report the end of more codes.
 const MOST_COMMANDS: usize = 64;
 
-/// A command that a client wants to be told of.
+/// A command event that a client requests.
 #[derive(Debug)]
 pub(in crate::service) struct CommandTrial {
     request: Received,
@@ -45,7 +45,7 @@ impl CommandTrial {
         self.request.source
     }
 
-    /// The command, as if the client had sent it by itself.
+    /// The command, as if the client had sent it directly.
     pub(in crate::service) fn command(&self) -> Received {
         Received {
             payload: self.create.command_message.clone(),
@@ -54,7 +54,7 @@ impl CommandTrial {
     }
 }
 
-/// What runs.
+/// The running commands.
 #[derive(Debug, Default)]
 pub(super) struct Commands {
     running: BTreeMap<Name, Running>,
@@ -63,7 +63,7 @@ pub(super) struct Commands {
 #[derive(Debug)]
 struct Running {
     code: u16,
-    /// When it will have failed.
+    /// When it times out.
     deadline: Option<Instant>,
 }
 
@@ -84,7 +84,7 @@ impl Commands {
         self.running.values().filter_map(|it| it.deadline).min()
     }
 
-    /// Ends those that a test is true of, and tells their clients.
+    /// Ends the commands that `which` selects, and notifies their clients.
     fn end(
         &mut self,
         result: CommandResult,
@@ -107,8 +107,8 @@ impl Commands {
 }
 
 impl Events {
-    /// Whether a service of the component tells the end of the command, and the client may give
-    /// it. If so the command runs from now on, and is to be carried out.
+    /// Begins a command event unless `refusal` gives a reason not to. Returns whether the command
+    /// must now be run.
     pub(in crate::service) fn begin_command(
         &mut self,
         now: Instant,
@@ -136,8 +136,8 @@ impl Events {
 
     fn run(&mut self, now: Instant, trial: &CommandTrial, id: u8, out: &mut Outbox) {
         let name = (trial.client(), id);
-        // Whoever had this command carried out before is told that it is replaced; the same
-        // client's event goes on with the new one.
+        // Notify the other clients with this command that it is replaced. An event of the same
+        // client continues with the new command.
         let unsuccessful = CommandResult::UNSUCCESSFUL;
         self.commands.end(unsuccessful, out, |other, it| {
             it.code == trial.code && other != name
@@ -146,14 +146,14 @@ impl Events {
         let deadline = now.checked_add(Duration::from_secs(seconds.into()));
         let running = Running {
             code: trial.code,
-            // A client that sets no limit does not mean that it fails at once.
+            // 0 means no limit, not immediate failure.
             deadline: deadline.filter(|_| seconds > 0),
         };
         self.commands.running.insert(name, running);
         out.reply(&trial.request, &confirmation(trial.create.request_id, id));
     }
 
-    /// A service tells that the command with this code has ended.
+    /// Ends the command with this code, as a service has reported.
     pub(in crate::service) fn end_command(
         &mut self,
         code: u16,
@@ -168,7 +168,7 @@ impl Events {
         self.commands.end(result, out, |_, it| it.code == code);
     }
 
-    /// What has taken too long has failed, whatever becomes of it.
+    /// Ends commands that have timed out as unsuccessful, whatever happens to them later.
     pub(super) fn expire_commands(&mut self, now: Instant, out: &mut Outbox) {
         let late = |it: &Running| it.deadline.is_some_and(|deadline| deadline <= now);
         let unsuccessful = CommandResult::UNSUCCESSFUL;
@@ -176,11 +176,11 @@ impl Events {
     }
 }
 
-/// Why a command is not carried out.
+/// Why a command is not run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::service) enum Refusal {
-    /// No service would tell when it has ended.
+    /// No service reports its end.
     NobodyTells,
-    /// The client may not give it now.
+    /// The client may not send it now.
     NotAllowed,
 }

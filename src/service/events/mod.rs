@@ -1,29 +1,30 @@
-//! The Events service (AS5710): clients name a query, and have its report sent at a rate or on every
-//! change.
+//! The Events service (AS5710): a client subscribes to a query, and gets its report periodically or
+//! on every change.
 //!
-//! Every query that the component answers can be subscribed to: the [`Stack`](super::Stack) puts it
-//! to the component's own services as if the client had asked, and what they answer is the event.
-//! This module keeps the subscriptions, and says which report is due.
+//! A client can subscribe to any query that the component answers. The [`Stack`](super::Stack)
+//! passes the query to the component's own services as if the client had sent it, and the answer
+//! becomes the event. This module keeps the subscriptions, and determines which report is due.
 //!
-//! # Choices
+//! # Design choices
 //!
-//! * Event numbers are given out for each client by itself, so that a component can have more than
-//!   the 256 that an octet names. Clients know an event by producer and number.
-//! * The first report follows the confirmation at once, of both types: the client knows where
-//!   things stand, and need not ask beside.
-//! * A query is answered once for all clients to whom its report is due at the same time: the answer
-//!   may not depend on who asks.
-//! * Creating what is there already (same client, type and query) changes its rate and confirms the
-//!   same number, so that a client that repeats itself, because an answer got lost or it was
-//!   restarted, does not multiply streams. At the same rate a periodic event keeps its beat, and
-//!   nothing comes beside it; an event on change is told again, because a report may have got lost.
-//! * Query Events by number lists that event first, and then the others of the client. JAUS++ looks
-//!   after each of its events with such a query, and takes all that are not in the answer for lost:
-//!   it would create them anew every five seconds, at 1 Hz.
-//! * Events do not expire unless [`EventSettings::timeout`] is set: clients of version 1.0 do not
-//!   know that they could. What is sent to a client that discovery finds gone ends.
-//! * Command events (1.1) are for commands whose end a service [tells](super::Service::tells_end_of),
-//!   and for clients that may give them; others are refused before anything is carried out.
+//! * Each client has its own numbering of events, so that a component can have more than the 256
+//!   that one octet can number. Clients identify an event by producer and number.
+//! * The first report follows the confirmation at once, for both types. So the client knows the
+//!   current state without a separate query.
+//! * A query is answered once for all clients whose report is due at the same time. So the answer
+//!   must not depend on the client.
+//! * Creating an event that exists (same client, type and query) changes its rate and confirms the
+//!   same number. So a client that repeats its request, after a lost answer or a restart, does not
+//!   multiply streams. At the same rate a periodic event keeps its schedule, without an extra
+//!   report. An event on change is reported again, because a report may have been lost.
+//! * Query Events by number lists that event first, and then the client's other events. JAUS++
+//!   checks each of its events with such a query, and assumes that all events missing from the
+//!   answer are lost. It would recreate them every five seconds, at 1 Hz.
+//! * Events do not expire unless [`EventSettings::timeout`] is set, because clients of version 1.0
+//!   do not know about expiry. Events of a client that discovery has lost end.
+//! * Command events (1.1) are available for commands whose end a service
+//!   [reports](super::Service::tells_end_of), and to clients that may send those commands. Other
+//!   requests are rejected before the command runs.
 
 mod commands;
 mod rejecting;
@@ -56,32 +57,33 @@ use table::{Kind, Name, Subscription, Table};
 const PERIODIC: u8 = 0;
 const EVERY_CHANGE: u8 = 1;
 
-/// The rates that the field of Create Event can say, in hertz.
+/// The rates that Create Event can carry, in hertz.
 const RATES: std::ops::RangeInclusive<f64> = 0.01..=1092.0;
-/// The longest query that can be subscribed to, in octets: each subscription keeps its query, and
-/// the queries of the standards have some dozens.
+/// The longest query of a subscription, in octets. Each subscription keeps its query; the queries
+/// of the standards have a few dozen octets.
 const LONGEST_QUERY: usize = 1024;
 
-/// What the component can take on.
+/// Limits of the Events service.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EventSettings {
-    /// Subscriptions of one client; the numbers of events allow 256.
+    /// Subscriptions per client; event numbers allow up to 256.
     pub per_client: usize,
-    /// Subscriptions of all clients behind one network address. Of all addresses together it is twice
-    /// as many, of which the second half is for newcomers.
+    /// Subscriptions per network address. The limit for all addresses together is twice this, with
+    /// the second half reserved for newcomers.
     pub total: usize,
-    /// The fastest rate of one subscription, in hertz. Faster ones are confirmed at this rate, and
-    /// changes that follow one another faster are told together.
+    /// The highest rate of one subscription, in hertz. A higher request is confirmed at this rate.
+    /// Changes in faster succession are reported together.
     pub fastest: f64,
-    /// The most reports a second that the periodic subscriptions of one network address may add up to;
-    /// those of all addresses together twice that.
+    /// Limit of periodic reports per second to one network address. The limit for all addresses
+    /// together is twice this.
     pub reports_per_second: f64,
-    /// After how many minutes an event ends that its client does not renew; 0 for never.
+    /// Minutes after which an event ends unless its client renews it; 0 disables this.
     pub timeout: u8,
 }
 
 impl Default for EventSettings {
-    /// 256 for each client and 4096 for each network address, up to 250 Hz each and 20 000 reports a second.
+    /// 256 per client and 4096 per network address, up to 250 Hz each and 20 000 reports per
+    /// second.
     fn default() -> Self {
         Self {
             per_client: 256,
@@ -101,25 +103,25 @@ pub(super) struct Events {
     commands: Commands,
 }
 
-/// What became of a message.
+/// Result of handling a message.
 #[derive(Debug)]
 pub(super) enum Outcome {
-    /// It was none of ours.
+    /// Not a message of this service.
     NotOurs,
-    /// It is dealt with.
+    /// Handled.
     Done,
-    /// Whether the event can be had depends on whether anybody answers its query.
+    /// The event is created if the component answers its query.
     Try(Trial),
-    /// Whether the command is carried out depends on the services and on who is in control.
+    /// The command runs if a service reports its end and the client may send it.
     TryCommand(CommandTrial),
 }
 
-/// A subscription that is wanted.
+/// A requested subscription.
 #[derive(Debug)]
 pub(super) struct Trial {
     request: Received,
     request_id: u8,
-    /// The event to be changed, if there is to be one.
+    /// The number of the event to change, if the request gives one.
     event_id: Option<u8>,
     kind: u8,
     hertz: f64,
@@ -188,7 +190,7 @@ impl Events {
         }
     }
 
-    /// Whether a client holds any subscription.
+    /// Whether a client has a subscription.
     pub(super) fn has(&self, client: JausId) -> bool {
         self.table.of(client).next().is_some()
     }
@@ -215,7 +217,7 @@ impl Events {
         match self.table.remove(name) {
             Some(ended) => confirm(message, cancel.request_id, name, &ended, out),
             None if self.commands.remove(name) => {
-                // The command goes on; its end is no longer told.
+                // The command continues; its end is no longer reported.
                 out.reply(message, &confirmation(cancel.request_id, cancel.event_id));
             }
             None => reject(message, cancel.request_id, INVALID_EVENT, out),
@@ -232,7 +234,7 @@ impl Events {
             QueryEventsVar::AllEventsRec(_) => true,
         };
         let listed = self.table.of(client).filter(|&(id, it)| wanted(id, it));
-        // See "Choices" above.
+        // See "Design choices" above.
         let beside = match which {
             QueryEventsVar::EventIdRec(one) if self.table.get((client, one.event_id)).is_some() => {
                 Some(one.event_id)
@@ -247,12 +249,12 @@ impl Events {
             event_id,
             query_message: subscription.query.clone(),
         };
-        // The list's count is an octet.
+        // The count field is one octet.
         let event_list = listed.take(usize::from(u8::MAX)).map(entry).collect();
         ReportEvents { event_list }
     }
 
-    /// Nobody answers the query of a trial, or somebody does, with this report.
+    /// Completes a trial with the report that answers its query; `None` if there is no answer.
     pub(super) fn conclude(
         &mut self,
         now: Instant,
@@ -305,13 +307,13 @@ impl Events {
         self.table.insert(name, subscription);
     }
 
-    /// A number that names no event of the client yet.
+    /// A number that the client does not use for an event.
     fn free_id(&self, client: JausId) -> Option<u8> {
         let taken = |name| self.commands.contains(name);
         self.table.free_id(client, taken)
     }
 
-    /// What the client gets of what it wants.
+    /// The kind of event that the client gets, within the limits.
     fn kind(&self, trial: &Trial) -> Kind {
         let fastest = self.settings.fastest.clamp(*RATES.start(), *RATES.end());
         if trial.kind == EVERY_CHANGE {
@@ -319,7 +321,7 @@ impl Events {
                 pause: Duration::from_secs_f64(1.0 / fastest),
             };
         }
-        // At least the smallest step of the field, which `check` has made sure of.
+        // At least the smallest step of the field, as `check` has ensured.
         let hertz = trial.hertz.clamp(*RATES.start(), fastest);
         Kind::Periodic {
             hertz,
@@ -343,18 +345,18 @@ impl Events {
         (minutes > 0).then(|| now + Duration::from_secs(60 * minutes))
     }
 
-    /// The answer to the query with this code is another now.
+    /// Handles a change of the answer to the query with this code.
     pub(super) fn handle_change(&mut self, now: Instant, query: u16) {
         self.table.touch(now, query);
     }
 
-    /// A client is gone, as far as discovery can tell.
+    /// Removes the events of a client that is gone, as far as discovery can tell.
     pub(super) fn forget(&mut self, client: JausId) {
         self.table.remove_client(client);
         self.commands.remove_client(client);
     }
 
-    /// Events that their clients have not renewed end, and the clients are told.
+    /// Ends events that their clients have not renewed, and notifies the clients.
     pub(super) fn expire(&mut self, now: Instant, out: &mut Outbox) {
         self.expire_commands(now, out);
         for (name, ended) in self.table.take_expired(now) {
@@ -369,7 +371,8 @@ impl Events {
         self.table.poll_due(now)
     }
 
-    /// The report of what was due; `None` if nobody answers its query any more.
+    /// Sends a due report. `None` if the component no longer answers the query, which ends the
+    /// event.
     pub(super) fn report_due(
         &mut self,
         now: Instant,
@@ -411,7 +414,7 @@ impl Events {
     }
 }
 
-/// What is answered to a number that the client has no event by.
+/// The trial of a new event.
 fn create(message: &Received, create: &CreateEvent, out: &mut Outbox) -> Outcome {
     let trial = Trial {
         request: message.clone(),
@@ -435,23 +438,23 @@ fn create_command(message: &Received, create: CreateCommandEvent, out: &mut Outb
     }
 }
 
-/// A query without the rest of the datagram that it came in. What is too long is cut, and
-/// [refused](check).
+/// A copy of a query, to free the datagram that contained it. A query that is too long is
+/// truncated, and [rejected](check).
 fn own(query: &Bytes) -> Bytes {
     Bytes::copy_from_slice(&query[..query.len().min(LONGEST_QUERY + 1)])
 }
 
-/// Whether two subscriptions differ only in what the client does not see.
+/// Whether two subscriptions look the same to the client.
 fn is_the_same(one: &Subscription, other: &Subscription) -> bool {
     one.kind == other.kind && one.query == other.query
 }
 
-/// Refuses what cannot be, whoever might answer the query.
+/// Rejects requests that are invalid whatever the services answer.
 fn check(trial: Trial, out: &mut Outbox) -> Outcome {
     let why = match code_of(&trial.query) {
         Some(code) if report_code(code).is_none() => ResponseCode::MESSAGE_NOT_SUPPORTED,
         Some(_) if trial.query.len() > LONGEST_QUERY => ResponseCode::INVALID_EVENT_SETUP,
-        // Nothing comes of events about events.
+        // Events about events never have a report.
         Some(QueryEvents::CODE | QueryEventTimeout::CODE) => ResponseCode::MESSAGE_NOT_SUPPORTED,
         Some(_) if trial.kind == EVERY_CHANGE || (trial.kind == PERIODIC && trial.hertz > 0.0) => {
             return Outcome::Try(trial);
@@ -498,7 +501,7 @@ fn set_rate(confirm: &mut ConfirmEventRequest, subscription: &Subscription) {
     if let Kind::Periodic { hertz, .. } = subscription.kind
         && let Err(error) = confirm.set_confirmed_periodic_rate_hz(hertz)
     {
-        // Settings beyond what the field can say.
+        // The settings exceed the range of the field.
         tracing::debug!(%error, "rate cannot be confirmed");
     }
 }

@@ -1,8 +1,9 @@
-//! Reject Event Request: why an event cannot be had, so that every known client can read it.
+//! Reject Event Request: why an event was rejected, in a form that every known client can read.
 //!
-//! JAUS++ takes the first bit of the presence vector for the text, and the code for always there.
-//! With both, everything is where it looks: it understands that it was refused, instead of waiting
-//! for an answer that it could not read. To all others the text is what the standard has it for.
+//! JAUS++ takes the first bit of the presence vector for that of the text, and assumes that the
+//! code is always present. With both present, all fields are where it expects them. So it sees the
+//! rejection instead of waiting for an answer that it could not read. For all other clients the
+//! text is used as in the standard.
 
 use crate::codec::Text;
 use crate::endpoint::Received;
@@ -10,17 +11,17 @@ use crate::messages::core::RejectEventRequest;
 use crate::messages::core::reject_event_request::ResponseCode;
 use crate::service::Outbox;
 
-/// The event that a request names is none of the client's.
+/// The client has no event with the requested number.
 pub(super) const INVALID_EVENT: ResponseCode =
     ResponseCode::ERROR_INVALID_EVENT_ID_FOR_UPDATE_EVENT_REQUEST;
 
-/// Refuses what a client asked for.
+/// Rejects a client's request.
 pub(super) fn reject(request: &Received, request_id: u8, why: ResponseCode, out: &mut Outbox) {
     tracing::debug!(client = %request.source, request_id, ?why, "event refused");
     out.reply(request, &rejection(request_id, why));
 }
 
-/// The refusal of a request.
+/// The rejection of a request.
 pub(super) fn rejection(request_id: u8, why: ResponseCode) -> RejectEventRequest {
     RejectEventRequest {
         request_id,
@@ -29,7 +30,7 @@ pub(super) fn rejection(request_id: u8, why: ResponseCode) -> RejectEventRequest
     }
 }
 
-/// Up to 80 octets, for people.
+/// Text for people, up to 80 octets.
 const fn in_words(why: ResponseCode) -> &'static str {
     match why {
         ResponseCode::CONNECTION_REFUSED => "no room for another event, or not for so fast a one",

@@ -1,5 +1,5 @@
-//! The subscriptions by client and number, with what is due when, and which wait for which change:
-//! no question is answered by looking at all of them.
+//! The table of subscriptions by client and number, indexed by due time, expiry and query, so that
+//! no lookup scans all of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ use crate::address::JausId;
 use crate::service::code_of;
 use crate::service::share::{Share, Shares};
 
-/// The client, and its number of the event.
+/// The client and its event number.
 pub(super) type Name = (JausId, u8);
 
 /// When a subscription's reports are sent.
@@ -20,14 +20,14 @@ pub(super) enum Kind {
         hertz: f64,
         period: Duration,
     },
-    /// With at least a pause between two.
+    /// With at least this pause between two reports.
     EveryChange {
         pause: Duration,
     },
 }
 
 impl Kind {
-    /// How many reports are sent in 1000 seconds for certain.
+    /// The number of reports in 1000 seconds; 0 for events on change, which have no fixed rate.
     fn reports(self) -> usize {
         match self {
             Self::Periodic { hertz, .. } => in_1000_seconds(hertz),
@@ -36,7 +36,7 @@ impl Kind {
     }
 }
 
-/// A rate in the smallest step that is counted.
+/// A rate in units of 0.001 Hz.
 fn in_1000_seconds(hertz: f64) -> usize {
     (hertz * 1000.0).round() as usize
 }
@@ -46,14 +46,14 @@ pub(super) struct Subscription {
     pub(super) kind: Kind,
     pub(super) query: Bytes,
     pub(super) sequence: u8,
-    /// The last report, if changes are to be told, and when.
+    /// For events on change, the last report and its time.
     pub(super) told: Option<(Instant, Bytes)>,
-    /// When the next report is due; none while no change is known.
+    /// When the next report is due; `None` while there is no change to report.
     pub(super) next: Option<Instant>,
     pub(super) expires: Option<Instant>,
-    /// The number of the request that it was last set up by.
+    /// The number of the request that last set it up.
     pub(super) request_id: u8,
-    /// Which network address pays for it.
+    /// The share of the network address that it counts against.
     pub(super) share: Share,
 }
 
@@ -72,7 +72,7 @@ impl Due {
 }
 
 impl Subscription {
-    /// The soonest time from `now` on at which a change may be told.
+    /// The earliest time from `now` on at which a change may be reported.
     fn after_its_pause(&self, now: Instant) -> Instant {
         match (self.kind, &self.told) {
             (Kind::EveryChange { pause }, Some((told, _))) => now.max(*told + pause),
@@ -86,15 +86,15 @@ pub(super) struct Table {
     subscriptions: BTreeMap<Name, Subscription>,
     due: BTreeSet<(Instant, Name)>,
     expiring: BTreeSet<(Instant, Name)>,
-    /// Those that wait for a change of the answer to a query, by its code.
+    /// Events on change, by the code of their query.
     by_query: BTreeSet<(u16, Name)>,
     shares: Shares,
-    /// Reports of the periodic ones, in 1000 seconds.
+    /// Reports of periodic events, in 1000 seconds.
     rates: Shares,
 }
 
 impl Table {
-    /// A table with room for so many of one network address, with so many reports a second.
+    /// A table with limits of entries and of reports per second for one network address.
     pub(super) fn new(most: usize, reports_per_second: f64) -> Self {
         Self {
             subscriptions: BTreeMap::new(),
@@ -106,7 +106,7 @@ impl Table {
         }
     }
 
-    /// Whether a network address may have one more of a kind, in place of `before` if there is one.
+    /// Whether a network address may have one more event of a kind, in place of `before` if given.
     pub(super) fn has_room(&self, share: Share, kind: Kind, before: Option<Kind>) -> bool {
         let freed = before.map_or(0, Kind::reports);
         let more = kind.reports().saturating_sub(freed);
@@ -118,7 +118,7 @@ impl Table {
         self.subscriptions.len()
     }
 
-    /// All of them.
+    /// All subscriptions.
     pub(super) fn iter(&self) -> impl Iterator<Item = &Subscription> {
         self.subscriptions.values()
     }
@@ -134,14 +134,15 @@ impl Table {
             .map(|(name, subscription)| (name.1, subscription))
     }
 
-    /// The number of a client's event of a type with this very query.
+    /// The number of a client's event of this type with exactly this query.
     pub(super) fn find(&self, client: JausId, kind: u8, query: &[u8]) -> Option<u8> {
         self.of(client)
             .find(|(_, it)| super::type_of(it) == kind && it.query == query)
             .map(|(id, _)| id)
     }
 
-    /// The lowest number that a client does not use, beginning with 1: 0 means none to some peers.
+    /// The lowest number that a client does not use. 0 comes last, because it means "none" to some
+    /// peers.
     pub(super) fn free_id(&self, client: JausId, taken: impl Fn(Name) -> bool) -> Option<u8> {
         (1..=u8::MAX)
             .chain([0])
@@ -150,7 +151,7 @@ impl Table {
             .map(|(_, id)| id)
     }
 
-    /// Puts a subscription in, in place of another of that name.
+    /// Inserts a subscription, in place of any other with that name.
     pub(super) fn insert(&mut self, name: Name, subscription: Subscription) {
         self.remove(name);
         if let Some(next) = subscription.next {
@@ -192,7 +193,7 @@ impl Table {
         }
     }
 
-    /// A client has shown that it still wants its events.
+    /// Renews a client's events.
     pub(super) fn renew(&mut self, client: JausId, expires: Option<Instant>) {
         for (name, subscription) in self
             .subscriptions
@@ -217,7 +218,7 @@ impl Table {
         expired
     }
 
-    /// Whoever waits for a change of this answer gets it, soon.
+    /// Makes the reports of the events on change of this query due, after their pause.
     pub(super) fn touch(&mut self, now: Instant, query: u16) {
         let all =
             (query, (JausId::from_u32(0), 0))..=(query, (JausId::from_u32(u32::MAX), u8::MAX));
@@ -230,14 +231,15 @@ impl Table {
         }
     }
 
-    /// The next that is due. It stays so until it is [rescheduled](Self::reschedule) or removed.
+    /// The next report that is due. It stays due until it is [rescheduled](Self::reschedule) or
+    /// removed.
     pub(super) fn poll_due(&mut self, now: Instant) -> Option<Due> {
         let &(when, name) = self.due.first().filter(|(when, _)| *when <= now)?;
         let query = self.subscriptions.get(&name)?.query.clone();
         Some(Due { name, when, query })
     }
 
-    /// Reports what was due with `report`, and settles when it is due again.
+    /// Calls `report` for a due subscription, and schedules its next report.
     pub(super) fn reschedule(
         &mut self,
         due: &Due,
@@ -265,8 +267,8 @@ impl Table {
     }
 }
 
-/// The next beat after `now`: beats that were missed are left out, and none comes late because one
-/// before it did.
+/// The next scheduled time after `now`. Missed times are skipped, and a delay does not shift the
+/// schedule.
 fn following(beat: Instant, period: Duration, now: Instant) -> Instant {
     let next = beat + period;
     if next > now {

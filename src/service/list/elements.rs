@@ -1,4 +1,4 @@
-//! The list itself: elements by number, each naming the one before and the one after it.
+//! The element list: elements by number, each with links to the previous and the next one.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,38 +7,37 @@ use bytes::Bytes;
 use crate::messages::core::reject_element_request::ResponseCode;
 use crate::messages::core::set_element::ElementRec;
 
-/// A doubly linked list. At all times it is one chain: it has one first and one last element, and
-/// each element is named by its neighbours.
+/// A doubly linked list. It is always a single chain, with one first and one last element, and each
+/// element's neighbours link back to it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ElementList {
     elements: BTreeMap<u16, ElementRec>,
 }
 
-/// Stands for no element, and for the first one when asked for.
+/// Means no element, or the first one in a query.
 const NONE: u16 = 0;
-/// Stands for all elements.
+/// Means all elements.
 const ALL: u16 = u16::MAX;
 
 impl ElementList {
-    /// The most elements that are kept.
+    /// Limit of elements.
     pub const MAX_ELEMENTS: usize = 4096;
-    /// The most octets of data that an element may hold: several times the longest message that
-    /// drives anything.
+    /// Limit of the data of one element in octets: several times the longest command message.
     pub const MAX_DATA: usize = 1024;
 
-    /// How many elements there are.
+    /// The number of elements.
     #[must_use]
     pub fn len(&self) -> u16 {
         u16::try_from(self.elements.len()).unwrap_or(u16::MAX)
     }
 
-    /// Whether there are none.
+    /// Whether the list is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.elements.is_empty()
     }
 
-    /// The element with a number; 0 stands for the first one.
+    /// The element with a number; 0 means the first one.
     #[must_use]
     pub fn get(&self, uid: u16) -> Option<&ElementRec> {
         match uid {
@@ -51,7 +50,7 @@ impl ElementList {
     pub fn uids(&self) -> impl Iterator<Item = u16> {
         let next = |element: &&ElementRec| self.elements.get(&element.next_uid);
         let chain = std::iter::successors(self.first(), next);
-        // It is one chain; this only keeps a mistake of ours from being endless.
+        // The list is a single chain. The limit only prevents an endless loop after a bug.
         chain
             .map(|element| element.element_uid)
             .take(self.elements.len())
@@ -62,15 +61,16 @@ impl ElementList {
         elements.find(|element| element.previous_uid == NONE)
     }
 
-    /// Adds elements between their neighbours, or replaces and moves those that are there. Either
-    /// all of it is done, or nothing.
+    /// Adds elements between their neighbours, or replaces and moves existing ones. Either all
+    /// changes take effect, or none.
     ///
-    /// The neighbours may be elements of the list or of the same request. A neighbour of the list
-    /// is linked to the new element by itself; what the request says itself must agree.
+    /// A neighbour may be an element of the list or of the same request. A neighbour in the list is
+    /// linked to the new element automatically. Links between elements of the request must agree.
     ///
     /// # Errors
-    /// The response code of Reject Element Request (041Dh): a number that is none or comes twice,
-    /// a neighbour that does not exist or would make a cycle or two lists, or too many elements.
+    /// The response code of Reject Element Request (041Dh): an invalid or repeated number, a
+    /// neighbour that does not exist or would create a cycle or two lists, too many elements, or
+    /// too much data.
     pub fn set(&mut self, elements: &[ElementRec]) -> Result<(), ResponseCode> {
         let mut requested = BTreeSet::new();
         for element in elements {
@@ -88,7 +88,7 @@ impl ElementList {
         }
         for element in elements {
             let mut element = element.clone();
-            // A slice of the datagram would keep all of the datagram.
+            // A slice would keep the whole datagram allocated.
             let data = &mut element.element_data.data;
             *data = Bytes::copy_from_slice(data);
             changed.elements.insert(element.element_uid, element);
@@ -104,11 +104,11 @@ impl ElementList {
         Ok(())
     }
 
-    /// Removes elements, and joins what remains; 65535 stands for all of them. Either all of it is
-    /// done, or nothing.
+    /// Removes elements, and joins the rest; 65535 means all elements. Either all are removed, or
+    /// none.
     ///
     /// # Errors
-    /// The response code of Reject Element Request (041Dh) if one of them is not there.
+    /// The response code of Reject Element Request (041Dh) if one of them does not exist.
     pub fn delete(&mut self, uids: &[u16]) -> Result<(), ResponseCode> {
         if uids.contains(&ALL) {
             self.clear();
@@ -123,12 +123,12 @@ impl ElementList {
         Ok(())
     }
 
-    /// Removes everything.
+    /// Removes all elements.
     pub fn clear(&mut self) {
         self.elements.clear();
     }
 
-    /// Takes an element out, if it is there, and joins its neighbours.
+    /// Removes an element, if it exists, and joins its neighbours.
     fn unlink(&mut self, uid: u16) {
         let Some(element) = self.elements.remove(&uid) else {
             return;
@@ -141,7 +141,7 @@ impl ElementList {
         }
     }
 
-    /// Makes the neighbours of a new element name it.
+    /// Links the neighbours of a new element to it.
     fn link(
         &mut self,
         element: &ElementRec,
@@ -169,7 +169,7 @@ impl ElementList {
         Ok(())
     }
 
-    /// Whether this is one chain.
+    /// Checks that the elements form a single chain.
     fn check(&self) -> Result<(), ResponseCode> {
         let none = |link: fn(&ElementRec) -> u16| {
             let elements = self.elements.values();
@@ -197,7 +197,7 @@ impl ElementList {
             previous = uid;
             count += 1;
         }
-        // The rest would be a cycle beside the list.
+        // Any others would form a cycle beside the list.
         if count == self.elements.len() {
             Ok(())
         } else {

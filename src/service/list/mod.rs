@@ -1,9 +1,8 @@
-//! The List Manager service: a linked list of elements that a client builds and drivers work off.
+//! The List Manager service: a linked list of elements that a client builds and drivers execute.
 //!
-//! The list itself is [`ElementList`], behind the shared handle [`Elements`]; [`ListManager`] is
-//! the service that lets clients read and change it. Drivers that work a list off hold a clone of
-//! the same handle, and say what kinds of elements they can work with
-//! ([`Elements::accept`]).
+//! The list itself is [`ElementList`], behind the shared handle [`Elements`]. [`ListManager`] is
+//! the service with which clients read and change it. Drivers that execute a list hold a clone of
+//! the same handle, and register the element types that they support ([`Elements::accept`]).
 
 mod elements;
 #[cfg(test)]
@@ -43,26 +42,26 @@ impl std::fmt::Debug for Elements {
 #[derive(Default)]
 struct Shared {
     list: ElementList,
-    /// By the code of the message in an element: whether a driver can work with it.
+    /// By the message code of an element: the check whether a driver supports it.
     kinds: BTreeMap<u16, Check>,
 }
 
 type Check = Box<dyn Fn(&Bytes) -> Result<(), ResponseCode> + Send>;
 
 impl Elements {
-    /// An empty list that takes no elements until something is [accepted](Self::accept).
+    /// An empty list that rejects all elements until a type is [accepted](Self::accept).
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Elements that hold a message of type `M` are welcome.
+    /// Accepts elements that hold a message of type `M`.
     pub fn accept<M: Message>(&self) {
         self.accept_if(|_: &M| true);
     }
 
-    /// Elements that hold a message of type `M` are welcome if it can be worked with, for instance
-    /// if it is in range.
+    /// Accepts elements that hold a message of type `M` if `can_do` returns true, for instance if
+    /// it is in range.
     pub fn accept_if<M: Message>(&self, can_do: impl Fn(&M) -> bool + Send + 'static) {
         let check = move |octets: &Bytes| match M::decode(octets) {
             Ok(message) if can_do(&message) => Ok(()),
@@ -72,7 +71,7 @@ impl Elements {
         self.accept_code(M::CODE, check);
     }
 
-    /// Elements that hold a message with this code are welcome if the check of its octets says so.
+    /// Accepts elements that hold a message with this code if the check of its octets succeeds.
     pub fn accept_code(
         &self,
         code: u16,
@@ -81,13 +80,13 @@ impl Elements {
         self.lock().kinds.insert(code, Box::new(check));
     }
 
-    /// The element with a number, if it is in the list; 0 stands for the first one.
+    /// The element with a number, if it is in the list; 0 means the first one.
     #[must_use]
     pub fn get(&self, uid: u16) -> Option<ElementRec> {
         self.lock().list.get(uid).cloned()
     }
 
-    /// How many elements lie before the one with a number, and how many there are.
+    /// The number of elements before the one with a number, and of all elements.
     #[must_use]
     pub fn place_of(&self, uid: u16) -> (usize, usize) {
         let shared = self.lock();
@@ -95,7 +94,7 @@ impl Elements {
         (before, shared.list.len().into())
     }
 
-    /// Removes everything.
+    /// Removes all elements.
     pub fn clear(&self) {
         self.lock().list.clear();
     }
@@ -106,7 +105,7 @@ impl Elements {
 }
 
 impl Shared {
-    /// Whether a driver can work with an element.
+    /// Checks whether a driver supports an element.
     fn check(&self, element: &ElementRec) -> Result<(), ResponseCode> {
         let data = &element.element_data;
         let check = code_of(&data.data).and_then(|code| self.kinds.get(&code));
@@ -126,16 +125,16 @@ impl Shared {
 
 /// Lets clients read the list, and the client in control change it.
 ///
-/// A request is carried out as a whole or refused as a whole. The list is emptied when the component
-/// [initializes](State::Initialize), as it does at a reset if it
-/// [said so](super::Management::initializes).
+/// A request takes effect as a whole or is rejected as a whole. The list is cleared when the
+/// component [initializes](State::Initialize), as on a reset if it is
+/// [configured](super::Management::initializes) to.
 #[derive(Debug)]
 pub struct ListManager {
     elements: Elements,
 }
 
 impl ListManager {
-    /// The service over a list.
+    /// The service for a list.
     #[must_use]
     pub const fn new(elements: Elements) -> Self {
         Self { elements }
@@ -159,7 +158,7 @@ impl ListManager {
         }
     }
 
-    /// An element that is not there is not reported: the definition has no answer for it.
+    /// A missing element is not reported: the standard defines no answer for it.
     fn report(&self, message: &Received, context: &mut Context<'_>) {
         let element = read::<QueryElement>(message);
         let element = element.and_then(|query| self.elements.get(query.element_uid));
@@ -191,7 +190,7 @@ impl ListManager {
     }
 }
 
-/// A request of the client in control; others' are ignored.
+/// Reads a request of the client in control; requests of other clients are ignored.
 fn requested<M: Message>(message: &Received, context: &Context<'_>) -> Option<M> {
     if context.standing().obeys(message.source) {
         return read(message);
@@ -200,7 +199,7 @@ fn requested<M: Message>(message: &Received, context: &Context<'_>) -> Option<M>
     None
 }
 
-/// Confirms or refuses a request, and says that the list has changed.
+/// Confirms or rejects a request, and reports the change of the list.
 fn answer(
     request_id: u8,
     result: Result<(), ResponseCode>,

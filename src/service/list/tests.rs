@@ -1,4 +1,4 @@
-//! What a list takes, what it refuses and with which code.
+//! The elements that a list accepts, and those that it rejects, with the codes.
 
 use super::*;
 use crate::codec::FormattedBlob;

@@ -1,9 +1,9 @@
-//! The control of a whole component beside the machine of its definition: both are given the same
-//! random events under virtual time, and must be in the same state, under the control of the same
-//! client, and have said the same to the same clients.
+//! Compares the control of a whole component with the state machine of its definition: both get the
+//! same random events in virtual time. They must be in the same state, controlled by the same
+//! client, and have sent the same messages to the same clients.
 //!
-//! What the application says during an emergency is not in the machine; see `Condition`. Here it
-//! is said again when the emergency is over.
+//! The state machine does not handle the application's reports during an emergency; see
+//! `Condition`. Here they are repeated after the emergency.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -21,16 +21,16 @@ use crate::messages::core::*;
 use crate::service::stack_rig::{StackRig, Told};
 use crate::service::{AccessControl, Condition, Management as Settings, State, Transport};
 
-/// The weakest client that gets control, and the seconds after which it ends.
+/// The lowest authority that gets control, and the timeout of control in seconds.
 const DEFAULT_AUTHORITY: u8 = 50;
 const TIMEOUT: u8 = 4;
 
-/// What the machine's actions and questions are about.
+/// The data of the state machine's actions and guards.
 struct Component {
     now: Instant,
     initializes: bool,
     controller: Option<(JausId, u8)>,
-    /// Who has taken control, whose authority is still to come.
+    /// The client that has taken control and whose authority is not known yet.
     taking: Option<JausId>,
     deadline: Option<Instant>,
     emergencies: BTreeSet<JausId>,
@@ -180,7 +180,7 @@ impl Behaviour for Component {
     }
 }
 
-/// What may happen; clients by number.
+/// A random event; clients by number.
 #[derive(Debug, Clone)]
 enum Happening {
     Request(u8, u8),
@@ -219,12 +219,12 @@ fn client(number: u8) -> JausId {
     JausId::new(42, 2, number + 1)
 }
 
-/// A component and the machine beside it.
+/// A component and the state machine to compare it with.
 struct Pair {
     rig: StackRig,
     machine: Machine,
     component: Component,
-    /// What the application said during the emergency.
+    /// The application's reports during the emergency.
     later: Vec<Condition>,
 }
 
@@ -265,7 +265,7 @@ impl Pair {
         pair
     }
 
-    /// As Report Status would say it.
+    /// The state, as in Report Status.
     fn state(&self) -> State {
         match self.machine.state() {
             Place::NotControlledAvailableStandby | Place::ControlledAvailableStandby => {
@@ -281,7 +281,7 @@ impl Pair {
         }
     }
 
-    /// After each step: outside of the states under control nobody is in control.
+    /// After each step: outside the controlled states there is no controller.
     fn settle(&mut self) {
         if !self
             .machine
@@ -300,7 +300,7 @@ impl Pair {
         outcome
     }
 
-    /// Both hear a message, and say the same.
+    /// Both handle a message, and must send the same.
     fn hear<'m, M: Message>(
         &mut self,
         source: &'m JausId,
@@ -337,7 +337,7 @@ impl Pair {
         };
     }
 
-    /// What was said during an emergency counts when it is over.
+    /// Applies the reports that were made during an emergency.
     fn resume(&mut self) {
         if self.state() != State::Emergency {
             for condition in std::mem::take(&mut self.later) {
@@ -427,7 +427,7 @@ proptest! {
     }
 }
 
-/// The random events mean something: a component can be brought into every state of the machine.
+/// The random events are sufficient: they bring a component into every state of the machine.
 #[test]
 fn a_component_reaches_every_state_of_the_machine() {
     let life = [

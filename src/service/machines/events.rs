@@ -1,5 +1,6 @@
-//! The events of a whole component beside the machine of their definition: both are given the same
-//! random requests, and must send the same clients the same messages and keep the same events.
+//! Compares the events of a whole component with the state machine of their definition: both get
+//! the same random requests, must send the same messages to the same clients, and must keep the
+//! same events.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +18,8 @@ use crate::messages::core::{self, *};
 use crate::service::stack_rig::StackRig;
 use crate::service::{Management, Transport, code_of};
 
-/// What the component answers, what it never does, and what is no query.
+/// Queries that the component answers, queries that it never answers, and a message that is no
+/// query.
 fn query(number: u8) -> Bytes {
     let query = match number {
         0 => QueryStatus.encode(),
@@ -34,7 +36,7 @@ fn query(number: u8) -> Bytes {
 #[derive(Default)]
 struct Kept {
     events: BTreeMap<(JausId, u8), Bytes>,
-    /// To whom, and the code of the message.
+    /// The receiver and the message code.
     said: Vec<(JausId, u16)>,
 }
 
@@ -64,7 +66,7 @@ impl Behaviour for Kept {
         false
     }
 
-    /// The same client has one event for a query, and the lowest number that is free.
+    /// A client has one event per query, with the lowest free number.
     fn store_event(&mut self, message: CreateEventOrUpdateEvent<'_>, client: &JausId) {
         let query = wanted(message).clone();
         let id = match message {
@@ -109,7 +111,7 @@ impl Behaviour for Kept {
     }
 }
 
-/// A request of a client; queries and events by number.
+/// A client's request; queries and events by number.
 #[derive(Debug, Clone)]
 enum Request {
     Create(u8),
@@ -131,7 +133,7 @@ fn request() -> impl Strategy<Value = Request> {
     ]
 }
 
-/// A component and the machine beside it.
+/// A component and the state machine to compare it with.
 struct Pair {
     rig: StackRig,
     machine: Machine,
@@ -147,7 +149,7 @@ impl Pair {
         Self { rig, machine, kept }
     }
 
-    /// Both hear a message, and send the same. Answers what was sent.
+    /// Both handle a message, and must send the same. Returns the messages.
     fn hear<'m, M: Message>(
         &mut self,
         client: &'m JausId,
@@ -203,7 +205,7 @@ impl Pair {
         }
     }
 
-    /// The list of a client's events is that of the machine.
+    /// A client's list of events must match that of the state machine.
     fn list(&mut self, client: &JausId) {
         let all = QueryEvents {
             query_events_var: QueryEventsVar::AllEventsRec(query_events::AllEventsRec::default()),

@@ -1,5 +1,5 @@
-//! Random events: the generated machines and the dynamic ones go the same way, and never where
-//! they cannot be.
+//! Random events: the generated state machines and the dynamic ones take the same path, and never
+//! enter an impossible state.
 
 use jsidl::behaviour::Run;
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ use proptest::sample::Index;
 use super::recorder::{Generated, Recorder, dynamic, step, stimulus};
 use crate::messages::core::{access_control, events, management};
 
-/// All questions; which of them hold is decided anew for each event.
+/// All guards; for each event it is decided again which of them hold.
 const QUESTIONS: [&str; 10] = [
     "isSupported",
     "eventExists",
@@ -22,7 +22,7 @@ const QUESTIONS: [&str; 10] = [
     "initializes",
 ];
 
-/// An event, and which questions hold.
+/// An event, and the guards that hold.
 type Happening = (Index, u16);
 
 fn happenings() -> impl Strategy<Value = Vec<Happening>> {
@@ -35,7 +35,7 @@ fn holding(bits: u16) -> impl Iterator<Item = String> {
     holding.map(|(_, question)| (*question).to_owned())
 }
 
-/// Sends both the same way; answers the paths of the states.
+/// Runs both, which must take the same path; returns the paths of the states.
 fn same<G: Generated>(happenings: &[Happening]) -> Vec<String> {
     let machine = dynamic(G::URN);
     let (mut ours, mut theirs) = (Recorder::default(), Recorder::default());
@@ -75,7 +75,7 @@ proptest! {
         same::<access_control::machine::Machine>(&happenings);
     }
 
-    /// Ready is a state under control only, and what starts or fails is not.
+    /// Ready is a controlled state; the states of starting and failure are not.
     #[test]
     fn generated_management_goes_as_the_dynamic_one_and_is_never_ready_without_control(
         happenings in happenings(),

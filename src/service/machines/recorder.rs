@@ -1,5 +1,5 @@
-//! A behaviour that writes down what it is asked to do, and one way of running the generated
-//! machines and the dynamic ones with it.
+//! A behaviour that records its actions, and a common way to run the generated state machines and
+//! the dynamic ones with it.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -10,12 +10,12 @@ use jsidl::behaviour::{self, Action, Guard, Name, Run, Stimulus};
 use crate::codec::machine::Outcome;
 use crate::messages::core::{self, access_control, events, management};
 
-/// Answers guards from a list, and writes actions down.
+/// Answers guards from a list, and records actions.
 #[derive(Debug, Default)]
 pub(super) struct Recorder {
-    /// The questions whose answer is yes, unqualified.
+    /// The guards that hold, unqualified.
     pub(super) holds: BTreeSet<String>,
-    /// The actions, unqualified, with the texts that they are given.
+    /// The actions, unqualified, with their text arguments.
     pub(super) done: Vec<String>,
 }
 
@@ -29,7 +29,7 @@ impl Recorder {
     }
 }
 
-/// The questions and actions of Events, for a type with `holds` and `note`.
+/// The guards and actions of Events, for a type with `holds` and `note`.
 macro_rules! of_events {
     ($machine:ident) => {
         fn is_supported(&self, _: $machine::CreateEventOrUpdateEvent<'_>) -> bool {
@@ -77,7 +77,7 @@ macro_rules! of_events {
 }
 pub(super) use of_events;
 
-/// Those of Access Control.
+/// The guards and actions of Access Control.
 macro_rules! of_access_control {
     ($machine:ident) => {
         fn is_default_authority_greater(&self, _: &$crate::messages::core::RequestControl) -> bool {
@@ -165,10 +165,10 @@ use access_control::machine as access_control_machine;
 use events::machine as events_machine;
 use management::machine as management_machine;
 
-/// A generated machine, in words.
+/// A generated state machine with string names.
 pub(super) trait Generated: Sized {
     const URN: &'static str;
-    /// What may happen to it: messages by name, then other events.
+    /// Its events: messages by name, then others.
     const MESSAGES: &'static [&'static str];
     const OTHERS: &'static [&'static str];
 
@@ -228,14 +228,14 @@ generated!(management: [
     Resume, Standby, Reset, Shutdown, SetEmergency, ClearEmergency, QueryStatus,
 ], [Timedout, Initialized, Failure]);
 
-/// The definitions that come with us.
+/// The definitions that come with this library.
 pub(super) static LIBRARY: LazyLock<Library> = LazyLock::new(|| {
     let mut loader = jsidl::Loader::new();
     loader.catalogue();
     loader.load().library
 });
 
-/// The dynamic machine of the newest version of a service.
+/// The dynamic state machine of the newest version of a service.
 pub(super) fn dynamic(urn: &str) -> behaviour::Machine<'static> {
     let service = LIBRARY.versions(urn).last().expect("it is ours");
     LIBRARY.machines(service).remove(0)
@@ -250,7 +250,7 @@ pub(super) fn stimulus<G: Generated>(event: &str) -> Stimulus<'_> {
     }
 }
 
-/// One step of a dynamic machine, in the same words.
+/// One step of a dynamic state machine, with the same names.
 pub(super) fn step(
     run: &mut Run<'_, '_>,
     stimulus: Stimulus<'_>,
@@ -278,7 +278,7 @@ fn words(action: &Action) -> String {
     words.join(" ")
 }
 
-/// A dynamic machine in the state with this path.
+/// A dynamic state machine in the state with this path.
 pub(super) fn run_at<'m, 'a>(machine: &'m behaviour::Machine<'a>, path: &str) -> Run<'m, 'a> {
     let name = Name::parse(path).expect("a path");
     let state = machine.find(&name).expect("a state");

@@ -1,11 +1,11 @@
-//! Expectations written by hand: a state, an event, the questions that hold, what is done and the
-//! new state, for the generated machines and the dynamic ones.
+//! Handwritten expectations for the generated state machines and the dynamic ones: a state, an
+//! event, the guards that hold, the actions and the new state.
 
 use super::recorder::{Generated, Recorder, dynamic, run_at, step, stimulus};
 use crate::codec::machine::Outcome::{self, Handled, Ignored, Rejected};
 use crate::messages::core::{access_control, events, management};
 
-/// State, event, what holds: outcome, actions, new state (`""` for the same).
+/// State, event, guards that hold: outcome, actions, new state (`""` if unchanged).
 type Row<'r> = (
     &'r str,
     &'r str,
@@ -15,7 +15,7 @@ type Row<'r> = (
     &'r str,
 );
 
-/// Both kinds of machine do what the rows say. Paths are those within `Receiving`.
+/// Both kinds of state machine must do what the rows say. Paths are those within `Receiving`.
 fn check<G: Generated>(rows: &[Row<'_>]) {
     let machine = dynamic(G::URN);
     for &(from, event, holds, outcome, actions, to) in rows {
@@ -269,7 +269,7 @@ fn management_stops_in_an_emergency_and_ends_control_where_it_ends() {
             &["deleteID"],
             "",
         ),
-        // There is nothing to go back to.
+        // There is no state to return to.
         (emergency, "ClearEmergency", last, Rejected, &[], ""),
         (emergency, "ClearEmergency", &[], Rejected, &[], ""),
         (emergency, "ReleaseControl", &[], Handled, &[KEPT], ""),
@@ -345,7 +345,7 @@ fn management_stops_in_an_emergency_and_ends_control_where_it_ends() {
     ]);
 }
 
-/// What was interrupted goes on, but for what was in motion.
+/// Continues what was interrupted, except motion.
 #[test]
 fn after_an_emergency_management_goes_back_to_what_it_was_doing() {
     let mut recorder = Recorder::default();

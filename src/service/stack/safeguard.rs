@@ -1,5 +1,5 @@
-//! What a stack does so that nothing moves without a living controller: the one stop, the watch over
-//! clients, and failures.
+//! The safeguards of a stack, so that nothing moves without a living controller: the one stop, the
+//! watch over clients, and faults.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
@@ -15,20 +15,20 @@ use crate::service::{Context, Service, StopCause, UnsafeService};
 pub(super) struct Faults {
     /// Faults that services have reported and not recovered from.
     of_services: u32,
-    /// Whether the application says that it has failed.
+    /// Whether the application has reported a failure.
     of_application: bool,
 }
 
 impl Stack {
-    /// A component that moves something and is not called for so long was held up, with all that steers
-    /// what it moves.
+    /// If something moves and the component is not called for `HUNG`, the component was held up,
+    /// together with the code that steers. While something moves it is called every `BEAT`.
     const HUNG: Duration = Duration::from_millis(500);
     const BEAT: Duration = Duration::from_millis(100);
 
-    /// Checks that each service has beside it what makes it safe.
+    /// Checks that each service has what it needs to be safe.
     ///
     /// # Errors
-    /// [`UnsafeService`] says what to add.
+    /// [`UnsafeService`] names what is missing.
     pub fn check(&self) -> Result<(), UnsafeService> {
         let mut services = self.services.iter();
         services.try_for_each(|service| self.check_service(service.as_ref()))
@@ -38,7 +38,8 @@ impl Stack {
         safety::check(service, self.control.has_management(), &self.standing)
     }
 
-    /// The application tells how the component is, which Management shows.
+    /// Takes the application's report of the component's condition, which Management reports to
+    /// clients.
     pub fn set_condition(&mut self, now: Instant, condition: Condition) {
         match condition {
             Condition::Initialized => {
@@ -60,7 +61,7 @@ impl Stack {
         self.collect(now);
     }
 
-    /// Stops whatever the services move.
+    /// Stops everything that the services move.
     pub fn stop(&mut self, cause: &StopCause) {
         for service in &mut self.services {
             let mut context =
@@ -73,14 +74,15 @@ impl Stack {
         self.services.iter().any(|service| service.is_moving())
     }
 
-    /// While something moves the component is called this often, if only to know that it can be.
+    /// While something moves the component is called this often, if only to show that it still can
+    /// be.
     pub(super) fn next_beat(&self) -> Option<Instant> {
         let last = self.called.filter(|_| self.is_moving())?;
         Some(last + Self::BEAT)
     }
 
-    /// Ends control that has timed out, and what a component that was held up has moved: messages that
-    /// have waited change nothing about that.
+    /// Ends control that has timed out, and stops motion if the component was held up. Called
+    /// before any waiting message is handled, so that none can prevent this.
     pub(super) fn end_overdue(&mut self, now: Instant) {
         let last = self.called.replace(now).unwrap_or(now);
         let gap = now.saturating_duration_since(last);
@@ -93,7 +95,7 @@ impl Stack {
         self.follow_control(now);
     }
 
-    /// Looks after the clients that matter: probes the silent, and forgets the dead.
+    /// Watches the clients that matter: probes silent ones, and forgets dead ones.
     pub(super) fn probe(&mut self, now: Instant) {
         let services = self.services.iter();
         let moving: Vec<_> = services.filter_map(|it| it.depends_on()).collect();
@@ -116,7 +118,7 @@ impl Stack {
         self.warn_of_mute(now);
     }
 
-    /// A client in control that never answers and need not renew could be dead.
+    /// Warns if the client in control could be dead: it never answers, and control has no timeout.
     fn warn_of_mute(&mut self, now: Instant) {
         let controller = self.standing.controller.map(|it| it.id);
         let mute =
@@ -131,7 +133,7 @@ impl Stack {
         self.mute = mute;
     }
 
-    /// Watches the client in control, and those on whose life a motion depends.
+    /// Watches the client in control, and those that a motion depends on.
     pub(super) fn watch_clients(&mut self, now: Instant) {
         if let Some(controller) = self.standing.controller {
             self.life.watch(now, controller.id, Rank::Controller);
@@ -143,7 +145,7 @@ impl Stack {
         }
     }
 
-    /// A service has found out that something is broken, or mended.
+    /// Handles the faults and recoveries that services have reported.
     pub(super) fn follow_faults(&mut self) {
         for fault in std::mem::take(&mut self.news.faults) {
             let id = self.out.source();
@@ -152,7 +154,7 @@ impl Stack {
                 Err(cause) => {
                     tracing::error!(%id, %cause, "failure");
                     self.faults.of_services = before.saturating_add(1);
-                    // While it gets ready it counts afterwards.
+                    // During initialization the fault takes effect afterwards.
                     if !self.control.is_initializing() {
                         self.control
                             .handle_condition(Condition::Failed, &mut self.out);
@@ -172,13 +174,13 @@ impl Stack {
 }
 
 impl Drop for Stack {
-    /// Whatever ends a component, a panic of one of its functions included, ends what it moves.
+    /// However a component ends, including by a panic in one of its functions, its motion stops.
     fn drop(&mut self) {
         for service in &mut self.services {
             let mut context =
                 Context::new(&mut self.out, &self.standing, &self.life, &mut self.news);
-            // Another stop action must not be skipped because one panics, nor may a panic during
-            // a panic end the process before the last one.
+            // A panic in one stop action must not skip the next ones, nor may a panic during a
+            // panic end the process before the last one.
             let stop = || service.handle_stop(&StopCause::Ended, &mut context);
             if catch_unwind(AssertUnwindSafe(stop)).is_err() {
                 tracing::error!("a stop action has panicked");

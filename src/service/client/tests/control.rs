@@ -1,4 +1,4 @@
-//! Control: asked for, renewed, lost, given back.
+//! Control: requested, renewed, lost, released.
 
 use std::time::Duration;
 
@@ -30,7 +30,7 @@ fn request(bench: &mut Bench) -> ControlId {
     asked.expect("nothing is in the way")
 }
 
-/// A bench on which control is held, of a peer that gives it for so many seconds.
+/// A bench that holds control of a peer with a lifetime of `seconds`.
 fn held(seconds: u8) -> (Bench, ControlId) {
     let mut bench = Bench::new();
     let id = request(&mut bench);
@@ -52,7 +52,7 @@ fn news(bench: &mut Bench) -> Vec<ControlNews> {
         .collect()
 }
 
-/// Answers renewals for a while; says how many there were.
+/// Confirms renewals for a while; returns how many there were.
 fn renew_for(bench: &mut Bench, duration: Duration) -> usize {
     let end = bench.now + duration;
     let mut renewals = 0;
@@ -143,7 +143,7 @@ fn confirmations_that_get_lost_in_a_row_do_not_cost_control() {
         bench.run_ms(10);
         for _ in bench.sent::<RequestControl>() {
             renewals += 1;
-            // One out of five arrives.
+            // One out of five is confirmed.
             if renewals % 5 == 0 {
                 bench.hear(PEER, &confirm(0));
             }
@@ -209,7 +209,7 @@ fn an_emergency_takes_control() {
     );
 }
 
-/// Refuses renewals for a while, and tells who is in control if that is asked.
+/// Denies renewals for a while, and reports `controller` to queries.
 fn deny_for(bench: &mut Bench, duration: Duration, controller: JausId) {
     let end = bench.now + duration;
     while bench.now < end {
@@ -365,7 +365,7 @@ fn a_peer_that_was_started_again_is_lost_and_the_control_that_it_grants_anew_giv
     let (mut bench, _) = held(5);
     bench.run_ms(300);
     assert_eq!(bench.sent::<QueryControl>().len(), 1, "before the renewal");
-    // It has just begun, is in control of nobody, and grants the renewal as a new request.
+    // It has just restarted, has no controller, and grants the renewal as a new request.
     bench.hear(PEER, &ReportControl::default());
     bench.hear(PEER, &confirm(0));
     assert_eq!(
@@ -375,8 +375,8 @@ fn a_peer_that_was_started_again_is_lost_and_the_control_that_it_grants_anew_giv
     assert_eq!(bench.sent::<ReleaseControl>().len(), 1);
 }
 
-/// A bench whose first request was given up, with a release that is still on its way when the
-/// second is granted.
+/// A bench whose first request was given up, with a release that is still in flight when the second
+/// request is granted.
 fn held_before_the_release_arrives() -> Bench {
     let mut bench = Bench::new();
     request(&mut bench);

@@ -1,4 +1,4 @@
-//! The client's half against a peer that does what the test says, in virtual time.
+//! The client side against a peer that the test scripts, in virtual time.
 
 mod control;
 mod streams;
@@ -18,7 +18,7 @@ const CLIENT: JausId = JausId::new(42, 1, 1);
 const PEER: JausId = JausId::new(101, 1, 33);
 const OTHER: JausId = JausId::new(102, 1, 33);
 
-/// A client's stack, and the clock that it lives by.
+/// A client's stack and its clock.
 struct Bench {
     now: Instant,
     stack: Stack,
@@ -31,7 +31,7 @@ impl Bench {
         Self::looking_for(Scope::Nobody)
     }
 
-    /// A client whose discovery looks for others.
+    /// A client whose discovery searches for others.
     #[expect(
         clippy::disallowed_methods,
         reason = "virtual time begins at some instant"
@@ -50,7 +50,7 @@ impl Bench {
         bench
     }
 
-    /// Lets time pass, with every wake-up at its time.
+    /// Advances the time, with every wake-up at its time.
     fn run(&mut self, duration: Duration) {
         let end = self.now + duration;
         while let Some(wake) = self.stack.poll_timeout().filter(|wake| *wake <= end) {
@@ -66,7 +66,7 @@ impl Bench {
         self.run(Duration::from_millis(milliseconds));
     }
 
-    /// A message from a peer.
+    /// Handles a message from a peer.
     fn hear<M: Message>(&mut self, source: JausId, message: &M) {
         self.hear_octets(source, message.encode().expect("a message"));
     }
@@ -94,8 +94,7 @@ impl Bench {
         }
     }
 
-    /// The messages of one type that the peer was sent since the last call; all others are
-    /// thrown away.
+    /// The messages of one type sent to the peer since the last call; all others are dropped.
     fn sent<M: Message>(&mut self) -> Vec<M> {
         let sent = std::mem::take(&mut self.sent);
         let to_peer = sent.into_iter().filter(|(to, _)| *to == PEER);

@@ -1,4 +1,4 @@
-//! The numbers and the silence of streams of reports.
+//! The sequence numbers and the silence of report streams.
 
 use super::subscriptions::{Told, confirm, fire, told, up};
 use crate::messages::core::CreateEvent;
@@ -28,7 +28,7 @@ fn a_periodic_event_that_stops_is_down_until_it_is_confirmed_again() {
     bench.run_ms(60_000);
     let attempts = bench.sent::<CreateEvent>();
     assert!((10..20).contains(&attempts.len()), "{}", attempts.len());
-    // It comes back with another number.
+    // It returns with another number.
     confirm(&mut bench, attempts[0].request_id, 1, 2.0);
     fire(&mut bench, 1, 0);
     assert_eq!(
@@ -54,7 +54,7 @@ fn a_stream_that_goes_on_by_itself_is_up_again() {
     );
 }
 
-/// JAUS++ sends the first report at once, and begins with the periods some time later.
+/// JAUS++ sends the first report at once, and starts its periods some time later.
 #[test]
 fn a_stream_that_begins_a_second_after_its_first_report_is_not_down() {
     let (mut bench, _) = up(When::hz(25.0));

@@ -52,7 +52,7 @@ pub(super) fn confirm(bench: &mut Bench, request_id: u8, event_id: u8, hz: f64) 
     bench.hear(PEER, &confirm);
 }
 
-/// Confirms all that was asked for since the last call; says how much that was.
+/// Confirms all requests since the last call; returns how many there were.
 fn confirm_all(bench: &mut Bench, event_id: u8, hz: f64) -> usize {
     let asked = bench.sent::<CreateEvent>();
     for create in &asked {
@@ -74,7 +74,7 @@ pub(super) fn fire(bench: &mut Bench, event: u8, sequence: u8) {
     bench.hear(PEER, &event_of(event, sequence, report));
 }
 
-/// What was told since the last call, in short.
+/// A notification in short form.
 #[derive(Debug, PartialEq)]
 pub(super) enum Told {
     Up(Option<u32>),
@@ -98,7 +98,7 @@ pub(super) fn told(bench: &mut Bench) -> Vec<Told> {
         .collect()
 }
 
-/// A bench with a confirmed subscription, the event 7.
+/// A bench with a confirmed subscription, event 7.
 pub(super) fn up(when: When) -> (Bench, SubscriptionId) {
     let mut bench = Bench::new();
     let id = subscribe(&mut bench, &status(when));
@@ -203,10 +203,10 @@ fn a_rate_below_what_is_of_use_is_refused_and_cancelled() {
     assert_eq!(bench.sent::<CancelEvent>()[0].event_id, 7);
 }
 
-/// Confirms what is asked for during a minute; says how often that was.
+/// Confirms the requests of one minute; returns how many there were.
 fn renewals_in_a_minute(bench: &mut Bench, hz: f64) -> usize {
     let mut renewals = 0;
-    // Thrice 256 steps, so that the numbers go on where they end.
+    // Three times 256 steps, so that the numbers wrap around.
     for step in 0..768_u32 {
         bench.run(Duration::from_micros(78_125));
         renewals += confirm_all(bench, 7, hz);
@@ -285,7 +285,7 @@ fn when_discovery_loses_the_peer_it_is_down_and_asked_for_when_the_peer_is_found
     };
     bench.hear(PEER, &identified);
     subscribe(&mut bench, &status(When::OnChange));
-    // It is as good as silent, and goes before its first renewal.
+    // It is as good as silent, and goes down before its first renewal.
     confirm_all(&mut bench, 7, 0.0);
     assert_eq!(told(&mut bench), [Told::Up(None)]);
     bench.run_ms(19_000);
@@ -304,7 +304,7 @@ fn a_peer_that_speaks_again_after_a_silence_is_asked_at_once_and_not_for_every_w
     fire(&mut bench, 7, 0);
     bench.run_ms(6000);
     bench.sent.clear();
-    // Among the pauses between two attempts, which have become long.
+    // In a pause between two attempts, which have become long.
     bench.hear(PEER, &QueryStatus {});
     bench.run_ms(0);
     let asked = bench.sent::<CreateEvent>();
@@ -372,7 +372,7 @@ fn events_with_the_same_number_are_told_apart_by_their_reports() {
     assert_eq!(owners, [second, first]);
 }
 
-/// JAUS++ crashes on it.
+/// It crashes JAUS++.
 #[test]
 fn no_update_event_is_sent_in_the_whole_life_of_a_subscription() {
     let mut bench = Bench::new();
@@ -385,7 +385,7 @@ fn no_update_event_is_sent_in_the_whole_life_of_a_subscription() {
             .unwrap();
         confirm(&mut bench, create.request_id, 0, hz);
         fire(&mut bench, 0, 0);
-        // It stops, is asked for again, and comes back.
+        // It stops, is requested again, and returns.
         bench.run_ms(20_000);
         confirm(&mut bench, create.request_id, 0, hz);
         bench.stack.unsubscribe(bench.now, id);
@@ -400,7 +400,7 @@ fn no_update_event_is_sent_in_the_whole_life_of_a_subscription() {
     assert_eq!(of(UpdateEvent::CODE), 0);
 }
 
-/// As JAUS++ sends the first report of Global Pose: numbers 0 to 3 within a moment.
+/// JAUS++ sends the first report of Global Pose like this: numbers 0 to 3 at once.
 #[test]
 fn a_first_report_that_comes_four_times_loses_nothing_and_cancels_nothing() {
     let mut bench = Bench::new();

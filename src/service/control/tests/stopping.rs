@@ -9,7 +9,7 @@ use crate::codec::ServiceId;
 use crate::endpoint::Received;
 use crate::service::{Context, Handled, Handlers, Service, StopCause, Validity, code_of};
 
-/// Handlers whose stops are counted.
+/// Handlers that count their stops.
 fn mover(stops: &Arc<AtomicU32>) -> Handlers {
     let stops = Arc::clone(stops);
     Handlers::new(list_manager::LATEST)
@@ -34,7 +34,7 @@ fn a_component_that_was_held_up_stops_and_drops_control_before_it_handles_what_h
     let (mut rig, stops) = moving();
     rig.run(Duration::from_secs(3));
     assert_eq!((stops.load(Relaxed), rig.state()), (0, State::Ready));
-    // Nothing calls it for so long; then a command of its client is handled first.
+    // Nothing calls it for this long; then it handles a command of its client first.
     rig.now += Duration::from_secs(3);
     rig.hear(FIRST, &DeleteElement::default());
     assert_eq!((rig.controller(), rig.state()), (None, State::Standby));
@@ -85,7 +85,7 @@ fn a_stop_action_runs_when_a_handler_panics() {
     assert!(stops.load(Relaxed) > 0);
 }
 
-/// Fails and recovers as it is told.
+/// Fails and recovers on request.
 struct Fragile(Arc<AtomicU32>);
 
 impl Service for Fragile {

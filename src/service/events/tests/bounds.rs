@@ -1,4 +1,4 @@
-//! What is refused, and what is limited.
+//! Rejected events, and limits.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

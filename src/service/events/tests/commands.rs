@@ -1,4 +1,4 @@
-//! Command events: carried out once, and their end told once.
+//! Command events: run once, and their end reported once.
 
 use super::*;
 use crate::messages::core::command_event::CommandResult;
@@ -7,7 +7,7 @@ use crate::messages::core::reject_event_request::ResponseCode;
 const FIRST: CommandResult = CommandResult::SUCCESSFUL;
 const FAILED: CommandResult = CommandResult::UNSUCCESSFUL;
 
-/// A component with a job that its application ends, and which `CLIENT` has made ready.
+/// A component with a job that its application ends. `CLIENT` has made it ready.
 fn ready() -> Rig {
     let mut rig = Rig::new();
     let job = Handlers::new(ServiceId {

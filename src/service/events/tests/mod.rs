@@ -1,4 +1,4 @@
-//! Events of a whole component, under virtual time.
+//! Events of a whole component, in virtual time.
 
 mod bounds;
 mod commands;
@@ -22,7 +22,7 @@ const CLIENT: JausId = JausId::new(42, 1, 1);
 const OTHER: JausId = JausId::new(42, 2, 1);
 const SECOND: Duration = Duration::from_secs(1);
 
-/// A service of the test, whose answer is a number that the test sets.
+/// A service of the test; its answer is a number that the test sets.
 const COUNTER: ServiceId = ServiceId {
     urn: "urn:test:Counter",
     major: 1,
@@ -346,7 +346,7 @@ fn a_client_is_told_of_its_own_events_by_each_question() {
         ([0, 0x02, 0x22].as_slice(), vec![1]),
         (&[1, 0], vec![1]),
         (&[1, 1], vec![2]),
-        // That one, and then the others.
+        // The requested one first, then the others.
         (&[2, 2], vec![2, 1]),
         (&[2, 9], vec![]),
         (&[3, 0], vec![1, 2]),
