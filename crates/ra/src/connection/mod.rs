@@ -10,11 +10,11 @@
 //! from the node goes through [`Connections::handle_message`] first.
 //!
 //! * As a provider, the owner gets [requests](Event::Wanted), accepts or refuses them, and
-//! [sets the report](Connections::set_report); the latest report is repeated at the rate, because
-//! clients treat silence as a loss.
+//!   [sets the report](Connections::set_report); the latest report is repeated at the rate, because
+//!   clients treat silence as a loss.
 //! * As a client, it repeats requests until they are answered, and recreates a connection after a
-//! silence. Reports do not identify their connection, so there can be only one per report between
-//! two components.
+//!   silence. Reports do not identify their connection, so there can be only one per report between
+//!   two components.
 
 mod client;
 mod provider;
