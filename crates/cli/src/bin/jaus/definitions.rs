@@ -1,4 +1,4 @@
-//! `--jsidl` and `--service`: which definitions messages are read and written by.
+//! `--jsidl` and `--service`: the definitions for reading and writing messages.
 
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ pub(crate) struct Definitions {
 }
 
 impl Definitions {
-    /// The built-in definitions and those of `--jsidl`.
+    /// Loads the built-in definitions and those of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
         let mut dictionary = Dictionary::complete();
         self.add(&mut dictionary)?;
