@@ -1,5 +1,5 @@
-//! Large messages between two nodes on the loopback interface: without acknowledgement none is
-//! lost though nobody repeats anything, and with it none whatever its size.
+//! Large messages between two nodes on the loopback interface: none is lost without acknowledgement
+//! and retransmission, and with it none of any size.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
