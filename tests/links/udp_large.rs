@@ -1,5 +1,5 @@
-//! Large messages between two nodes on the loopback interface: none is lost without acknowledgement
-//! and retransmission, and with it none of any size.
+//! Large messages between two nodes on the loopback interface: no loss without acknowledgement,
+//! although nothing is retransmitted; with acknowledgement no loss at any size.
 
 use std::collections::BTreeSet;
 use std::time::Duration;

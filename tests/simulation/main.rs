@@ -3,7 +3,7 @@
 //!
 //! A seed determines the nodes and their networks, their settings, the traffic, and the faults.
 //! Each run uses fresh seeds, prints them, and repeats those of `failed_seeds.txt`. It also prints
-//! the events of all seeds, and fails if a kind of event never occurred.
+//! the events of all seeds; a full run fails if a kind of event never occurred.
 //!
 //! | module | content |
 //! |---|---|

@@ -3,7 +3,6 @@
 //! the last effort and applies it as long as its controller reports ready or standby over a service
 //! connection. It keeps the last speed and applies it in any case. It does not report its
 //! controller.
-//! speed, and drives with it in any case. It does not tell who controls it.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};

@@ -5,7 +5,6 @@
 //! forged, and is dropped. (OpenJAUS accepts such a message and reads stale octets of its buffer.)
 //! With AS5669, several messages may share a datagram; every sender writes the length in front of
 //! each message, but no receiver reads it, so the size in the header counts.
-//! nobody, so the header's size counts.
 
 use bytes::{Buf, BufMut, Bytes, BytesMut};
 

@@ -127,7 +127,6 @@ fn segment<Report: Message>(set: &core::SetElement, code: u16) -> Result<(u16, R
 }
 
 /// Replaces the code: set and report of a segment share a layout, and only the report is defined.
-/// the report has a definition.
 fn recode(message: &Bytes, code: u16) -> Bytes {
     let mut recoded = BytesMut::from(message.as_ref());
     if let Some(place) = recoded.first_chunk_mut() {

@@ -5,7 +5,6 @@
 //! component that follows the standard stops anyway. Like a JAUS component with Management, a
 //! driver is in standby after a grant of control: a client that merely renews control from an
 //! earlier gateway does not drive.
-//! control was granted: a client that merely renews what an earlier gateway granted does not drive.
 
 use std::time::Instant;
 

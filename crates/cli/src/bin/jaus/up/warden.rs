@@ -1,8 +1,8 @@
 //! Warden process that briefly outlives a killed `jaus up`: it knows the process group of every
 //! part, and ends what is left when the pipe from `jaus up` breaks.
+//!
 //! The kernel has signalled the parts themselves by then ([`leash`](super::leash)); the warden ends
 //! their descendants, and parts that ignore the signal.
-//! what they have started, and to what does not end when it is asked to.
 
 use std::collections::BTreeSet;
 use std::io::{self, BufRead, PipeWriter, Write};
