@@ -1,4 +1,4 @@
-//! The flags of every command that goes on the network: who we are, and where.
+//! Network flags of all commands: our id, and the interfaces, addresses and peers to use.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};

@@ -18,7 +18,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | RA | name | ours | name | what is lost, and what is refused |
+//! | RA | name | ours | name | lost and refused content |
 //! |---|---|---|---|---|
 //! | 0001h 2001h 4001h | Set, Query, Report Component Authority | same | Set, Query, Report Authority | |
 //! | 0002h to 0005h | Shutdown, Standby, Resume, Reset | same | same | |

@@ -164,7 +164,7 @@ impl Proxy {
     }
 
     /// Without a client in control, stops the driver before it is released. In an emergency,
-    /// whoever has set it, no further places and no speed follow.
+    /// from any client, no further places and no speed follow.
     pub(super) fn stop_list_where_due(&mut self, now: Instant, tally: &mut Tally) {
         let Some(listing) = &self.listing else { return };
         if self.lease.controller().is_none() {
