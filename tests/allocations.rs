@@ -1,5 +1,5 @@
-//! A small message that wants no acknowledgement goes through an endpoint without an allocation once
-//! its tables have been filled.
+//! A small message without acknowledgement passes an endpoint without an allocation once the tables
+//! are filled.
 
 #![allow(clippy::expect_used, reason = "helpers of tests")]
 

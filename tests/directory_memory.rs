@@ -1,4 +1,4 @@
-//! What a further component of a node costs in memory.
+//! Memory cost of each further component of a node.
 #![cfg(target_os = "linux")]
 #![allow(
     clippy::disallowed_methods,

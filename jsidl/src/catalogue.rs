@@ -1,16 +1,16 @@
-//! The definitions that come with the crate, embedded: the same at run time, in a build script and
-//! on a machine without the source.
+//! Definitions that ship with the crate, embedded: they need no source files at run time.
 //!
 //! Definitions are grouped into sets, for example `core` (AS5710) and `mobility` (AS6009).
-//! [`Loader::catalogue`](crate::Loader::catalogue) loads all of them but [those of the Reference
-//! Architecture](Entry::of_reference_architecture), which has the same message codes for other
-//! layouts; [`Loader::reference_architecture`](crate::Loader::reference_architecture) loads these.
+//! [`Loader::catalogue`](crate::Loader::catalogue) loads all sets except
+//! [those of the Reference Architecture](Entry::of_reference_architecture), whose message codes
+//! collide with the others;
+//! [`Loader::reference_architecture`](crate::Loader::reference_architecture) loads those.
 
 use std::path::{Path, PathBuf};
 
 use crate::model::{Id, Location};
 
-/// The folder that the embedded files stand in when they are named.
+/// Folder of the embedded files in reported paths.
 const FOLDER: &str = "catalogue";
 
 /// One embedded file.
@@ -22,9 +22,9 @@ pub struct Entry {
     pub path: &'static str,
     /// The root element: `service_def`, `declared_type_set` or `declared_const_set`.
     pub element: &'static str,
-    /// The URN that the file declares.
+    /// The declared URN.
     pub urn: &'static str,
-    /// The version that the file declares, for example `1.1`.
+    /// The declared version, for example `1.1`.
     pub version: &'static str,
     /// The XML text, packed as raw deflate.
     packed: &'static [u8],
@@ -34,9 +34,8 @@ pub struct Entry {
 const REFERENCE_ARCHITECTURE: &[&str] = &["ra33"];
 
 impl Entry {
-    /// Whether the messages are those of the Reference Architecture, the predecessor of the
-    /// standards by SAE: their codes mean other layouts there, so that a code alone must not lead
-    /// to them.
+    /// Whether the messages belong to the Reference Architecture, the predecessor of the SAE
+    /// standards: it uses the same codes for other layouts, so a code alone must not select them.
     #[must_use]
     pub fn of_reference_architecture(&self) -> bool {
         REFERENCE_ARCHITECTURE.contains(&self.set)
@@ -79,14 +78,14 @@ pub fn find(id: &Id) -> Option<&'static Entry> {
         .find(|entry| entry.urn == &*id.urn && entry.version == version)
 }
 
-/// Whether a place is in an embedded file, as [`Loader::catalogue`](crate::Loader::catalogue) names
-/// them.
+/// Whether a location is in an embedded file, as [`Loader::catalogue`](crate::Loader::catalogue)
+/// names them.
 pub fn holds(location: &Location) -> bool {
     let path = location.file.strip_prefix(FOLDER);
     path.is_ok_and(|path| ENTRIES.iter().any(|entry| Path::new(entry.path) == path))
 }
 
-/// What an embedded file is called in findings.
+/// Path of an embedded file in findings.
 pub(crate) fn name(entry: &Entry) -> PathBuf {
     Path::new(FOLDER).join(entry.path)
 }

@@ -1,5 +1,4 @@
-//! What is wrong with the definitions of a load: every finding with its place and a sentence that
-//! says what to do about it.
+//! Diagnostics of a load: every finding with its location and a sentence that says what to do.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -9,13 +8,13 @@ use std::sync::Arc;
 use crate::model::Location;
 use crate::source::{Sources, Span};
 
-/// How bad a finding is.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
     /// Usable, but the author should look at it. Published definitions have such findings.
     Warning,
-    /// What it concerns is left out of the library, or, of a state machine that could be read, can
-    /// never happen.
+    /// The definition is left out of the library. In a readable state machine: the transition or
+    /// state can never take effect.
     Error,
 }
 
@@ -28,12 +27,12 @@ impl fmt::Display for Severity {
     }
 }
 
-/// A second place that a finding is about.
+/// Secondary location of a finding.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Note {
     /// The place.
     pub location: Location,
-    /// What is to be seen there.
+    /// What to see there.
     pub message: String,
 }
 
@@ -44,9 +43,9 @@ pub struct Diagnostic {
     pub severity: Severity,
     /// Where to look first.
     pub location: Location,
-    /// What is wrong, and what to do.
+    /// The mistake and its remedy.
     pub message: String,
-    /// Other places that matter.
+    /// Secondary locations.
     pub notes: Vec<Note>,
 }
 
@@ -60,21 +59,21 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// All findings of a load, ordered by file and place.
+/// All findings of a load, ordered by file and position.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Diagnostics {
     findings: Vec<Diagnostic>,
-    /// The files that the findings are about.
+    /// Texts of the files with findings.
     texts: BTreeMap<Arc<Path>, Arc<str>>,
 }
 
 impl Diagnostics {
-    /// Whether anything was left out.
+    /// Whether any definition was left out.
     pub fn has_errors(&self) -> bool {
         self.errors().next().is_some()
     }
 
-    /// Whether there is no finding at all.
+    /// Whether there are no findings.
     pub fn is_empty(&self) -> bool {
         self.findings.is_empty()
     }
@@ -89,17 +88,17 @@ impl Diagnostics {
         self.findings.iter()
     }
 
-    /// The errors among them.
+    /// The errors.
     pub fn errors(&self) -> impl Iterator<Item = &Diagnostic> {
         self.iter().filter(|d| d.severity == Severity::Error)
     }
 
-    /// The warnings among them.
+    /// The warnings.
     pub fn warnings(&self) -> impl Iterator<Item = &Diagnostic> {
         self.iter().filter(|d| d.severity == Severity::Warning)
     }
 
-    /// The texts of the files that the findings are about.
+    /// Texts of the files with findings.
     #[cfg(feature = "excerpts")]
     pub(crate) fn texts(&self) -> &BTreeMap<Arc<Path>, Arc<str>> {
         &self.texts
@@ -130,7 +129,7 @@ impl fmt::Display for Diagnostics {
     }
 }
 
-/// A finding whose places are still offsets.
+/// A finding with unresolved offsets.
 #[derive(Debug)]
 pub(crate) struct Finding {
     severity: Severity,
@@ -140,14 +139,14 @@ pub(crate) struct Finding {
 }
 
 impl Finding {
-    /// Adds a second place.
+    /// Adds a secondary location.
     pub(crate) fn note(&mut self, span: Span, message: impl Into<String>) -> &mut Self {
         self.notes.push((span, message.into()));
         self
     }
 }
 
-/// Collects the findings while a load is under way.
+/// Collects findings during a load.
 #[derive(Debug, Default)]
 pub(crate) struct Report {
     findings: Vec<Finding>,
@@ -155,18 +154,18 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    /// Reports what makes a definition unusable.
+    /// Reports a mistake that makes a definition unusable.
     pub(crate) fn error(&mut self, span: Span, message: impl Into<String>) -> &mut Finding {
         self.errors += 1;
         self.add(Severity::Error, span, message.into())
     }
 
-    /// Reports what a definition should not say but may.
+    /// Reports a questionable but permitted construct.
     pub(crate) fn warning(&mut self, span: Span, message: impl Into<String>) -> &mut Finding {
         self.add(Severity::Warning, span, message.into())
     }
 
-    /// Errors so far.
+    /// Number of errors so far.
     pub(crate) fn errors(&self) -> usize {
         self.errors
     }

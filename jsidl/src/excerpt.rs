@@ -1,5 +1,4 @@
-//! Findings as people like to read them: with the lines of the definition that they are about, the
-//! place marked, and the other places that matter beneath it.
+//! Formats findings for people: with source lines, the position marked, secondary locations below.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -11,15 +10,15 @@ use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Render
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity};
 use crate::model::Location;
 
-/// Lines between two places beyond which each gets an excerpt of its own.
+/// Lines between two positions beyond which each gets its own excerpt.
 const FAR: u32 = 200;
 
-/// How excerpts are written.
+/// Format of excerpts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Style {
-    /// With colours, as escape sequences of a terminal.
+    /// With terminal escape sequences for colours.
     pub colours: bool,
-    /// Characters in a line; longer lines of a definition are cut around the place.
+    /// Characters per line; longer source lines are cut around the position.
     pub width: usize,
 }
 
@@ -33,8 +32,8 @@ impl Default for Style {
 }
 
 impl Diagnostics {
-    /// One of these findings with the lines that it is about, ending with a line break. A finding
-    /// of another load has none.
+    /// Formats a finding with its source lines; ends with a line break. A finding of another load
+    /// has no source lines.
     pub fn excerpt(&self, finding: &Diagnostic, style: Style) -> String {
         let level = match finding.severity {
             Severity::Error => Level::ERROR,
@@ -58,7 +57,7 @@ impl Diagnostics {
         text
     }
 
-    /// The places of a finding, those near each other in one excerpt, the first one first.
+    /// The locations of a finding, neighbours in one excerpt, the primary one first.
     fn places<'a>(&'a self, finding: &'a Diagnostic) -> Vec<Excerpt<'a>> {
         let first = Mark {
             location: &finding.location,
@@ -89,14 +88,14 @@ fn text_of<'a>(texts: &'a BTreeMap<Arc<Path>, Arc<str>>, path: &Path) -> &'a str
     texts.get(path).map_or("", |text| text)
 }
 
-/// A place in an excerpt.
+/// A marked position in an excerpt.
 struct Mark<'a> {
     location: &'a Location,
     kind: AnnotationKind,
     label: Option<&'a str>,
 }
 
-/// Some lines of one file.
+/// Consecutive lines of one file.
 struct Excerpt<'a> {
     path: &'a Path,
     text: &'a str,
@@ -127,7 +126,7 @@ impl<'a> Excerpt<'a> {
     }
 }
 
-/// These lines of a text, counted from 1, the last one included.
+/// Lines `first` to `last` (inclusive, from 1) of a text.
 fn lines_of(text: &str, first: u32, last: u32) -> &str {
     let start_of = |line: u32| {
         let before = text.split_inclusive('\n').take(line as usize);
@@ -137,8 +136,8 @@ fn lines_of(text: &str, first: u32, last: u32) -> &str {
     lines.trim_end_matches(['\n', '\r'])
 }
 
-/// The octets that a location stands for, in a text that begins with the line `first`: the name of
-/// a tag, the value of an attribute, or what else stands there up to the next blank.
+/// Octet range of a location in a text that begins at line `first`: the name of a tag, the value of
+/// an attribute, or everything up to the next blank.
 fn range(source: &str, first: u32, location: &Location) -> Range<usize> {
     let lines = source.split_inclusive('\n');
     let before = lines.take(location.line.saturating_sub(first) as usize);

@@ -1,5 +1,5 @@
-//! Constant expressions, as they stand in limits and counts: numbers (thousands commas allowed),
-//! `+ - * /`, parentheses and dotted names of constants, for example `-10*basicConsts.PI`.
+//! Constant expressions in limits and counts: numbers (thousands commas allowed), `+ - * /`,
+//! parentheses and dotted names of constants, for example `-10*basicConsts.PI`.
 
 use nom::branch::alt;
 use nom::bytes::complete::take_while;
@@ -10,13 +10,13 @@ use nom::multi::{many0, many1_count, separated_list1};
 use nom::sequence::{delimited, pair, preceded};
 use nom::{Finish, IResult, Parser};
 
-/// Longer texts are refused: no limit needs more, and it bounds the depth of the tree.
+/// Maximum length of a text: no limit needs more, and it bounds the depth of the tree.
 const LONGEST: usize = 256;
 
-/// Parentheses and signs within each other.
+/// Maximum nesting of parentheses and signs.
 const DEEPEST: usize = 16;
 
-/// The value of an expression. Integers stay exact as long as they can.
+/// Value of an expression. Integers stay exact as long as possible.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Value {
     Integer(i128),
@@ -61,10 +61,10 @@ pub(crate) enum Expression {
 }
 
 impl Expression {
-    /// Reads a whole text.
+    /// Parses a whole text.
     ///
     /// # Errors
-    /// A phrase that says what is wrong, to follow the words "because" or a colon.
+    /// A phrase that describes the mistake, to follow "because" or a colon.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         if text.len() > LONGEST {
             return Err(format!("it is longer than {LONGEST} characters"));
@@ -77,7 +77,7 @@ impl Expression {
         }
     }
 
-    /// Computes the value; `constant` looks names up and reports what it cannot find.
+    /// Computes the value; `constant` looks names up and reports missing ones.
     ///
     /// # Errors
     /// `None` inside if a name has no value (already reported), a phrase if the arithmetic fails.
@@ -147,7 +147,7 @@ fn product(input: &str, depth: usize) -> IResult<&str, Expression> {
     )
 }
 
-/// Operands joined by operators of one rank, from left to right.
+/// Parses operands joined by operators of one rank, from left to right.
 fn chain<'a>(
     input: &'a str,
     depth: usize,

@@ -1,10 +1,10 @@
 //! JSIDL (AS5684), the language in which JAUS services are defined.
 //!
-//! A [`Loader`] reads definitions and resolves them into a [`Library`] of [`model`] types, with
-//! [`Diagnostics`] for everything that is wrong. From the model, [`rust`] and [`build`] write typed
-//! messages, and [`dynamic`] encodes and decodes without any generated code. What a service does
-//! when is in [`behaviour`]. The [`catalogue`]
-//! holds the definitions that come with the crate.
+//! A [`Loader`] reads definitions and resolves them into a [`Library`] of [`model`] types, and
+//! reports every mistake in its [`Diagnostics`]. From the model, [`rust`] and [`build`] generate
+//! typed messages; [`dynamic`] encodes and decodes without generated code. [`behaviour`] holds the
+//! protocol behaviour of services. The [`catalogue`] holds the definitions that ship with the
+//! crate.
 //!
 //! ```
 //! let mut loader = jsidl::Loader::new();

@@ -1,18 +1,18 @@
-//! A set of services that were loaded together, found by URN and version.
+//! Set of services that were loaded together, indexed by URN and version.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::model::{Id, Message, Service, Version};
 
-/// Services by identity. Everything in it is resolved and checked.
+/// Services by identity, all resolved and checked.
 #[derive(Debug, Clone, Default)]
 pub struct Library {
     services: BTreeMap<Id, Arc<Service>>,
 }
 
 impl Library {
-    /// Adds a service; answers the one that had the same identity.
+    /// Adds a service; returns the previous service with the same identity.
     pub fn insert(&mut self, service: Arc<Service>) -> Option<Arc<Service>> {
         self.services.insert(service.id.clone(), service)
     }
@@ -43,12 +43,12 @@ impl Library {
             let base = s.inherits_from.as_ref()?;
             self.services.get(&base.id).map(AsRef::as_ref)
         });
-        // The loader lets no circle pass, but `insert` does not look.
+        // The loader rejects inheritance cycles, `insert` does not check.
         chain.take(self.services.len() + 1)
     }
 
-    /// All messages that a service takes part in, each with the service that declares it: its own,
-    /// then the inherited ones. A message in both sets of a service comes twice.
+    /// All messages of a service, each with the service that declares it: its own messages, then
+    /// the inherited ones. A message in both sets of a service comes twice.
     pub fn vocabulary<'a>(
         &'a self,
         service: &'a Service,
@@ -57,7 +57,7 @@ impl Library {
             .flat_map(|declaring| declaring.messages().map(move |m| (declaring, m)))
     }
 
-    /// Every declaration of a message code, with the service that declares it.
+    /// Every declaration of a message code, with the declaring service.
     pub fn by_code(&self, code: u16) -> impl Iterator<Item = (&Service, &Arc<Message>)> {
         self.services().flat_map(move |service| {
             service

@@ -1,24 +1,24 @@
-//! The definitions of a directory and those below it, in an order that does not depend on the file
-//! system.
+//! Lists the definition files below a directory, in an order independent of the file system.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Directories within each other.
+/// Maximum depth of nested directories.
 const DEEPEST: usize = 32;
 
-/// The `.xml` files of a directory.
+/// The `.xml` files below a directory.
 #[derive(Debug, Default)]
 pub(crate) struct Listing {
     pub(crate) files: Vec<PathBuf>,
-    /// Directories that could not be read, and why.
+    /// Directories that could not be read, with the reason.
     pub(crate) unreadable: Vec<(PathBuf, String)>,
 }
 
-/// The `.xml` files of a directory and those below it, as a [`Loader`](crate::Loader) reads them.
+/// The `.xml` files below a directory, in the order in which a [`Loader`](crate::Loader) reads
+/// them.
 ///
 /// # Errors
-/// A sentence with the first directory that cannot be read.
+/// A sentence that names the first unreadable directory.
 pub fn definition_files(directory: impl AsRef<Path>) -> Result<Vec<PathBuf>, String> {
     let listing = Listing::of(directory.as_ref());
     match listing.unreadable.into_iter().next() {
@@ -50,7 +50,7 @@ impl Listing {
         entries.sort_by_key(fs::DirEntry::file_name);
         for entry in entries {
             let path = entry.path();
-            // Links to directories are not followed: they may lead in a circle.
+            // Links to directories are not followed: they may form a cycle.
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 self.add(&path, depth + 1);
             } else if path.is_file()

@@ -13,8 +13,8 @@ use crate::syntax::{Program, Strictness, read};
 
 /// Collects definitions; [`load`](Self::load) compiles them.
 ///
-/// References are followed across everything that was added, whatever the order. When one
-/// identity is declared several times, the first counts.
+/// References resolve across everything that was added, in any order. If an identity is declared
+/// several times, the first declaration counts.
 #[derive(Debug, Default)]
 pub struct Loader {
     sources: Sources,
@@ -24,23 +24,22 @@ pub struct Loader {
     with_reference_architecture: bool,
 }
 
-/// What came of a load.
+/// Result of a load.
 #[derive(Debug, Clone)]
 pub struct Loaded {
-    /// Everything that is sound.
+    /// All sound definitions.
     pub library: Library,
-    /// Everything that is wrong, and what should be looked at.
+    /// All errors and warnings.
     pub diagnostics: Diagnostics,
 }
 
 impl Loader {
-    /// A loader that knows no definitions.
+    /// A loader without definitions.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a file, or all `.xml` files of a directory and those below it. What cannot be read
-    /// becomes a diagnostic.
+    /// Adds a file, or all `.xml` files below a directory. An unreadable file becomes a diagnostic.
     pub fn path(&mut self, path: impl AsRef<Path>) -> &mut Self {
         let path = path.as_ref();
         if path.is_dir() {
@@ -62,21 +61,21 @@ impl Loader {
         self
     }
 
-    /// Adds a text as if it were a file of this name.
+    /// Adds a text as if it were a file with this name.
     pub fn text(&mut self, name: impl AsRef<Path>, text: &str) -> &mut Self {
         self.add(name.as_ref(), text, Strictness::Named);
         self
     }
 
-    /// Adds the definitions that come with this crate, but for those of the Reference
-    /// Architecture. What was added otherwise counts before them, whatever the order.
+    /// Adds the definitions that ship with this crate, except those of the Reference Architecture.
+    /// Definitions added by other means take precedence, in any order.
     pub fn catalogue(&mut self) -> &mut Self {
         self.with_catalogue = true;
         self
     }
 
-    /// Adds the definitions of the Reference Architecture that come with this crate. Their message
-    /// codes are those of other layouts in [the others](Self::catalogue).
+    /// Adds the definitions of the Reference Architecture that ship with this crate. They use
+    /// message codes of [the other definitions](Self::catalogue) for other layouts.
     pub fn reference_architecture(&mut self) -> &mut Self {
         self.with_reference_architecture = true;
         self
@@ -119,7 +118,7 @@ impl Loader {
     }
 }
 
-/// The text of a file, or the reason why there is none.
+/// The text of a file, or the reason why it cannot be read.
 fn readable(path: &Path) -> Result<String, String> {
     let metadata =
         fs::metadata(path).map_err(|error| format!("the file cannot be read: {error}"))?;

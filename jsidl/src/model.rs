@@ -1,8 +1,8 @@
-//! The resolved language: what a definition means once every reference has been followed.
+//! Resolved model of the language: services and messages after every reference is followed.
 //!
-//! Nothing here remembers XML. The reader, the resolver and the checker build these types; the
-//! emitters and the dynamic codec only read them. A [`Service`] holds the messages that it
-//! declares itself; those of the services it inherits from are reached through [`Library`](crate::Library).
+//! The model is independent of XML. The reader, the resolver and the checker build these types; the
+//! emitters and the dynamic codec only read them. A [`Service`] holds the messages that it declares
+//! itself; [`Library`](crate::Library) finds the inherited ones.
 //!
 //! On the wire a message is `code ++ header ++ body ++ footer`, little-endian, without padding.
 
@@ -15,9 +15,9 @@ pub use crate::source::Location;
 /// A service's version, `major.minor`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Version {
-    /// Raised by incompatible changes.
+    /// Incremented for incompatible changes.
     pub major: u8,
-    /// Raised by additions.
+    /// Incremented for additions.
     pub minor: u8,
 }
 
@@ -27,7 +27,7 @@ impl fmt::Display for Version {
     }
 }
 
-/// What identifies a service, a type set or a constant set: its URN and version.
+/// Identity of a service, a type set or a constant set: its URN and version.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Id {
     /// For example `urn:jaus:jss:core:Discovery`.
@@ -42,14 +42,14 @@ impl fmt::Display for Id {
     }
 }
 
-/// Another service that a service names in its `references`.
+/// Reference to another service, from the `references` of a service.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reference {
     /// The local alias, which qualifies the names of states and actions.
     pub name: String,
-    /// The service meant.
+    /// The identity of the referenced service.
     pub id: Id,
-    /// Where it is named.
+    /// Position of the reference.
     pub location: Location,
 }
 
@@ -70,10 +70,10 @@ pub struct Service {
     pub inputs: Vec<Arc<Message>>,
     /// Messages that the service sends; inherited ones are not repeated.
     pub outputs: Vec<Arc<Message>>,
-    /// What the service itself says about its state machines;
-    /// [`Library::machines`](crate::Library::machines) adds what it inherits.
+    /// State machines that the service declares itself;
+    /// [`Library::machines`](crate::Library::machines) merges the inherited ones.
     pub behaviour: Vec<StateMachine>,
-    /// Where the `service_def` stands.
+    /// Position of the `service_def`.
     pub location: Location,
 }
 
@@ -95,14 +95,14 @@ pub struct Message {
     pub is_command: bool,
     /// The author's text, white space folded.
     pub description: String,
-    /// What stands between the code and the body. `None` for the usual header, whose only field is
-    /// the code itself.
+    /// Fields between the code and the body. `None` for the usual header, whose only field is the
+    /// code itself.
     pub header: Option<Item>,
     /// A group, list or variant that is not optional; `None` if the body is empty.
     pub body: Option<Item>,
     /// As [`body`](Self::body); empty in every published definition.
     pub footer: Option<Item>,
-    /// Where the `message_def` stands.
+    /// Position of the `message_def`.
     pub location: Location,
 }
 
@@ -111,13 +111,13 @@ pub struct Message {
 pub struct Item {
     /// The JSIDL name, for example `Latitude` or `ComponentList`.
     pub name: String,
-    /// Whether the presence vector of the enclosing group governs it.
+    /// Whether a bit of the enclosing group's presence vector controls it.
     pub optional: bool,
     /// The author's `interpretation`, white space folded; empty if there is none.
     pub interpretation: String,
-    /// What it looks like on the wire.
+    /// Layout on the wire.
     pub shape: Shape,
-    /// Where it is declared. For a reference, where the reference stands.
+    /// Position of the declaration. For a reference, position of the reference.
     pub location: Location,
 }
 
@@ -129,7 +129,7 @@ pub enum Shape {
     Group(Group),
     /// `list`: a count, then that many elements.
     List(List),
-    /// `variant`: a tag, then the alternative it names.
+    /// `variant`: a tag, then the selected alternative.
     Variant(Variant),
     /// `fixed_field`.
     Scalar(Scalar),
@@ -154,14 +154,14 @@ pub enum Shape {
     },
     /// `variable_format_field`: a format index (one octet), a count of octets, then raw octets.
     FormattedBlob {
-        /// The formats that may be chosen.
+        /// The selectable formats.
         formats: Vec<Format>,
         /// The octet count.
         count: Count,
     },
-    /// `variable_field`: an index (one octet) that chooses type and units, then the value.
+    /// `variable_field`: an index (one octet) that selects type and units, then the value.
     Measure {
-        /// What may be chosen; `index` is what stands on the wire, not the position.
+        /// The selectable types and units; `index` is the value on the wire, not the position.
         choices: Vec<Choice>,
     },
     /// `array`: elements back to back without a count; the first dimension varies fastest.
@@ -171,7 +171,7 @@ pub enum Shape {
 /// `record` (members are fields) or `sequence` (members are composites): one layout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// Which of the two the definition says.
+    /// Spelling used by the definition.
     pub kind: GroupKind,
     /// Present exactly if some member is optional; bit *i* is the *i*-th optional member.
     pub presence: Option<Unsigned>,
@@ -209,44 +209,44 @@ pub struct Variant {
 /// `fixed_field`, or the value of a `variable_field`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scalar {
-    /// How it stands on the wire.
+    /// Encoding on the wire.
     pub number: Number,
     /// For example `meter` or `one`.
     pub units: String,
-    /// What the number means.
+    /// Meaning of the number.
     pub meaning: Meaning,
 }
 
-/// What a number on the wire stands for.
+/// Interpretation of a number on the wire.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Meaning {
     /// Itself.
     Plain,
     /// A real number in a range (`scale_range`); only with integers of at most four octets.
     Scaled(Scale),
-    /// One of a set of values (`value_set`). Other values occur and are kept.
+    /// One of a set of values (`value_set`). Other values occur and are preserved.
     Values(ValueSet),
 }
 
 /// `scale_range`: `value = raw * (upper - lower) / (2^n - 1) + lower`.
 ///
-/// In a signed integer, for which JSIDL has no rule and the Reference Architecture has this one, 0
-/// is the centre: `value = raw * (upper - lower) / (2^n - 2) + (upper + lower) / 2`. The least
-/// integer is then one step below the lower limit.
+/// JSIDL has no rule for signed integers; the rule of the Reference Architecture applies: 0 is the
+/// centre, `value = raw * (upper - lower) / (2^n - 2) + (upper + lower) / 2`. The least integer is
+/// then one step below the lower limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
-    /// Value of the least raw number; in a signed integer, of the next.
+    /// Value of the least raw number; in a signed integer, of the second least.
     pub lower: f64,
     /// Value of the largest raw number; greater than `lower`.
     pub upper: f64,
-    /// How a real number becomes an integer.
+    /// Conversion of a real number to an integer.
     pub rounding: Rounding,
 }
 
 /// `integer_function`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rounding {
-    /// To the nearest integer, halves up; the only one in published definitions.
+    /// To the nearest integer, halves up; published definitions use no other.
     Round,
     /// Down.
     Floor,
@@ -270,9 +270,9 @@ pub struct ValueRange {
     pub lower: f64,
     /// Greatest value.
     pub upper: f64,
-    /// Whether `lower` itself is left out.
+    /// Whether the range excludes `lower`.
     pub lower_exclusive: bool,
-    /// Whether `upper` itself is left out.
+    /// Whether the range excludes `upper`.
     pub upper_exclusive: bool,
     /// The author's text.
     pub interpretation: String,
@@ -281,7 +281,7 @@ pub struct ValueRange {
 /// `value_enum`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NamedValue {
-    /// What stands on the wire.
+    /// Value on the wire.
     pub index: u64,
     /// `enum_const`: the author's text, which need not be an identifier.
     pub name: String,
@@ -307,7 +307,7 @@ pub struct SubField {
     pub from: u8,
     /// Highest bit, inclusive.
     pub to: u8,
-    /// The values it may take.
+    /// The values that it may take.
     pub values: ValueSet,
     /// The author's text.
     pub interpretation: String,
@@ -316,18 +316,18 @@ pub struct SubField {
 /// A count that precedes its elements or octets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Count {
-    /// How the count stands on the wire.
+    /// Encoding of the count on the wire.
     pub unsigned: Unsigned,
-    /// Least count; 0 if the definition says nothing.
+    /// Least count; 0 if not specified.
     pub min: u64,
-    /// Greatest count; the type's maximum if the definition says nothing.
+    /// Greatest count; the type's maximum if not specified.
     pub max: u64,
 }
 
 /// `format_enum` of a `variable_format_field`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Format {
-    /// What stands on the wire.
+    /// Value on the wire.
     pub index: u8,
     /// `field_format`, for example `JPEG`.
     pub name: String,
@@ -336,9 +336,9 @@ pub struct Format {
 /// `type_and_units_enum` of a `variable_field`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
-    /// What stands on the wire.
+    /// Value on the wire.
     pub index: u8,
-    /// The name, which only newer definitions give.
+    /// The name; only newer definitions give one.
     pub name: Option<String>,
     /// Type, units and meaning of the value.
     pub scalar: Scalar,
@@ -353,7 +353,7 @@ pub struct Array {
     pub element: Box<Item>,
 }
 
-/// The numbers of `fixed_field`.
+/// Number types of `fixed_field`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Number {
     /// An unsigned integer.

@@ -1,13 +1,13 @@
-//! The texts of a load, and the way back from an offset in one of them to file, line and column.
+//! Texts of a load; maps an offset in a text to file, line and column.
 
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Where something was declared: a file with the line and column (both from 1) in it.
+/// Place of a declaration: file, line and column (both from 1).
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Location {
-    /// The file as it was named to the loader.
+    /// The file name as given to the loader.
     pub file: Arc<Path>,
     /// Line, counted from 1.
     pub line: u32,
@@ -21,7 +21,7 @@ impl fmt::Display for Location {
     }
 }
 
-/// A place in one of the loaded texts: eight octets instead of a whole [`Location`].
+/// Position in a loaded text: eight octets instead of a whole [`Location`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Span {
     file: u32,
@@ -35,7 +35,7 @@ impl Span {
     }
 }
 
-/// A value together with the place where it is written.
+/// A value with its position in the source.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Spanned<T> {
     pub(crate) value: T,
@@ -50,15 +50,15 @@ pub(crate) struct Source {
     text: Arc<str>,
     /// Offset of the first octet of every line.
     lines: Vec<u32>,
-    /// Number of characters before every block of octets, so that a column costs the same in a
-    /// text that is one long line.
+    /// Number of characters before each block of octets: column lookup costs the same in a text
+    /// that is one long line.
     characters: Vec<u32>,
 }
 
-/// Octets that share an entry in [`Source::characters`].
+/// Octets per entry in [`Source::characters`].
 const BLOCK: usize = 256;
 
-/// Characters that begin in these octets of a UTF-8 text.
+/// Number of characters that start in these octets of a UTF-8 text.
 fn characters(octets: &[u8]) -> u32 {
     let starts = octets.iter().filter(|&octet| octet & 0xC0 != 0x80);
     u32::try_from(starts.count()).unwrap_or(u32::MAX)
@@ -70,7 +70,7 @@ impl Source {
         &self.text
     }
 
-    /// The place at this octet of the text.
+    /// The position of this octet of the text.
     pub(crate) fn span(&self, offset: usize) -> Span {
         let offset = u32::try_from(offset).unwrap_or(u32::MAX);
         Span {
@@ -79,7 +79,7 @@ impl Source {
         }
     }
 
-    /// File, line and column of a place in this text.
+    /// File, line and column of a position in this text.
     pub(crate) fn location(&self, span: Span) -> Location {
         let offset = span.offset;
         let line = self.lines.partition_point(|&start| start <= offset).max(1);
@@ -129,17 +129,17 @@ impl Sources {
         &self.0[index]
     }
 
-    /// File, line and column of a place.
+    /// File, line and column of a position.
     pub(crate) fn location(&self, span: Span) -> Location {
         self.source(span).location(span)
     }
 
-    /// The name of the file in which a place lies.
+    /// The file that contains a position.
     pub(crate) fn path(&self, span: Span) -> &Path {
         &self.source(span).path
     }
 
-    /// Name and text of the file in which a place lies.
+    /// Name and text of the file that contains a position.
     pub(crate) fn text(&self, span: Span) -> (Arc<Path>, Arc<str>) {
         let source = self.source(span);
         (Arc::clone(&source.path), Arc::clone(&source.text))

@@ -1,10 +1,10 @@
-//! The generated and the dynamic codec, which share nothing but the definitions, against each
-//! other: for every generated message they accept the same octets, refuse the same, show the same
-//! JSON text and write the same octets.
+//! The generated codec against the dynamic one, which shares only the definitions: for every
+//! generated message both accept and refuse the same octets, show the same JSON text and write the
+//! same octets.
 //!
 //! The messages of the Reference Architecture are compared in `roundtrip` and `ra33`.
 //!
-//! `JAUS_CASES=500` tries so many inputs for each message in place of a few.
+//! `JAUS_CASES=500` tests that many inputs per message instead of a few.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;

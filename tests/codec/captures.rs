@@ -1,5 +1,5 @@
-//! Recorded traffic of other JAUS stacks, put through the wire formats and, in the place of one of
-//! the two parties, through an endpoint.
+//! Recorded traffic of other JAUS stacks through the wire formats, and through an endpoint in the
+//! place of one party.
 
 use std::fs::File;
 use std::net::{IpAddr, SocketAddr};

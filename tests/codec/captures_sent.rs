@@ -1,7 +1,7 @@
-//! What recorded peers sent, sent again by an endpoint of ours in their place: the same octets, or a
-//! difference with its reason.
+//! Messages of recorded peers, sent again by our endpoint in their place: the same octets, or a
+//! difference with a reason.
 //!
-//! Differences that are meant, and left out of the comparison:
+//! Intended differences, left out of the comparison:
 //!
 //! | recording | difference | reason |
 //! |---|---|---|
@@ -11,8 +11,8 @@
 //! | jauspp/* | sequence numbers | JAUS++ counts from 0 for each component, we count for the whole node from a random number |
 //! | jauspp/* | octets behind the message | JAUS++ leaves what an older, longer message had there |
 //!
-//! Streams and serial lines are compared in `jtcp_captures.rs` and `jserial_captures.rs`; what is
-//! received from the recordings in `captures.rs`.
+//! `jtcp_captures.rs` and `jserial_captures.rs` compare streams and serial lines; `captures.rs`
+//! covers reception.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};

@@ -1,5 +1,5 @@
-//! The generated codec against octets that JTS' own C++ encoder made: every vector of a message that
-//! is generated here decodes, shows the stated values, and encodes to the same octets.
+//! The generated codec against octets of JTS' C++ encoder: every vector of a generated message
+//! decodes to the stated values and encodes to the same octets.
 
 use std::fs;
 

@@ -1,5 +1,5 @@
-//! Recorded traffic of other JAUS stacks in Wireshark: with our dissector `tshark` names the
-//! messages that our own reading of the captures names, and finds fault where that does.
+//! Recorded traffic of other JAUS stacks in Wireshark: with our dissector, `tshark` reports the
+//! same message names and the same errors as our own decoder.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};

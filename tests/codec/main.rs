@@ -1,4 +1,4 @@
-//! Messages: the two codecs against each other, against independent vectors and against recordings.
+//! Message codecs: compared with each other, with independent vectors and with recordings.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

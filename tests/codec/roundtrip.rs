@@ -1,6 +1,6 @@
-//! For every generated message: what is encoded decodes to the same, what is accepted encodes to
-//! the same, and no octets whatever make the decoder panic. New messages are covered by being in
-//! the registry. The generated codec and the dynamic one of `jsidl` agree on all of it.
+//! Round trips of every generated message: encoded messages decode to the same value, accepted
+//! octets encode to the same octets, and no octets make the decoder panic. New messages are covered
+//! by the registry. The generated codec and the dynamic one of `jsidl` agree in all cases.
 
 use bytes::Bytes;
 use jaus::codec::arbitrary::Unstructured;

@@ -1,5 +1,5 @@
-//! One service at two versions that lay a message out differently under the same code: a component
-//! offers both, a client is told which one to speak, and each is understood.
+//! One service at two versions with different layouts under the same code: a component offers both,
+//! a client selects one, and both are decoded correctly.
 
 use std::future::Future;
 use std::time::Duration;

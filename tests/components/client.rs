@@ -1,5 +1,5 @@
-//! Subscriptions and control in the hands of an application: components on nodes with real
-//! sockets on the loopback interface, and a peer that does what the test says.
+//! Subscriptions and control in an application: components on nodes with real sockets on the
+//! loopback interface, and a scripted peer.
 
 use std::future::Future;
 use std::time::Duration;

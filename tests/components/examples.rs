@@ -1,6 +1,6 @@
-//! The examples do what they say: each is started as a program, and found to do it.
+//! The examples work as documented: each is run as a program and checked.
 //!
-//! `cargo test` builds them; a run of this test alone needs `cargo build --examples` before.
+//! `cargo test` builds them; to run this test alone, run `cargo build --examples` first.
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;

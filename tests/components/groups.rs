@@ -1,4 +1,4 @@
-//! Messages for many and subscriptions to many: components on nodes with real sockets on the
+//! Multicast messages and group subscriptions: components on nodes with real sockets on the
 //! loopback interface.
 
 use std::future::Future;

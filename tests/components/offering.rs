@@ -1,4 +1,4 @@
-//! What an application sees: components on nodes with real sockets on the loopback interface.
+//! Components as an application offers them, on nodes with real sockets on the loopback interface.
 
 use std::future::Future;
 use std::time::Duration;

@@ -1,5 +1,5 @@
-//! A hostile serial line: rubbish, messages without an end, and ids of peers that are elsewhere. The
-//! line is a pseudo-terminal; the peers that it attacks use UDP on loopback.
+//! A hostile serial line: garbage, endless messages, and ids of peers elsewhere. The line is a
+//! pseudo-terminal; the attacked peers use UDP on loopback.
 #![cfg(target_os = "linux")]
 
 use std::fs::File;

@@ -1,5 +1,5 @@
-//! A flood over real sockets: while 100 000 packets of 10 000 invented senders come from one socket,
-//! two components go on talking. Loopback only.
+//! A flood over real sockets: while one socket sends 100 000 packets of 10 000 forged senders, two
+//! components keep communicating. Loopback only.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! A node that passes messages on between UDP and TCP, with real sockets on the loopback interface.
+//! A node that forwards messages between UDP and TCP, with real sockets on the loopback interface.
 //! Needs no network.
 
 use std::net::SocketAddr;

@@ -1,5 +1,5 @@
-//! Nodes that talk over a serial line, with and without noise on it. The line is a pair of
-//! pseudo-terminals with the test in between, which carries the octets across.
+//! Nodes connected by a serial line, with and without noise. The line is a pair of
+//! pseudo-terminals, with the test copying the octets between them.
 #![cfg(target_os = "linux")]
 
 use std::fs::{self, File};

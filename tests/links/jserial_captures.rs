@@ -1,5 +1,5 @@
-//! The recorded JSerial traffic of Junior: each read gives the expected frames, and our packets for
-//! them are the same octets.
+//! Recorded JSerial traffic of Junior: each read gives the expected frames, and our encoding of
+//! them gives the same octets.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! Nodes that talk over TCP on the loopback interface, with each other and with scripted peers that
+//! Nodes connected by TCP on the loopback interface, with each other and with scripted peers that
 //! behave like other stacks, or badly. Needs no network.
 
 use std::net::SocketAddr;

@@ -1,4 +1,4 @@
-//! Recorded JTCP connections of Junior and JAUS++: read, however they are cut, and written again.
+//! Recorded JTCP connections of Junior and JAUS++: decoded in any segmentation, and encoded again.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! The limits of a TCP link that need time to pass, which a test can tell it.
+//! Time-dependent limits of a TCP link, in virtual time.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};

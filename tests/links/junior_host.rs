@@ -1,5 +1,5 @@
-//! A node through the node manager of a Junior on the same host, which is played here: a Unix
-//! datagram socket in a folder, as the real one has it.
+//! A node behind the node manager of a Junior on the same host, which the test simulates: a Unix
+//! datagram socket in a folder, as in the real one.
 #![cfg(unix)]
 
 use std::os::unix::net::UnixDatagram as StdDatagram;

@@ -1,5 +1,5 @@
-//! Real sockets on the loopback interface: what a link hears, what it leaves out, and what it
-//! says when it cannot be opened. Needs no network and no rights.
+//! UDP link with real sockets on the loopback interface: reception, filtering, and errors on
+//! opening. Needs no network and no rights.
 
 use std::future::poll_fn;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};

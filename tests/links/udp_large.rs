@@ -1,5 +1,5 @@
-//! Large messages between two nodes on the loopback interface: without acknowledgement none is
-//! lost though nobody repeats anything, and with it none whatever its size.
+//! Large messages between two nodes on the loopback interface: no loss without acknowledgement,
+//! although nothing is retransmitted; with acknowledgement no loss at any size.
 
 use std::collections::BTreeSet;
 use std::time::Duration;

@@ -1,5 +1,5 @@
 //! Whole nodes with real sockets on the loopback interface: unicast, both broadcast scopes,
-//! acknowledgement, components that do not read, and the end of a node. Needs no network.
+//! acknowledgement, components that do not read, and shutdown. Needs no network.
 
 use std::time::Duration;
 

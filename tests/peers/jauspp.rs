@@ -1,6 +1,5 @@
-//! What JAUS++ said in the captures, said again to a vehicle and to an operator of ours, in virtual
-//! time: every request gets the answer that JAUS++ can use, within the 250 ms that it waits, at the
-//! address that it sent from.
+//! Captured JAUS++ messages, replayed in virtual time to a vehicle and an operator of ours: every
+//! request gets a usable answer, within JAUS++'s timeout of 250 ms, at its source address.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::net::SocketAddr;

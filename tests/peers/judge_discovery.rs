@@ -1,5 +1,5 @@
-//! The discovery and heartbeat requests of the competitions' judging tool, octet for octet as
-//! they were captured, against a node with real sockets on the loopback interface.
+//! Captured discovery and heartbeat requests of the competitions' judging tool, octet for octet,
+//! against a node with real sockets on the loopback interface.
 //!
 //! The capture is not part of the project; see `JAUS_SHARED` in CONTRIBUTING.
 

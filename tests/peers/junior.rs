@@ -1,5 +1,5 @@
-//! Junior's sides of the captures, replayed to a node of ours in the place of the other, in virtual
-//! time: what we say is, octet for octet, what Junior's own node said there.
+//! Junior's side of captures, replayed in virtual time to a node of ours in the place of the other:
+//! our octets equal those of the recorded Junior node.
 
 use std::net::SocketAddr;
 

@@ -1,4 +1,4 @@
-//! Recorded exchanges with other stacks, with components of ours in the place of one side.
+//! Recorded exchanges with other stacks, with components of ours in the place of one party.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

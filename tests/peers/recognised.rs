@@ -1,4 +1,4 @@
-//! Who spoke in the captures is recognised as what it was, and nobody is taken for somebody else.
+//! Stack recognition: every sender in the captures is recognised correctly.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! The recorded TCP connections of Junior and JAUS++, replayed to a node of ours that listens: each
-//! is answered where it reads.
+//! Recorded TCP connections of Junior and JAUS++, replayed to a listening node of ours, which
+//! answers on the same connection.
 
 use std::net::SocketAddr;
 

@@ -1,4 +1,4 @@
-//! The cells of the table: each kind of driver, crossed with each fault.
+//! Cells of the table: each kind of driver with each fault.
 
 use std::fmt;
 use std::time::Duration;

@@ -1,5 +1,5 @@
-//! A scripted controller: it takes control, makes the vehicle ready, and drives. It can also be one
-//! that goes on sending when it has lost control.
+//! A scripted controller: it takes control, makes the vehicle ready, and drives. Optionally it
+//! continues to send after a loss of control.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};

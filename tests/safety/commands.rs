@@ -1,4 +1,4 @@
-//! The messages with which a controller drives.
+//! Motion commands of a controller.
 
 use std::time::Duration;
 

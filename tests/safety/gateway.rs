@@ -1,7 +1,7 @@
-//! An operator among RA systems and the gateway between it and the vehicle: the controller in the row
-//! "gateway restarted".
+//! An operator among RA systems and the gateway to the vehicle: the controller in the row "gateway
+//! restarted".
 //!
-//! Both are one party. Nothing is lost between them; the gateway's JAUS side is a node of the
+//! The two form one party without losses between them; the gateway's JAUS side is a node of the
 //! simulated network.
 
 use std::net::SocketAddr;

@@ -1,10 +1,10 @@
-//! Nothing moves without a living controller: every kind of driver, crossed with every fault, in
+//! No motion without a living controller: every kind of driver, combined with every fault, in
 //! virtual time.
 //!
-//! A seed gives one trial: the cell, the network's delays and losses, the other peers, the moment of
-//! the fault, and what the controller does afterwards. The vehicle's hardware is simulated outside
-//! its program, so that it moves on while the program hangs or is dead, until its actuator's
-//! deadline. What counts is the motion that the program orders:
+//! A seed determines one trial: the cell, the network's delays and losses, the other peers, the
+//! moment of the fault, and the controller's later actions. The vehicle's hardware is simulated
+//! outside its program, so that it keeps moving while the program hangs or is dead, until its
+//! actuator's deadline. The test measures the motion that the program orders:
 //!
 //! | driver | moves no longer than |
 //! |---|---|
@@ -14,11 +14,11 @@
 //! | any | 5 s after the last Request Control |
 //! | any, its program hung | the actuator's deadline |
 //!
-//! Control is free within 5 s of the last Request Control, nothing moves again in the next 30 s, and
+//! Control is free within 5 s of the last Request Control, there is no motion in the next 30 s, and
 //! then a new lease sets the vehicle in motion.
 //!
-//! `JAUS_SEEDS=n` tries so many fresh seeds, `JAUS_SEED=n` exactly that one, and `JAUS_TRACE=1`
-//! prints what happens in it.
+//! `JAUS_SEEDS=n` runs n fresh seeds, `JAUS_SEED=n` only seed n, and `JAUS_TRACE=1` prints its
+//! events.
 
 #![expect(clippy::expect_used, clippy::panic, reason = "tests")]
 

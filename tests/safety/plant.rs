@@ -1,4 +1,4 @@
-//! The hardware of the vehicle: it moves on while the program that drives it hangs or is dead.
+//! The vehicle's hardware: it keeps moving while its program hangs or is dead.
 
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! What the simulated network does to its hosts: cuts in one direction, suspension, wall clocks.
+//! Faults of the simulated network's hosts: cuts in one direction, suspension, wall clock steps.
 
 use std::time::Duration;
 

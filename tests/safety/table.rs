@@ -1,4 +1,4 @@
-//! The table of the cells: what was run, what moved, and the worst of it.
+//! Results by cell: number of trials, observed motion, and the worst case.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;

@@ -1,5 +1,5 @@
-//! One trial: the vehicle drives, something goes wrong, and everything is watched for half a minute
-//! and more.
+//! One trial: the vehicle drives, a fault occurs, and everything is observed for at least half a
+//! minute.
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,5 @@
-//! The vehicle's program: how a component and its services are made. What depends on the library's
-//! API is here and nowhere else in this test.
+//! The vehicle's program: creates a component and its services. Only this file of the test depends
+//! on the library's API.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! What arrived from the controller, and until when it was in control.
+//! Observes the controller's messages at the vehicle, and the end of its control.
 
 use std::time::Instant;
 

@@ -1,5 +1,5 @@
-//! The network of a trial: the vehicle with its hardware, the controller, a supervisor, other peers,
-//! and a crowd of ids that die.
+//! The network of a trial: the vehicle with its hardware, the controller, a supervisor, other
+//! peers, and a crowd of dying ids.
 
 use std::time::{Duration, Instant};
 

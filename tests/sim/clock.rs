@@ -1,4 +1,4 @@
-//! The wall clocks of the simulated hosts, which can be stepped while virtual time goes on evenly.
+//! Wall clocks of the simulated hosts, which tests can step while virtual time advances evenly.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering::Relaxed};

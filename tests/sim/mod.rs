@@ -1,11 +1,10 @@
-//! A network in memory: endpoints, virtual time, and a seeded wire that delays, loses, repeats and
-//! reorders.
+//! A network in memory: endpoints, virtual time, and a seeded wire that delays, loses, duplicates
+//! and reorders.
 //!
 //! Used by several test binaries (`mod sim;`). Each node is an [`Endpoint`] with an [`Owner`] that
-//! takes its events: [`Mailbox`] keeps them for the test to look at, and whoever builds on the
-//! endpoint (a service, a component) puts its own state machine there. A node has a link on one
-//! network or on several, by which it may forward. Nothing waits for real time, and the same seed
-//! gives the same run.
+//! takes its events: [`Mailbox`] stores them for the test; a service or component on top of the
+//! endpoint brings its own state machine. A node has a link on one or several networks, and may
+//! forward between them. Nothing waits for real time, and the same seed gives the same run.
 
 #![allow(
     clippy::expect_used,

@@ -1,4 +1,4 @@
-//! An endpoint with a place for what it delivers, as a node has mailboxes.
+//! An endpoint with a store for delivered messages, like a node's mailboxes.
 
 use std::collections::VecDeque;
 use std::ops::{Deref, DerefMut};

@@ -1,5 +1,4 @@
-//! Runs many seeds, on both threads of a small machine, and prints how to repeat the one that
-//! fails.
+//! Runs many seeds, on both cores of a small machine, and prints how to repeat a failing one.
 
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;

@@ -1,5 +1,4 @@
-//! What happens in the network: a number that differs when anything does, and a line for each thing
-//! for whoever looks for a fault.
+//! Trace of the simulated network: a hash of all events, and a line per event for debugging.
 
 use std::fmt::{self, Write};
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! The wire between the nodes: what it does to each datagram, and the socket buffers at its ends.
+//! The wire between the nodes: its effects on datagrams, and the socket buffers at its ends.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};

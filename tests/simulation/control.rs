@@ -1,7 +1,6 @@
-//! Operators that contend for a vehicle while the wire is bad and everybody restarts: there are
-//! never two controllers, only the one in control makes the vehicle act, an emergency stops it
-//! whoever is in control, who has lost control knows it soon, and once the wire is good control can
-//! be taken.
+//! Operators that compete for a vehicle over a bad wire with restarts: there are never two
+//! controllers, only the controller makes the vehicle act, an emergency from any client stops it, a
+//! controller soon learns of its loss of control, and once the wire is good control can be taken.
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};

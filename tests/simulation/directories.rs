@@ -1,5 +1,5 @@
-//! Components that look for each other while the wire is bad and nodes restart and die: once it is
-//! good, all of them know the same, which is the truth.
+//! Discovery over a bad wire, with nodes that restart and die: once the wire is good, all
+//! directories are equal and correct.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};

@@ -1,5 +1,5 @@
-//! What goes wrong: changing conditions, cuts, restarts, other addresses, components that do not
-//! read, forged senders. And how all of it ends.
+//! Faults of a scenario: changing conditions, cuts, restarts, address changes, components that do
+//! not read, forged senders; and their ends.
 
 use std::net::SocketAddr;
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! What every endpoint keeps to, whatever goes wrong: its bounds, and rest once all is quiet.
+//! Invariants of every endpoint under all faults: its bounds, and silence once all is quiet.
 
 use jaus::endpoint::Counter;
 

@@ -1,6 +1,6 @@
-//! What was promised: which messages were sent, for whom, and what has become of them.
+//! Ledger of a scenario: sent messages, their receivers, and their delivery.
 //!
-//! Each message of a scenario has a code of its own, so that every copy of it is known, whatever its
+//! Each message of a scenario has a unique code, so that every copy is recognised, whatever its
 //! length.
 
 use std::collections::HashMap;

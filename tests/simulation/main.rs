@@ -1,23 +1,23 @@
-//! Random scenarios on a simulated network: what endpoints and services promise holds for every
+//! Random scenarios on a simulated network: the guarantees of endpoints and services hold for every
 //! seed.
 //!
-//! A seed gives the nodes and their networks, their settings, the traffic, and what goes wrong.
-//! Each run takes seeds that no run before had, prints them, and repeats those of
-//! `failed_seeds.txt`. What happened in all of them is printed too, and none of it may be missing.
+//! A seed determines the nodes and their networks, their settings, the traffic, and the faults.
+//! Each run uses fresh seeds, prints them, and repeats those of `failed_seeds.txt`. It also prints
+//! the events of all seeds; a full run fails if a kind of event never occurred.
 //!
-//! | here | what it does |
+//! | module | content |
 //! |---|---|
 //! | [`scenario`] | messages between endpoints: the timeline, the traffic, the time after healing |
-//! | [`plan`] | what a seed chooses beforehand: networks, routers, settings of each node |
-//! | [`nodes`] | the nodes on their networks, through restarts |
-//! | [`faults`] | what goes wrong and when it ends |
-//! | [`ledger`] | what was promised, and whether what comes out keeps it |
-//! | [`judges`] | what endpoints keep to whatever happens: bounds, and rest when all is quiet |
-//! | [`totals`] | what has happened over all seeds |
-//! | [`large`], [`streams`], [`control`], [`directories`] | scenarios of their own: one large message, subscriptions, operators, discovery |
+//! | [`plan`] | choices of a seed: networks, routers, settings of each node |
+//! | [`nodes`] | the nodes on their networks, across restarts |
+//! | [`faults`] | faults and their ends |
+//! | [`ledger`] | sent messages, and checks of their delivery |
+//! | [`judges`] | invariants of endpoints: bounds, and silence when all is quiet |
+//! | [`totals`] | events over all seeds |
+//! | [`large`], [`streams`], [`control`], [`directories`] | separate scenarios: a large message, subscriptions, operators, discovery |
 //!
-//! `JAUS_SEEDS=n` tries so many seeds, `JAUS_SEED=n` exactly that one, and `JAUS_TRACE=1` prints
-//! what happens in it. A hundred thousand, as fast as a debug build allows:
+//! `JAUS_SEEDS=n` runs n seeds, `JAUS_SEED=n` only seed n, and `JAUS_TRACE=1` prints its events. A
+//! hundred thousand, as fast as a debug build allows:
 //!
 //! ```sh
 //! JAUS_SEEDS=100000 CARGO_PROFILE_TEST_OPT_LEVEL=2 cargo test --test simulation every_seed

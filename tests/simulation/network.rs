@@ -1,4 +1,4 @@
-//! Endpoints among themselves on a simulated network, good and poor.
+//! Endpoints on a simulated network, good and poor.
 
 #![expect(clippy::expect_used, reason = "helpers of tests")]
 

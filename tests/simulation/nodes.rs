@@ -1,4 +1,4 @@
-//! The nodes of a scenario on their networks, each in one of its lives.
+//! The nodes of a scenario on their networks, across restarts.
 
 use jaus::address::JausId;
 use jaus::endpoint::{Config, Counter, Endpoint, MessageHandle, Outgoing, SendError};

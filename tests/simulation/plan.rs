@@ -1,5 +1,5 @@
-//! What a seed chooses beforehand: the networks and the nodes on them, the settings of each node,
-//! and which kinds of trouble there may be.
+//! Choices of a seed: the networks and their nodes, the settings of each node, and the possible
+//! kinds of faults.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! A producer of events in the ways of known peers: some number their events for each query anew,
-//! some create a second event where one is, some forget an event that nobody renews.
+//! An event producer with the behaviour of known peers: some number their events per query, some
+//! create a duplicate event, some drop an event that is not renewed.
 
 use std::time::{Duration, Instant};
 

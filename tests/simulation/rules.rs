@@ -1,5 +1,5 @@
-//! What a vehicle under Management may do, concluded from nothing but what it hears and says: for
-//! whom it acts, in which state it is, and who is in control.
+//! Rules for a vehicle under Management, derived only from its messages: whose commands it follows,
+//! in which state it is, and who is in control.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};

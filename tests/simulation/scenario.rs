@@ -1,5 +1,5 @@
-//! A scenario from a seed: nodes send while things go wrong; then everything is mended, and what is
-//! sent then has to arrive.
+//! A scenario from a seed: nodes send during faults; then all faults end, and every later message
+//! must arrive.
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,5 @@
-//! Clients that subscribe while the wire is bad and everybody restarts: a stream runs at its rate,
-//! or its client knows that it is down; and in the end there are no more events than subscriptions.
+//! Subscriptions over a bad wire with restarts: a stream runs at its rate, or its client knows that
+//! it is down; at the end there are no more events than subscriptions.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};

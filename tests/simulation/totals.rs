@@ -1,4 +1,4 @@
-//! What happened over all seeds of a test: a promise that nothing has put to the test says nothing.
+//! Events over all seeds of a test: a guarantee that was never exercised is not tested.
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;

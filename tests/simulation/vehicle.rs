@@ -1,5 +1,5 @@
-//! A component of this library that answers a few queries, and says every three seconds that the
-//! answers have changed.
+//! A component of this library that answers a few queries, and reports changed answers every three
+//! seconds.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering::Relaxed};

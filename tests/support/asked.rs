@@ -1,4 +1,4 @@
-//! What must come back to a request.
+//! Required answers to requests.
 
 use jaus::codec::Message;
 use jaus::messages::core::{

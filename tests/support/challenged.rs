@@ -1,4 +1,4 @@
-//! What a peer's transport does with a challenge: it acknowledges. Recordings cannot.
+//! Acknowledges challenges like a peer's transport, which recordings cannot do.
 
 use bytes::Bytes;
 use jaus::endpoint::{Path, To, Transmit};

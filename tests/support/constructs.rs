@@ -1,5 +1,5 @@
-//! Messages generated from small definitions, one module for each part of the language. The texts
-//! are those that the emitter's own tests keep.
+//! Messages generated from small definitions, one module per language construct. The texts are
+//! those of the emitter's own tests.
 
 macro_rules! constructs {
     ($($name:ident),* $(,)?) => {

@@ -1,4 +1,4 @@
-//! Components to be put in the place of recorded ones.
+//! Components that replace recorded ones.
 
 use jaus::address::JausId;
 use jaus::service::{

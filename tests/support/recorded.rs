@@ -1,4 +1,4 @@
-//! Datagrams of a capture, with the time and the addresses that they had.
+//! Datagrams of a capture, with their times and addresses.
 
 use std::fs::File;
 use std::net::SocketAddr;

@@ -1,5 +1,5 @@
-//! A node of ours in the place of a party of a capture, in virtual time: its endpoint, its
-//! components, and everything that it says.
+//! A node of ours in the place of a captured party, in virtual time: its endpoint, its components,
+//! and all messages that it sends.
 
 #[path = "challenged.rs"]
 mod challenged;

@@ -1,4 +1,4 @@
-//! How a run ends: the exit status, and the one sentence that a failure prints.
+//! End of a run: the exit status, and the sentence that a failure prints.
 
 use std::error::Error;
 use std::fmt;
@@ -6,19 +6,19 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// A run that came to its end.
+/// Result of a completed run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Exit status 0.
     Done,
-    /// Something could not be read, or did not answer: exit status 1.
+    /// Some input was unreadable or unanswered: exit status 1.
     Incomplete,
-    /// Something that was looked at does not work: exit status 2.
+    /// An examined item does not work: exit status 2.
     Broken,
 }
 
 impl Outcome {
-    /// [`Incomplete`](Self::Incomplete) if anything was missing.
+    /// [`Incomplete`](Self::Incomplete) if anything is missing.
     pub fn complete_if(complete: bool) -> Self {
         if complete {
             Self::Done
@@ -38,22 +38,22 @@ impl From<Outcome> for ExitCode {
     }
 }
 
-/// Why a run could not be: exit status 2.
+/// Reason why a run was not possible: exit status 2.
 #[derive(Debug)]
 pub enum Failure {
-    /// Nobody reads our output any more; not worth a word.
+    /// Standard output is closed; no message is printed.
     OutputClosed,
-    /// What is wrong and what to do.
+    /// The mistake and its remedy.
     Message(String),
 }
 
 impl Failure {
-    /// A sentence for people.
+    /// A sentence for the user.
     pub fn new(message: impl Into<String>) -> Self {
         Self::Message(message.into())
     }
 
-    /// An error of the library, with its causes: its sentences are made for people.
+    /// An error of the library, with its causes: its messages are written for users.
     pub fn of(error: impl Error) -> Self {
         let mut message = error.to_string();
         let mut source = error.source();

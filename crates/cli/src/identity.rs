@@ -1,4 +1,4 @@
-//! Who a node is, as flags and settings files say it.
+//! Identity of a node, from flags and settings files.
 
 use std::str::FromStr;
 
@@ -8,17 +8,17 @@ use serde::Deserialize;
 use jaus::address::JausId;
 use jaus::component::Kind;
 
-/// Who a node is, as far as a settings file or flags say.
+/// Identity of a node, as far as it is configured.
 #[derive(Debug, Default, Deserialize)]
 pub struct Identity {
     pub(super) id: Option<OwnId>,
-    /// What the subsystem is called.
+    /// Name of the subsystem.
     pub name: Option<String>,
-    /// What the subsystem is.
+    /// Kind of the subsystem.
     pub kind: Option<SubsystemKind>,
 }
 
-/// Our own id: one component, so no wildcards.
+/// Our own id: a single component, without wildcards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 pub(super) struct OwnId(pub(super) JausId);

@@ -1,47 +1,47 @@
-//! Results as JUnit XML, which build servers show.
+//! Writes results as JUnit XML for build servers.
 
 use std::fmt::Write as _;
 use std::time::Duration;
 
-/// Cases that belong together.
+/// A group of test cases.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Suite {
-    /// What it is called.
+    /// Name of the suite.
     pub name: String,
-    /// What was tried, in order.
+    /// Cases in execution order.
     pub cases: Vec<Case>,
 }
 
-/// Something that was tried.
+/// A test case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Case {
-    /// What it is called.
+    /// Name of the case.
     pub name: String,
-    /// What it is sorted by, in parts with dots between them.
+    /// Class for sorting, in parts separated by dots.
     pub class: String,
-    /// How long it took.
+    /// Duration.
     pub took: Duration,
-    /// What became of it.
+    /// Result.
     pub result: CaseResult,
 }
 
-/// What became of a case.
+/// Result of a test case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum CaseResult {
-    /// All was right.
+    /// Passed.
     Passed,
-    /// It was not tried, for this reason.
+    /// Skipped, for this reason.
     Skipped(String),
-    /// Something was wrong.
+    /// Failed.
     Failed {
-        /// What, in a line.
+        /// The reason, in one line.
         reason: String,
-        /// What happened, in as many lines as it takes.
+        /// The proceedings, in any number of lines.
         details: String,
     },
 }
 
-/// The whole file.
+/// The whole document.
 #[must_use]
 pub fn document(name: &str, suites: &[Suite]) -> String {
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
@@ -82,7 +82,7 @@ fn case(xml: &mut String, case: &Case) {
     element(xml, 2, "</testcase>");
 }
 
-/// The attributes that a suite counts its cases with.
+/// The attributes with the case counts of a suite.
 fn counts<'c>(cases: impl IntoIterator<Item = &'c Case>) -> String {
     let (mut all, mut failed, mut skipped, mut took) = (0, 0, 0, Duration::ZERO);
     for case in cases {
@@ -109,7 +109,7 @@ fn element(xml: &mut String, depth: usize, text: &str) {
     let _ = writeln!(xml, "{:indent$}{text}", "", indent = 2 * depth);
 }
 
-/// Text as XML may hold it: peers choose their names, and XML forbids most control characters.
+/// Escapes text for XML: peers choose their names, and XML forbids most control characters.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {

@@ -1,4 +1,4 @@
-//! The launch of a program that is one ready component: flags, settings file, node, and the end.
+//! Launches a single-component program: flags, settings file, node, shutdown.
 
 use std::convert::Infallible;
 use std::ffi::OsString;
@@ -18,30 +18,30 @@ use jaus::component::Kind;
 use jaus::node::{Config, Node};
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
-/// The flags of a program that is one [`Part`].
+/// The flags of a program with a single [`Part`].
 pub trait Ready: Args {
-    /// What the program is called, for example `jaus-planner`.
+    /// Name of the program, for example `jaus-planner`.
     const PROGRAM: &'static str;
-    /// What it does, in one line.
+    /// Description in one line.
     const ABOUT: &'static str;
-    /// Text below the help: examples.
+    /// Examples below the help text.
     const EXAMPLES: &'static str;
-    /// The id of whoever does not choose one.
+    /// Id if none is chosen.
     const ID: JausId;
-    /// What its subsystem is.
+    /// Kind of its subsystem.
     const KIND: Kind = Kind::Vehicle;
-    /// What its subsystem is called unless a flag or the settings file says.
+    /// Name of its subsystem, unless a flag or the settings file sets one.
     const SUBSYSTEM: &'static str = "G-Bat";
 
-    /// What the flags say about the node, if we run one: it is laid over the node's settings.
+    /// Changes of the node's settings by the flags, if the program runs a node.
     fn for_node(&self) -> impl FnOnce(&mut Config) + 'static {
         |_: &mut Config| {}
     }
 
-    /// The component that the flags ask for.
+    /// Creates the component from the flags.
     ///
     /// # Errors
-    /// If a flag is mistaken: what is wrong and what to do.
+    /// An invalid flag, with its remedy.
     fn part(self) -> Result<impl Part, Failure>;
 }
 
@@ -66,14 +66,15 @@ struct Program<F: Args> {
     logging: Logging,
 }
 
-/// What is logged without `-v`: warnings of every module, such as an emergency or a log that cannot be
-/// written, and what parts report of themselves.
+/// Log filter without `-v`: warnings of every module, such as an emergency or an unwritable log,
+/// and the reports of the parts.
 const USUAL: &str = "warn,jaus_vehicle=info,jaus_ocu=info,jaus_ra=info,jaus_cli=info";
 
-/// Runs a program to its end: reads flags and settings, takes a place on a node, lets the part run
-/// until Ctrl-C or SIGTERM, and takes leave.
+/// Runs a program: reads flags and settings, attaches to a node, runs the part until Ctrl-C or
+/// SIGTERM, and detaches.
 ///
-/// Exit status: 0 it was told to end, by a signal or by Management's Shutdown; 1 it could not go on; 2 it could not begin.
+/// Exit status: 0 after a signal or Management's Shutdown; 1 it could not continue; 2 it could not
+/// start.
 #[must_use]
 pub fn launch<F: Ready>() -> ExitCode {
     let program = match read::<F>() {
@@ -141,7 +142,7 @@ impl<F: Ready> Program<F> {
     }
 }
 
-/// Tells who and where we are.
+/// Prints the id and the node.
 fn tell_place(id: JausId, node: Option<&Node>) {
     let Some(node) = node else {
         tracing::info!("{id} on the node of this host");
@@ -152,7 +153,7 @@ fn tell_place(id: JausId, node: Option<&Node>) {
     }
 }
 
-/// The program as flags and settings file say; help, version and mistakes end the process here.
+/// Parses flags and settings file; help, version and mistakes end the process here.
 fn read<F: Ready>() -> Result<Program<F>, Failure> {
     let given: Vec<OsString> = std::env::args_os().collect();
     let matches = command::<F>().get_matches_from(&given);
@@ -164,7 +165,7 @@ fn read<F: Ready>() -> Result<Program<F>, Failure> {
     if from_file.is_empty() {
         return Ok(program);
     }
-    // What the command line says comes later and therefore wins.
+    // Command line flags come later and therefore win.
     let (name, rest) = given
         .split_first()
         .map_or((None, &[][..]), |(n, r)| (Some(n), r));
@@ -217,11 +218,11 @@ const FILE_EXAMPLE: &str = r#"For example:
   seconds = 60"#;
 
 fn parse<F: Ready>(matches: &ArgMatches) -> Program<F> {
-    // The matches are those of this very command, so that only a mistake in its definition can fail.
+    // The matches belong to this command, so only a mistake in its definition can fail.
     Program::from_arg_matches(matches).unwrap_or_else(|error| error.exit())
 }
 
-/// A mistake in the file's table `[component]`, which is told like one on the command line.
+/// Formats a mistake in the file's table `[component]` like one on the command line.
 fn in_file(file: &Path, error: &clap::Error) -> Failure {
     let text = error.to_string();
     let text = text.strip_prefix("error: ").unwrap_or(&text);

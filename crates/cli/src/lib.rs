@@ -1,6 +1,6 @@
-//! What the programs of this project share: flags, settings files, output, exit statuses, and the
-//! [`launch`] of a ready component. For programs of your own it is a convenience, and changes as
-//! ours need it.
+//! Shared parts of the project's programs: flags, settings files, output, exit statuses, and the
+//! [`launch`] of a ready component. Other programs may use it for convenience, but it changes with
+//! the needs of ours.
 #![forbid(unsafe_code)]
 #![warn(
     clippy::print_stdout,

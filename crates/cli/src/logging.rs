@@ -1,4 +1,4 @@
-//! The library's tracing on standard error, as much of it as is asked for.
+//! Sends the library's tracing to standard error, at the chosen level.
 
 use clap::Args;
 use tracing_subscriber::filter::Targets;
@@ -18,12 +18,12 @@ pub struct Logging {
     verbose: u8,
 }
 
-/// The environment variable that says what to log.
+/// Environment variable with the log filter.
 const LOG: &str = "JAUS_LOG";
 
 impl Logging {
-    /// Sends the library's tracing to standard error. `usual` is what is told without a flag, such
-    /// as `warn`.
+    /// Sends the library's tracing to standard error. `usual` is the level without a flag, such as
+    /// `warn`.
     ///
     /// # Errors
     /// If the environment variable cannot be read.
@@ -34,8 +34,8 @@ impl Logging {
             2 => "debug",
             _ => "trace",
         };
-        // Modules and levels are enough: filters of fields would bring an engine for regular
-        // expressions into every small program.
+        // Modules and levels are enough: field filters would add a regular expression engine to
+        // every small program.
         let wanted = std::env::var(LOG).unwrap_or_else(|_| level.to_owned());
         let filter: Targets = wanted
             .parse()
@@ -44,7 +44,7 @@ impl Logging {
             .with_writer(std::io::stderr)
             .with_ansi(colours_wanted(&std::io::stderr()))
             .with_target(self.verbose > 1)
-            // It would complain on standard error that standard error is closed, and panic.
+            // Otherwise it reports on standard error that standard error is closed, and panics.
             .log_internal_errors(false);
         tracing_subscriber::registry()
             .with(filter)

@@ -1,4 +1,4 @@
-//! The flags of every command that goes on the network: who we are, and where.
+//! Network flags of all commands: our id, and the interfaces, addresses and peers to use.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::path::{Path, PathBuf};
@@ -99,43 +99,43 @@ pub struct Network {
 }
 
 impl Network {
-    /// For a node that is meant to be found: its component's id, what the file says about it, and
-    /// the settings. `default` is the id of whoever chooses none.
+    /// For a node that others are to find: its component's id, the identity from the settings file,
+    /// and the settings. `default` is the id if none is chosen.
     pub fn for_node(&self, default: JausId) -> Result<(JausId, Identity, Config), Failure> {
         let (identity, node) = self.settings()?;
         let id = self.chosen_id(&identity, &node).unwrap_or(default);
         Ok((id, identity, self.with_flags(node, id)?))
     }
 
-    /// For a look at a node that is to be: the id that it is to have, if one is chosen, and its
-    /// settings, but with a passing id.
+    /// For the examination of a node before its start: its id, if one is chosen, and its settings,
+    /// but with a temporary id.
     pub fn for_examination(&self) -> Result<(Option<JausId>, Config), Failure> {
         let (identity, node) = self.settings()?;
         let id = self.chosen_id(&identity, &node);
         Ok((id, self.with_flags(node, passing_id())?))
     }
 
-    /// Whether settings come from a file.
+    /// Whether a settings file is chosen.
     pub const fn has_file(&self) -> bool {
         self.config.is_some()
     }
 
-    /// The id that a flag or the file names.
+    /// The id from a flag or the file.
     fn chosen_id(&self, identity: &Identity, node: &Config) -> Option<JausId> {
-        // A file may also have the node's own keys for its id.
+        // A file may also set the node's own keys for its id.
         let of_node = (node.subsystem, node.node) != (0, 0);
         let of_node = of_node.then(|| OwnId(JausId::new(node.subsystem, node.node, 1)));
         let id = self.id.or(identity.id).or(of_node);
         id.map(|OwnId(id)| id)
     }
 
-    /// For a command that runs for a moment beside other nodes: a passing id, whatever the file
-    /// says, and any free port unless a flag names one.
+    /// For a short-lived command beside other nodes: a temporary id, whatever the file says, and
+    /// any free port unless a flag names one.
     fn for_a_moment(&self) -> Result<(JausId, Config), Failure> {
         self.for_a_moment_as(passing_id())
     }
 
-    /// The same for a command that has a usual id.
+    /// The same, for a command with a default id.
     fn for_a_moment_as(&self, usual: JausId) -> Result<(JausId, Config), Failure> {
         let (_, node) = self.settings()?;
         let id = self.id.map_or(usual, |OwnId(id)| id);
@@ -143,13 +143,12 @@ impl Network {
         Ok((id, node))
     }
 
-    /// The same for a command that looks at the numbers of its node, so that it needs one of its
-    /// own.
+    /// The same, for a command that reads the counters of its node, and so needs a node of its own.
     pub fn for_own_node(&self, command: &str) -> Result<(JausId, Config), Failure> {
         self.for_own_node_as(passing_id(), command)
     }
 
-    /// The same for a command that has a usual id.
+    /// The same, for a command with a default id.
     pub fn for_own_node_as(
         &self,
         usual: JausId,
@@ -169,16 +168,16 @@ impl Network {
         self.config.as_deref()
     }
 
-    /// A place for a component that stays: on the host's node, or on one of its own. `usual` is the
-    /// id of whoever chooses none; on the host's node its component number alone counts.
+    /// Attaches a permanent component: to the host's node, or to a node of its own. `usual` is the
+    /// id if none is chosen; on the host's node only its component number counts.
     ///
-    /// `for_node` lays its wishes over the settings of a node of our own.
+    /// `for_node` changes the settings of a node of our own.
     ///
-    /// Where the host's node is not there yet, it is waited for, for ever: components may be started
-    /// in any order.
+    /// Waits for the host's node without a timeout: components may be started in any order.
     ///
     /// # Errors
-    /// If a flag or the file is mistaken, or a node cannot be started, or will not have us.
+    /// An invalid flag or file, a node that cannot be started, or a node that refuses the
+    /// component.
     pub async fn join(
         &self,
         usual: JausId,
@@ -209,7 +208,7 @@ impl Network {
         })
     }
 
-    /// A component for a command that runs for a moment, on the host's node or on one of its own.
+    /// Attaches a component for a short-lived command, to the host's node or to a node of its own.
     pub async fn join_for_a_moment(&self) -> Result<(Port, Stay), Failure> {
         let Some(address) = &self.attach else {
             let (id, config) = self.for_a_moment()?;
@@ -227,7 +226,7 @@ impl Network {
         Ok((port, stay))
     }
 
-    /// What the file says; without one, the usual settings.
+    /// The settings of the file, or the defaults.
     fn settings(&self) -> Result<(Identity, Config), Failure> {
         match &self.config {
             Some(path) => settings::read(path),
@@ -235,7 +234,7 @@ impl Network {
         }
     }
 
-    /// Lays id and flags over the settings.
+    /// Applies id and flags to the settings.
     fn with_flags(&self, mut node: Config, id: JausId) -> Result<Config, Failure> {
         (node.subsystem, node.node) = (id.subsystem(), id.node());
         if self.loopback {
@@ -245,7 +244,7 @@ impl Network {
             node.interfaces = Interfaces::Only(self.interface.clone());
         }
         if let Some(port) = self.port {
-            // Who names a port wants that one.
+            // A chosen port is not replaced by a free one.
             node.port = port;
             node.port_taken = PortTaken::Refuse;
         }
@@ -261,18 +260,18 @@ impl Network {
     }
 }
 
-/// A place that a component has taken.
+/// An attached component.
 pub struct Place {
-    /// Its door to the node.
+    /// Its port on the node.
     pub port: Port,
-    /// Who its subsystem is, as far as the settings file says.
+    /// Identity of its subsystem, from the settings file.
     pub identity: Identity,
-    /// Whose node it is.
+    /// The node that it is attached to.
     pub stay: Stay,
 }
 
-/// Attaches to the host's node as soon as there is one, and the place is free: a component that has
-/// crashed may still be there for a moment.
+/// Attaches to the host's node as soon as it exists and the id is free: a crashed predecessor may
+/// still be attached for a moment.
 #[expect(clippy::disallowed_methods, reason = "processes start in real time")]
 async fn wait_for_host(host: &Host, id: Option<JausId>, usual: u8) -> Result<Port, Failure> {
     const PAUSE: Duration = Duration::from_millis(100);
@@ -305,7 +304,7 @@ async fn wait_for_host(host: &Host, id: Option<JausId>, usual: u8) -> Result<Por
     }
 }
 
-/// Where the component of a passing command lives.
+/// The node of a short-lived command's component.
 pub enum Stay {
     /// A node of our own.
     OnOurs(Node),
@@ -314,7 +313,7 @@ pub enum Stay {
 }
 
 impl Stay {
-    /// The node, if it is in this process.
+    /// The node, if it runs in this process.
     #[must_use]
     pub fn node(&self) -> Option<Node> {
         match self {
@@ -323,18 +322,18 @@ impl Stay {
         }
     }
 
-    /// Whether it is a node that somebody else runs.
+    /// Whether the node belongs to another process.
     pub const fn is_guest(&self) -> bool {
         matches!(self, Self::AtHost(_))
     }
 
-    /// Ends it, once nobody holds the component any more.
+    /// Ends it, once the component is dropped.
     #[expect(clippy::disallowed_methods, reason = "a farewell in real time")]
     pub async fn end(self) {
         match self {
             Self::OnOurs(node) => node.shutdown().await,
             Self::AtHost(sender) => {
-                // A node that does not listen need not be told.
+                // An unresponsive node needs no goodbye.
                 let _ = tokio::time::timeout(FAREWELL, sender.disconnected()).await;
             }
         }
@@ -343,7 +342,7 @@ impl Stay {
 
 const FAREWELL: Duration = Duration::from_millis(250);
 
-/// Any number that is free on the host's node, for a command to which it does not matter.
+/// Attaches under any free number on the host's node, for a command that needs no particular id.
 async fn attach_somewhere(host: &Host) -> Result<Port, HostError> {
     const TRIES: usize = 5;
     for _ in 1..TRIES {
@@ -358,9 +357,8 @@ async fn attach_somewhere(host: &Host) -> Result<Port, HostError> {
     host.attach(passing_id().component()).await
 }
 
-/// An id for a command that needs none of its own choice: subsystems from 60000 on, where nobody
-/// numbers vehicles. It differs from run to run, so that two people who use the tool at the same
-/// time do not meet.
+/// A temporary id: from subsystem 60000 on, where no vehicles are numbered. It differs from run to
+/// run, so that simultaneous commands do not collide.
 fn passing_id() -> JausId {
     let random = RandomState::new().build_hasher().finish();
     let [subsystem, node, component, ..] = random.to_le_bytes();

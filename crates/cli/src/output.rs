@@ -1,11 +1,11 @@
-//! Standard output, line by line; and what goes to standard error.
+//! Standard output by lines, and messages on standard error.
 
 use std::fmt::{self, Display};
 use std::io::{self, IsTerminal, StdoutLock, Write};
 
 use super::failure::Failure;
 
-/// Standard output. Every line is on its way when [`line`](Self::line) returns.
+/// Standard output. Every line is flushed when [`line`](Self::line) returns.
 pub struct Output {
     out: StdoutLock<'static>,
 }
@@ -17,14 +17,14 @@ impl Default for Output {
 }
 
 impl Output {
-    /// Takes hold of standard output.
+    /// Opens standard output.
     pub fn new() -> Self {
         Self {
             out: io::stdout().lock(),
         }
     }
 
-    /// Prints what is no line: a screen.
+    /// Prints text that is no line: a screen.
     pub fn part(&mut self, text: &str) -> Result<(), Failure> {
         self.write(format_args!("{text}"))
     }
@@ -45,17 +45,17 @@ impl Output {
     }
 }
 
-/// Says something on standard error. If nobody reads that, it is not said.
+/// Prints a message on standard error. Errors are ignored.
 pub fn say(words: impl Display) {
     say_as("jaus", words);
 }
 
-/// The same for another program than `jaus`.
+/// The same, for a program other than `jaus`.
 pub fn say_as(program: &str, words: impl Display) {
     let _ = writeln!(io::stderr().lock(), "{program}: {words}");
 }
 
-/// Whether to write in colours: to a terminal, unless NO_COLOR (<https://no-color.org>) is set.
+/// Whether to use colours: on a terminal, unless NO_COLOR (<https://no-color.org>) is set.
 pub fn colours_wanted(stream: &impl IsTerminal) -> bool {
     stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

@@ -1,4 +1,4 @@
-//! One thread with tokio on it, and the ways in which a command comes to its end.
+//! Single-threaded tokio runtime, and the end of a command: signals and time limits.
 #![expect(
     clippy::disallowed_methods,
     reason = "commands run in real time and own their tasks"
@@ -12,7 +12,7 @@ use tokio::runtime::Builder;
 
 use super::failure::Failure;
 
-/// Runs a command's network part to its end.
+/// Runs a command's network part to completion.
 pub fn run<T>(work: impl Future<Output = Result<T, Failure>>) -> Result<T, Failure> {
     let runtime = Builder::new_current_thread()
         .enable_all()
@@ -21,7 +21,7 @@ pub fn run<T>(work: impl Future<Output = Result<T, Failure>>) -> Result<T, Failu
     runtime.block_on(work)
 }
 
-/// Waits for Ctrl-C or a request to terminate; with a time limit for that at most.
+/// Waits for Ctrl-C or SIGTERM, or for the time limit if there is one.
 pub async fn end(limit: Option<Duration>) {
     let limit = async {
         match limit {
@@ -37,7 +37,7 @@ pub async fn end(limit: Option<Duration>) {
 }
 
 async fn interrupt() {
-    // Without a handler Ctrl-C still ends the process, only less politely.
+    // Without a handler, Ctrl-C still ends the process, without cleanup.
     if tokio::signal::ctrl_c().await.is_err() {
         std::future::pending::<()>().await;
     }
@@ -59,7 +59,7 @@ async fn termination() {
     std::future::pending::<()>().await;
 }
 
-/// A flag's number of seconds: `2`, `0.5`.
+/// Parses a flag's number of seconds: `2`, `0.5`.
 pub fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text
         .parse()
@@ -72,7 +72,7 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
 
 const MOST: Duration = Duration::from_secs(365 * 86_400);
 
-/// A flag's number between two bounds.
+/// Parses a flag's number within bounds.
 pub fn between(text: &str, least: f64, most: f64) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if (least..=most).contains(&number) => Ok(number),
@@ -80,17 +80,17 @@ pub fn between(text: &str, least: f64, most: f64) -> Result<f64, String> {
     }
 }
 
-/// The time since a command began, printed as `  12.34 s`.
+/// The time since the start of a command, printed as `  12.34 s`.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock(Instant);
 
 impl Clock {
-    /// Begins to count.
+    /// Starts the clock.
     pub fn start() -> Self {
         Self(Instant::now())
     }
 
-    /// How long it has been counting.
+    /// The elapsed time.
     pub fn elapsed(self) -> Duration {
         self.0.elapsed()
     }

@@ -1,5 +1,4 @@
-//! Settings files: TOML, read so that every mistake is told with file, line, key, value and what
-//! would be right.
+//! Reads settings files (TOML), with errors that name file, line, key, value and the remedy.
 
 use std::fmt::{self, Display};
 use std::fs;
@@ -14,24 +13,23 @@ use toml::de::{DeString, DeTable, DeValue, Deserializer, Error};
 use super::failure::Failure;
 use super::identity::Identity;
 
-/// The programs' own keys; all others are the node's.
+/// Keys of the programs; all others are the node's.
 const OWN: [&str; 3] = ["id", "name", "kind"];
 
-/// The table with the flags of a program that is one component.
+/// The table with the flags of a single-component program.
 const COMPONENT: &str = "component";
 
-/// Reads a settings file: who the node is, and its settings.
+/// Reads a settings file: identity and settings of the node.
 pub fn read(path: &Path) -> Result<(Identity, Config), Failure> {
     let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
     parse(&text).map_err(|mistake| Failure::new(format!("{}:{mistake}", path.display())))
 }
 
-/// The flags in the table `[component]` of a settings file, as they would stand on the command line:
-/// a key is a flag's long name, `true` stands for a flag without a value, a list for one that is
-/// given several times.
+/// The flags in the table `[component]` of a settings file, as command line arguments: a key is a
+/// flag's long name, `true` a flag without a value, a list a repeated flag.
 ///
 /// # Errors
-/// If the file cannot be read, or a value cannot be a flag's.
+/// An unreadable file, or a value that no flag can have.
 pub fn flags(path: &Path) -> Result<Vec<String>, Failure> {
     let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
     flags_in(&text).map_err(|mistake| Failure::new(format!("{}:{mistake}", path.display())))
@@ -56,10 +54,10 @@ fn flags_in(text: &str) -> Result<Vec<String>, Mistake> {
     Ok(flags)
 }
 
-/// One flag of a table of flags, as it would stand on the command line.
+/// Converts one key of a table of flags to command line arguments.
 ///
 /// # Errors
-/// Where the value cannot be a flag's, and why.
+/// The position of a value that no flag can have, and the reason.
 pub fn flag(
     name: &str,
     value: &Spanned<DeValue<'_>>,
@@ -109,17 +107,17 @@ fn parse(text: &str) -> Result<(Identity, Config), Mistake> {
     Ok((identity, node))
 }
 
-/// What is wrong, and where. Printed as `LINE: …`, to stand behind the file's name.
+/// A mistake with its position. Displays as `LINE: …`, to follow the file's name.
 #[derive(Debug)]
 pub struct Mistake {
     line: usize,
-    /// The line as it stands in the file: key and value.
+    /// The line in the file: key and value.
     written: String,
     problem: String,
 }
 
 impl Mistake {
-    /// A mistake at a place of the text, if it is known where.
+    /// A mistake at a position of the text, if that is known.
     pub fn at(place: Option<Range<usize>>, text: &str, problem: String) -> Self {
         let before = place.map_or("", |place| text.get(..place.start).unwrap_or(text));
         let line = before.matches('\n').count();
@@ -130,7 +128,7 @@ impl Mistake {
         }
     }
 
-    /// What serde or the parser finds wrong with the text, with what would be right.
+    /// The mistake that serde or the parser reports, with the remedy.
     pub fn of(error: &Error, text: &str) -> Self {
         let problem = error.message().replace('\n', "; ");
         let problem = match remedy(&problem) {
@@ -147,7 +145,7 @@ impl Display for Mistake {
     }
 }
 
-/// What to write, for the types that serde names as programmers do.
+/// The remedy, for types that serde names in programmers' terms.
 fn remedy(problem: &str) -> Option<&'static str> {
     let (_, expected) = problem.rsplit_once("expected ")?;
     Some(match expected {
@@ -162,7 +160,7 @@ fn remedy(problem: &str) -> Option<&'static str> {
     })
 }
 
-/// A key that means nothing.
+/// An unknown key.
 struct Unknown {
     place: Range<usize>,
     problem: String,
@@ -174,8 +172,8 @@ impl Unknown {
     }
 }
 
-/// The first key that the settings do not have. `known` is an example that has them all; where it
-/// holds no table, everything goes, and is looked at when it is read.
+/// The first unknown key. `known` is an example with all keys; where it has no table, any content
+/// is accepted here and checked on reading.
 fn unknown_key(
     table: &DeTable<'_>,
     known: &Json,
@@ -214,7 +212,7 @@ fn inner_table<'t, 'i>(value: &'t Spanned<DeValue<'i>>) -> Option<&'t DeTable<'i
     }
 }
 
-/// Words for a key that means nothing: the nearest one that does, or all.
+/// The remedy for an unknown key: the most similar key, or all keys.
 pub fn unknown_words<'k>(
     key: &str,
     section: &str,
@@ -234,9 +232,9 @@ pub fn unknown_words<'k>(
     }
 }
 
-/// The name of which another one may be a misspelling.
+/// The most similar name to a misspelt one.
 pub fn nearest<'k>(misspelt: &str, names: impl Iterator<Item = &'k str>) -> Option<&'k str> {
-    /// Less alike than this, and it is hardly a slip of the finger.
+    /// Minimum similarity of a misspelling.
     const ALIKE: f64 = 0.75;
     let alike = names.map(|name| (strsim::jaro_winkler(misspelt, name), name));
     let best = alike.max_by(|(a, _), (b, _)| a.total_cmp(b));

@@ -1,4 +1,4 @@
-//! What a node has counted, for people: everything that is not zero, with reasons.
+//! Prints the counters of a node: all nonzero ones, with reasons.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use jaus::node::Node;
 use super::failure::Failure;
 use super::output::Output;
 
-/// Peers that are listed one by one.
+/// Maximum number of peers that are listed one by one.
 const MOST: usize = 20;
 
 /// Prints counters, links, mailboxes and peers.
@@ -99,15 +99,15 @@ fn peers(node: &Node) -> Vec<String> {
     lines
 }
 
-/// Notices when drops grow, a line for each reason; called now and then, so that a flood cannot
-/// fill a log.
+/// Reports growing drop counters, one line per reason, at the caller's interval, so that a flood
+/// cannot fill a log.
 #[derive(Default)]
 pub struct DropWatch {
     before: BTreeMap<Counter, u64>,
 }
 
 impl DropWatch {
-    /// Logs what was dropped since the last call.
+    /// Logs the drops since the last call.
     pub fn log(&mut self, node: &Node) {
         for (counter, total) in node.counters().iter() {
             if !counter.name().starts_with("dropped: ") {

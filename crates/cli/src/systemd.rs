@@ -1,7 +1,7 @@
-//! The service manager's side of a program: it is ready, it is alive, it stops (`sd_notify(3)`).
+//! Service manager notifications of a program: ready, watchdog, stopping (`sd_notify(3)`).
 //!
-//! A program runs on one thread: its component, its control loops and this watchdog. A loop that
-//! hangs therefore ends the pings, and systemd starts the program again after `WatchdogSec=`.
+//! A program runs on one thread: its component, its control loops and this watchdog. A hanging loop
+//! therefore stops the pings, and systemd restarts the program after `WatchdogSec=`.
 
 #[cfg(unix)]
 use std::ffi::OsStr;
@@ -12,16 +12,16 @@ use std::os::unix::net::UnixDatagram;
 
 use tokio::time::{MissedTickBehavior, interval};
 
-/// The way to the service manager, if there is one.
+/// Connection to the service manager, if there is one.
 pub(super) struct Systemd {
     #[cfg(unix)]
     socket: Option<UnixDatagram>,
-    /// Within which time it wants to hear of us, if it watches us.
+    /// Watchdog timeout, if the watchdog is enabled.
     watchdog: Option<Duration>,
 }
 
 impl Systemd {
-    /// As the environment of the process says: `NOTIFY_SOCKET`, `WATCHDOG_USEC`, `WATCHDOG_PID`.
+    /// Reads `NOTIFY_SOCKET`, `WATCHDOG_USEC` and `WATCHDOG_PID` from the environment.
     pub(super) fn from_environment() -> Self {
         let number = |name: &str| std::env::var(name).ok()?.parse::<u64>().ok();
         let is_meant =
@@ -34,10 +34,10 @@ impl Systemd {
         }
     }
 
-    /// Reports that the program is ready, and from then on that it is alive, twice in the time that
-    /// is wanted. Does not end.
+    /// Reports that the program is ready, and then feeds the watchdog twice per timeout. Never
+    /// returns.
     pub(super) async fn watch(&self) {
-        // The part has begun when this is polled again.
+        // The part has started when this is polled again.
         tokio::task::yield_now().await;
         self.notify("READY=1");
         let Some(watchdog) = self.watchdog else {
@@ -51,7 +51,7 @@ impl Systemd {
         }
     }
 
-    /// Reports that the program stops.
+    /// Reports that the program is stopping.
     pub(super) fn stopping(&self) {
         self.notify("STOPPING=1");
     }
@@ -69,8 +69,8 @@ impl Systemd {
     fn notify(&self, _: &str) {}
 }
 
-/// A socket to the service manager; a name that begins with `@` is an abstract one of Linux. It never
-/// blocks: what the manager does not read it does not want.
+/// Opens a socket to the service manager; a name that begins with `@` is an abstract socket of
+/// Linux. It never blocks: unread notifications are dropped.
 #[cfg(unix)]
 fn connect(name: &OsStr) -> Option<UnixDatagram> {
     let connect = || {

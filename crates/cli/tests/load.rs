@@ -1,6 +1,5 @@
-//! `jaus-tester load` with few components: every message is acknowledged, and nothing of it is left
-//! behind, whether it ends or is killed. It takes both processors, so nothing else runs in
-//! this program.
+//! `jaus-tester load` with few components: every message is acknowledged, and nothing remains after
+//! it ends or is killed. It uses both processors, so this program has no other tests.
 #![cfg(target_os = "linux")]
 #![expect(
     clippy::disallowed_methods,

@@ -1,18 +1,18 @@
-//! Speaking the Reference Architecture 3.2 and 3.3, JAUS as it was before the SAE standards, without
-//! I/O and without a clock.
+//! Reference Architecture 3.2 and 3.3, the JAUS version before the SAE standards, without I/O and
+//! without a clock.
 //!
-//! | part | what it knows |
+//! | part | content |
 //! |---|---|
-//! | [`Message`] | one whole message, whichever framing carried it |
+//! | [`Message`] | one complete message, independent of the framing |
 //! | [`carrier`] | datagrams: the framings "JAUS01.0" and AS5669, addresses, large messages |
-//! | [`node`] | our presence among RA systems: heartbeats, identification, configuration, services |
-//! | [`connection`] | service connections, as the one who reports and as the one who is reported to |
-//! | `convert` | which RA message stands for which of ours, and what cannot be said |
-//! | [`ids`] | which RA id stands for which of ours |
+//! | [`node`] | our presence among RA systems: heartbeats, names, configuration, services |
+//! | [`connection`] | service connections, as provider and as client |
+//! | `convert` | conversion between RA messages and ours |
+//! | [`ids`] | mapping between RA ids and ours |
 //!
-//! Ids have four octets here, [`RaId`]: subsystem, node, component and instance, where the number of
-//! a component names its type. The subsystem speaks through its *communicator* (component 35),
-//! each node through its *node manager* (component 1).
+//! RA ids have four octets, [`RaId`]: subsystem, node, component and instance; the component number
+//! names the component type. A subsystem is represented by its *communicator* (component 35), each
+//! node by its *node manager* (component 1).
 #![forbid(unsafe_code)]
 
 pub mod carrier;

@@ -1,4 +1,4 @@
-//! One whole message of the Reference Architecture.
+//! A complete message of the Reference Architecture.
 
 use std::fmt;
 
@@ -8,35 +8,35 @@ use super::RaId;
 use jaus::codec;
 use jaus::wire::ra::CODE_LEN;
 
-/// One whole message, put together if it came in parts.
+/// A complete message, reassembled if it arrived in parts.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Message {
-    /// For whom; 255 in a field stands for all.
+    /// Destination; 255 in a field addresses all.
     pub destination: RaId,
-    /// From whom: always one component.
+    /// Source: always a single component.
     pub source: RaId,
-    /// What it is: the message (command) code.
+    /// The message (command) code.
     pub code: u16,
-    /// What follows the header.
+    /// Data after the header.
     pub data: Bytes,
-    /// 0 ..= 15; 6 is the ordinary one.
+    /// 0 ..= 15; the default is 6.
     pub priority: u8,
-    /// Whether the receiver is to acknowledge it.
+    /// Whether the sender requests an acknowledgement.
     pub acknowledge: bool,
     /// Whether it belongs to a service connection.
     pub connection: bool,
-    /// Whether its code is one of those that systems agree upon among themselves.
+    /// Whether its code is experimental, defined by agreement between systems.
     pub experimental: bool,
-    /// The number that its sender gave it: of a large message that of the last part to come. Most
-    /// systems leave it at 0 but in service connections.
+    /// Sequence number set by the sender; for a large message, that of the last part to arrive.
+    /// Most systems use 0 except in service connections.
     pub sequence: u16,
 }
 
 impl Message {
-    /// The priority of ordinary messages.
+    /// Default priority.
     pub const ORDINARY: u8 = 6;
 
-    /// An ordinary message, which nobody has to acknowledge.
+    /// A message with default priority and without acknowledgement.
     #[must_use]
     pub const fn new(source: RaId, destination: RaId, code: u16, data: Bytes) -> Self {
         Self {
@@ -52,7 +52,7 @@ impl Message {
         }
     }
 
-    /// An ordinary message with this body.
+    /// A message with default priority and this body.
     ///
     /// # Errors
     /// A body outside the limits of its definition.
@@ -65,15 +65,15 @@ impl Message {
         Ok(Self::new(source, destination, M::CODE, data))
     }
 
-    /// The body, if it is one of that type.
+    /// Decodes the body as type `M`.
     ///
     /// # Errors
-    /// Another code, or data that is none of its type.
+    /// A different code, or data that does not decode.
     pub fn body<M: codec::Message>(&self) -> Result<M, codec::DecodeError> {
         M::decode(&self.payload())
     }
 
-    /// Code and data in one, as all our codecs have it.
+    /// Code and data in one payload, as our codecs expect it.
     #[must_use]
     pub fn payload(&self) -> Bytes {
         let mut payload = Vec::with_capacity(CODE_LEN + self.data.len());
@@ -82,7 +82,7 @@ impl Message {
         payload.into()
     }
 
-    /// An answer to this message: from the id that was addressed, to the one that asked.
+    /// A reply to this message: from the addressed id to the sender.
     #[must_use]
     pub const fn answer(&self, code: u16, data: Bytes) -> Self {
         let mut answer = Self::new(self.destination, self.source, code, data);

@@ -1,32 +1,30 @@
-//! Where the evidence lies: what others have said and written, against which tests hold what we say
-//! and write.
+//! Locates recorded evidence: messages and captures of other stacks, for comparison with ours.
 //!
-//! Most of it is in the repository, under `tests/evidence`, and is always there. What may not be
-//! passed on lies in the folder that `JAUS_SHARED` names (`../shared` beside the repository, if it
-//! is not set). A test whose evidence is missing says so past the test harness, with a count, and
-//! fails where `JAUS_EVIDENCE=required` is set.
+//! Most of it is in the repository, under `tests/evidence`, and always available. Evidence that
+//! must not be redistributed is in the folder that `JAUS_SHARED` names (by default `../shared`
+//! beside the repository). A test without its evidence reports this outside the test harness, with
+//! a count, and fails if `JAUS_EVIDENCE=required` is set.
 
 use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The messages that the encoders of the JAUS Tool Set have written, `*.jsonl`.
+/// Messages written by the encoders of the JAUS Tool Set, `*.jsonl`.
 #[must_use]
 pub fn golden() -> &'static Path {
     Path::new(concat!(env!("OUT_DIR"), "/golden"))
 }
 
-/// The recordings of Junior, JAUS++ and OpenJAUS, in the folders `junior`, `jauspp` and
-/// `openjaus33`.
+/// Captures of Junior, JAUS++ and OpenJAUS, in the folders `junior`, `jauspp` and `openjaus33`.
 #[must_use]
 pub fn captures() -> &'static Path {
     Path::new(concat!(env!("OUT_DIR"), "/captures"))
 }
 
-/// A recording by its folder and name, in the repository or [outside] it.
+/// A capture by folder and name, in the repository or [outside] it.
 ///
 /// # Panics
-/// If it is in neither and `JAUS_EVIDENCE=required` is set.
+/// If it is missing and `JAUS_EVIDENCE=required` is set.
 #[must_use]
 pub fn capture(file: &str) -> Option<PathBuf> {
     let kept = captures().join(file);
@@ -36,11 +34,11 @@ pub fn capture(file: &str) -> Option<PathBuf> {
     outside(&format!("captures/{file}"))
 }
 
-/// A file or folder of the evidence that is not in the repository, such as `jsidl-corpus`. Without it
-/// the test proves nothing, and is to return.
+/// A file or folder of evidence outside the repository, such as `jsidl-corpus`. Without it the test
+/// proves nothing and must return.
 ///
 /// # Panics
-/// If it is not there and `JAUS_EVIDENCE=required` is set.
+/// If it is missing and `JAUS_EVIDENCE=required` is set.
 #[must_use]
 pub fn outside(part: &str) -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
@@ -58,8 +56,8 @@ pub fn outside(part: &str) -> Option<PathBuf> {
     None
 }
 
-/// Says that a test proves nothing here, past the test harness, which keeps the words of a test that
-/// passes; and how many did not in all, since `cargo test` began.
+/// Reports that a test proves nothing, outside the test harness, which hides the output of passing
+/// tests, with the number of such tests since `cargo test` began.
 ///
 /// # Panics
 /// If `JAUS_EVIDENCE=required` is set.
@@ -68,12 +66,12 @@ pub fn not_tested(test: &str, reason: &str) {
     assert!(!required, "{test} has to run here: {reason}");
     let count = count_not_tested().map_or_else(String::new, |count| format!(" ({count} so far)"));
     let words = format!("\n*** NOT TESTED{count}: {test}: {reason}\n\n");
-    // Where nothing can be printed, the other tests still count.
+    // If printing fails, the other tests still count.
     let _ = std::io::stderr().lock().write_all(words.as_bytes());
 }
 
-/// One more test, of all programs that the same `cargo test` has started: they have their parent in
-/// common.
+/// Counts one more test, over all programs of the same `cargo test`: they share their parent
+/// process.
 fn count_not_tested() -> Option<u64> {
     let name = format!("jaus-not-tested-{}", parent_id());
     let path = std::env::temp_dir().join(name);
@@ -84,7 +82,7 @@ fn count_not_tested() -> Option<u64> {
         .read(true)
         .open(path)
         .ok()?;
-    // An octet for each.
+    // One octet per test.
     file.write_all(b".").ok()?;
     Some(file.metadata().ok()?.len())
 }

@@ -1,5 +1,4 @@
-//! A multicast group for one test, so that what runs beside it is not heard: discovery asks
-//! strangers, too.
+//! A multicast group per test, so that simultaneous tests do not discover each other.
 #![allow(
     clippy::disallowed_types,
     reason = "the operating system knows which ports are free"
@@ -9,7 +8,7 @@ use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 
 use jaus::link::Group;
 
-/// A group at a port that nobody has.
+/// A group at a free port.
 pub fn own_group() -> Group {
     let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
     let port = socket.local_addr().unwrap().port();

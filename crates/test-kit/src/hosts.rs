@@ -1,4 +1,4 @@
-//! Test hosts: network namespaces, and processes that play nodes in them.
+//! Test hosts: network namespaces, and processes that run test nodes in them.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -8,20 +8,20 @@ use std::time::{Duration, Instant};
 
 use crate::evidence::not_tested;
 
-/// Longer than anything takes; reached only when a test fails.
+/// Timeout of every operation; reached only in a failing test.
 const LIMIT: Duration = Duration::from_secs(30);
 
-/// Set for a process that plays a node; says which.
+/// Role of a test node's process.
 const ROLE: &str = "JAUS_TEST_ROLE";
 
-/// Set for a process that plays a node with other settings than the usual.
+/// Nondefault settings of a test node's process.
 pub const SETTINGS: &str = "JAUS_TEST_SETTINGS";
 
-/// Set for a test that was started again in a user namespace.
+/// Set for a test that was restarted in a user namespace.
 const INSIDE: &str = "JAUS_TEST_IN_USER_NAMESPACE";
 
-/// Runs a test's body on hosts: made here; or else in a user namespace, where this test binary is
-/// started again for the same test; or [not at all](not_tested).
+/// Runs a test's body on hosts: created here; otherwise in a user namespace, where this test binary
+/// is restarted for the same test; otherwise [not at all](not_tested).
 pub fn on_hosts<H>(test: &str, make: impl FnOnce() -> Result<H, String>, body: impl FnOnce(&H)) {
     let reason = match make() {
         Ok(hosts) => {
@@ -51,7 +51,7 @@ pub fn on_hosts<H>(test: &str, make: impl FnOnce() -> Result<H, String>, body: i
     );
 }
 
-/// A command as root of namespaces of its own, which a plain user may often be.
+/// A command as root in its own namespaces, which many systems permit to any user.
 fn in_user_namespace(command: &[&str]) -> Command {
     let mut unshare = Command::new("unshare");
     unshare
@@ -65,15 +65,15 @@ fn in_user_namespace(command: &[&str]) -> Command {
 /// Runs `ip` with these arguments.
 ///
 /// # Errors
-/// What it printed, if it failed.
+/// The output, if it failed.
 pub fn ip(arguments: &[&str]) -> Result<(), String> {
     run("ip", arguments)
 }
 
-/// Runs a program to its end.
+/// Runs a program to completion.
 ///
 /// # Errors
-/// What it printed, if it failed.
+/// The output, if it failed.
 pub fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
     let output = Command::new(program).args(arguments).output();
     let output = output.map_err(|e| format!("{program}: {e}"))?;
@@ -85,7 +85,7 @@ pub fn run(program: &str, arguments: &[&str]) -> Result<(), String> {
     }
 }
 
-/// Two network namespaces, joined by a cable; gone when dropped.
+/// Two network namespaces joined by a cable; removed when dropped.
 pub struct TwoHosts {
     /// The names of the namespaces.
     pub names: [String; 2],
@@ -109,12 +109,12 @@ impl TwoHosts {
         self.connect("jaus0", "10.213.77")
     }
 
-    /// Lays a cable between the hosts, with addresses .1 and .2 of the network.
+    /// Connects the hosts with a cable, with addresses .1 and .2 of the network.
     pub fn connect(&self, cable: &str, network: &str) -> Result<(), String> {
         lay_cable(&self.names, cable, network)
     }
 
-    /// The link-local IPv6 address of an interface, as the other end of the cable writes it.
+    /// The link-local IPv6 address of an interface, as written on the other end of the cable.
     pub fn link_local(&self, host: usize, cable: &str) -> String {
         let shown = [
             "-n",
@@ -134,7 +134,7 @@ impl TwoHosts {
         format!("{}%{cable}", address.unwrap())
     }
 
-    /// Waits until both hosts are sure of their IPv6 addresses, which takes a second or two.
+    /// Waits for duplicate address detection of both hosts' IPv6 addresses: a second or two.
     pub fn wait_for_addresses(&self) {
         let deadline = Instant::now() + LIMIT;
         for name in &self.names {
@@ -157,7 +157,7 @@ impl TwoHosts {
         ip(&[&["-n", &self.names[host]], arguments].concat()).unwrap();
     }
 
-    /// Starts this test binary in the role of a node on one of the two hosts.
+    /// Starts this test binary in a node's role on one of the two hosts.
     pub fn start(&self, host: usize, role: &str) -> Process {
         self.start_with(host, role, "")
     }
@@ -171,19 +171,19 @@ impl TwoHosts {
 impl Drop for TwoHosts {
     fn drop(&mut self) {
         for name in &self.names {
-            // Not there if setting up failed half-way.
+            // Missing if the setup failed halfway.
             let _ = ip(&["netns", "delete", name]);
         }
     }
 }
 
-/// Makes a host: a network namespace of this name.
+/// Creates a host: a network namespace of this name.
 pub fn add_host(name: &str) -> Result<(), String> {
     ip(&["netns", "add", name])?;
     ip(&["-n", name, "link", "set", "lo", "up"])
 }
 
-/// Lays a cable between two hosts, with addresses .1 and .2 of the network.
+/// Connects two hosts with a cable, with addresses .1 and .2 of the network.
 pub fn lay_cable(hosts: &[String; 2], cable: &str, network: &str) -> Result<(), String> {
     let [a, b] = hosts;
     ip(&[
@@ -197,19 +197,19 @@ pub fn lay_cable(hosts: &[String; 2], cable: &str, network: &str) -> Result<(), 
     Ok(())
 }
 
-/// Runs a test's body on two hosts, or says loudly that it cannot.
+/// Runs a test's body on two hosts, or reports that this is impossible.
 pub fn on_two_hosts(test: &str, body: impl FnOnce(&TwoHosts)) {
     on_hosts(test, TwoHosts::new, body);
 }
 
-/// A node in a process of its own; killed when dropped.
+/// A node in its own process; killed when dropped.
 pub struct Process {
     child: Child,
     lines: Receiver<String>,
 }
 
 impl Process {
-    /// Starts this test binary in a role on a host, with settings for it.
+    /// Starts this test binary in a role on a host, with settings.
     pub fn start(host: &str, role: &str, settings: &str) -> Self {
         let mut child = Command::new("ip")
             .args(["netns", "exec", host])
@@ -244,7 +244,7 @@ impl Process {
         assert!(sent.unwrap().success(), "{name} to {id}");
     }
 
-    /// Waits until the process prints a line that begins so, and gives the rest of it.
+    /// Waits until the process prints a line with this beginning; returns the rest.
     pub fn says(&self, beginning: &str) -> String {
         let deadline = Instant::now() + LIMIT;
         loop {
@@ -268,11 +268,11 @@ impl Drop for Process {
     }
 }
 
-/// Says how many seconds a test by hand takes in all.
+/// Duration of a manual test, in seconds.
 pub const SOAK: &str = "JAUS_SOAK_SECONDS";
 
-/// Plays the role that this process was started in, if it was in any: not for ever, should the test
-/// that waits for it be killed.
+/// Plays the role of this process, if it has one; for a limited time, in case the waiting test is
+/// killed.
 pub fn play(part: impl AsyncFnOnce(&str)) {
     let Ok(role) = std::env::var(ROLE) else {
         return;

@@ -1,4 +1,4 @@
-//! What the tests of the workspace share: evidence, hosts in network namespaces, processes, peers.
+//! Shared parts of the workspace's tests: evidence, hosts in network namespaces, processes, peers.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

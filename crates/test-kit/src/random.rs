@@ -1,13 +1,13 @@
-//! Numbers that look random and follow from a seed.
+//! Seeded pseudorandom numbers.
 
 use std::ops::Range;
 use std::time::Duration;
 
-/// A small generator of numbers that look random (SplitMix64).
+/// A small pseudorandom number generator (SplitMix64).
 pub struct Random(u64);
 
 impl Random {
-    /// The generator of a seed.
+    /// A generator with this seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
@@ -26,12 +26,12 @@ impl Random {
         (self.number() % end as u64) as usize
     }
 
-    /// One of several.
+    /// One of the choices.
     pub fn choose<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[self.below(choices.len())]
     }
 
-    /// True `of_1000` times of 1000.
+    /// True with a probability of `of_1000` in 1000.
     pub fn happens(&mut self, of_1000: u32) -> bool {
         self.number() % 1000 < u64::from(of_1000)
     }
@@ -42,7 +42,7 @@ impl Random {
         range.start + Duration::from_nanos(self.number() % spread)
     }
 
-    /// A time of up to so many milliseconds.
+    /// A time of up to `millis` milliseconds.
     pub fn up_to_millis(&mut self, millis: u64) -> Duration {
         self.between(&(Duration::ZERO..Duration::from_millis(millis.max(1))))
     }

@@ -1,7 +1,8 @@
-//! An RA vehicle as OpenJAUS 3.3.1's simulator behaves: it reports by service connections, obeys the
-//! component in control, and anybody while there is none. It keeps the last effort, and drives with it
-//! as long as its controller reports ready or standby over a service connection. It keeps the last
-//! speed, and drives with it in any case. It does not tell who controls it.
+//! Simulated RA vehicle with the behaviour of OpenJAUS 3.3.1's simulator: it reports by service
+//! connections and obeys the component in control, or any component while there is none. It keeps
+//! the last effort and applies it as long as its controller reports ready or standby over a service
+//! connection. It keeps the last speed and applies it in any case. It does not report its
+//! controller.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -14,10 +15,10 @@ pub const SUBSYSTEM: u8 = 20;
 /// Its primitive driver.
 pub const DRIVER: RaId = RaId::new(SUBSYSTEM, 1, 33, 1);
 
-/// A global pose of a running OpenJAUS 3.3.1.
+/// A global pose from OpenJAUS 3.3.1.
 pub const GLOBAL_POSE: &str = "ff00eb0eed3425c8ccc63a8ee3b8295c8f020000000000401304";
 
-/// The octets that hexadecimal digits stand for.
+/// Decodes hexadecimal digits.
 #[must_use]
 pub fn bytes(hex: &str) -> Bytes {
     let octet = |at: usize| u8::from_str_radix(&hex[at..at + 2], 16).unwrap();
@@ -39,34 +40,34 @@ pub fn datagram(source: RaId, destination: RaId, code: u16, data: &[u8]) -> Byte
     datagram.freeze()
 }
 
-/// The vehicle's state; sans-IO.
+/// The vehicle's state, without I/O.
 #[derive(Default)]
 pub struct Rover {
     /// The component in control, and its authority.
     pub controller: Option<(RaId, u8)>,
-    /// Wrench efforts of the controller.
+    /// Received wrench efforts.
     pub efforts: Vec<Bytes>,
-    /// Waypoints in the order in which they came, as OpenJAUS keeps them.
+    /// Waypoints in order of arrival, as OpenJAUS stores them.
     pub waypoints: Vec<Bytes>,
-    /// Speeds of travel.
+    /// Received travel speeds.
     pub speeds: Vec<Bytes>,
-    /// Rates that were asked for, by report.
+    /// Requested rates by report.
     pub connections: BTreeMap<u16, f64>,
     streams: BTreeMap<u16, Stream>,
-    /// Whether it answers no queries for poses, velocities and waypoints.
+    /// Whether it ignores queries for poses, velocities and waypoints.
     pub mute: bool,
-    /// What its controller says of itself.
+    /// Whether its controller reports ready.
     pub controller_ready: bool,
-    /// Whether it reports who controls it, as RA systems other than OpenJAUS do.
+    /// Whether it reports its controller, as RA systems other than OpenJAUS do.
     pub reports_control: bool,
-    /// When its controller said last that it is ready or in standby.
+    /// Time of the controller's last report of ready or standby.
     controller_heard: Option<Instant>,
     next_connection: Option<Instant>,
-    /// The component that is controlled.
+    /// The controlled component.
     driver: Option<RaId>,
-    /// Vectors.
+    /// Received vectors.
     pub vectors: Vec<Bytes>,
-    /// Its primary state, as Report Component Status gives it.
+    /// Its primary status, as in Report Component Status.
     pub state: u8,
     said: Vec<Message>,
 }
@@ -78,7 +79,7 @@ struct Stream {
 }
 
 impl Rover {
-    /// A vehicle in standby, without a controller.
+    /// A vehicle in standby without a controller.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -87,10 +88,10 @@ impl Rover {
         }
     }
 
-    /// For so long it drives on when its controller does not say that it is ready.
+    /// It stops this long after the controller's last report of ready or standby.
     const CONTROLLER_TIMEOUT: Duration = Duration::from_millis(1500);
 
-    /// Whether it drives now.
+    /// Whether it moves now.
     #[must_use]
     pub fn drives(&self, now: Instant) -> bool {
         let heard = self.controller_heard.filter(|_| self.controller.is_some());
@@ -98,7 +99,7 @@ impl Rover {
         let pushes = |effort: &Bytes| effort[0] & 1 != 0 && effort[2..4] != [0, 0];
         let effort = is_ready && self.efforts.last().is_some_and(pushes);
         let is_fast = |speed: &Bytes| speed[..2] != [0, 0];
-        // The least of the integer is no speed.
+        // The least integer means no speed.
         let is_vector = |vector: &Bytes| vector[..4] != [1, 0, 0, 0x80];
         effort
             || self.speeds.last().is_some_and(is_fast)
@@ -167,7 +168,7 @@ impl Rover {
         match report {
             0x4002 => Bytes::from(vec![self.state, 0, 0, 0, 0]),
             0x4402 => bytes(GLOBAL_POSE),
-            // A little more than 1.5 m/s forward.
+            // Slightly more than 1.5 m/s forward.
             0x4404 => bytes("ff00fb8401000000000000000000b98d06000000000000000000"),
             _ => bytes("ff000000000000000000000000000000"),
         }
@@ -216,7 +217,7 @@ impl Rover {
         self.connect_to(message.destination, from);
     }
 
-    /// It wants to know that its controller is ready, five times a second.
+    /// Requests its controller's status five times a second.
     fn connect_to(&mut self, own: RaId, controller: RaId) {
         let body = bytes("02402c0100000000");
         let mut connect = Message::new(own, controller, 0x0008, body);
@@ -235,7 +236,7 @@ impl Rover {
         self.next_connection = None;
     }
 
-    /// Somebody else takes control.
+    /// Another client takes control.
     pub fn lose_controller(&mut self) {
         if let Some((id, _)) = self.controller.take() {
             self.said
@@ -243,7 +244,7 @@ impl Rover {
         }
     }
 
-    /// Sends what is due.
+    /// Sends all due messages.
     pub fn handle_timeout(&mut self, now: Instant) {
         if let Some((id, _)) = self.controller
             && self.next_connection.is_some_and(|due| due <= now)

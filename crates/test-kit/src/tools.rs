@@ -1,11 +1,11 @@
-//! What tests use of this machine: the files of the workspace, and programs that it may not have.
+//! Workspace files, and optional programs of this machine.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::evidence::not_tested;
 
-/// The path of a file of the workspace, given from its top level.
+/// The path of a workspace file, relative to the top level.
 #[must_use]
 pub fn workspace(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -13,10 +13,10 @@ pub fn workspace(path: &str) -> PathBuf {
         .join(path)
 }
 
-/// Whether there is a `tshark`. Without it the test proves nothing, and is to return.
+/// Whether `tshark` is installed. Without it the test proves nothing and must return.
 ///
 /// # Panics
-/// If there is none and `JAUS_EVIDENCE=required` is set.
+/// If it is missing and `JAUS_EVIDENCE=required` is set.
 #[must_use]
 pub fn has_tshark() -> bool {
     let there = Command::new("tshark").arg("--version").output().is_ok();

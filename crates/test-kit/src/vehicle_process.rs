@@ -1,4 +1,4 @@
-//! `jaus vehicle` in a process of its own.
+//! `jaus vehicle` as a process of its own.
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -12,7 +12,7 @@ pub struct VehicleProcess {
 }
 
 impl VehicleProcess {
-    /// Starts what the command says, and waits until the vehicle is there.
+    /// Starts the command, and waits for the vehicle's introduction.
     pub fn start(command: &mut Command) -> Self {
         let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut stdout = BufReader::new(child.stdout.take().unwrap());
@@ -25,7 +25,7 @@ impl VehicleProcess {
             let read = stdout.read_line(&mut introduction).unwrap();
             assert_ne!(read, 0, "the vehicle has ended: {introduction}");
         }
-        // It may go on talking.
+        // The vehicle may print more lines.
         let lines = move || stdout.lines().map_while(Result::ok).collect();
         vehicle.reader = Some(std::thread::spawn(lines));
         vehicle
@@ -43,7 +43,7 @@ impl VehicleProcess {
         assert!(sent.unwrap().success(), "{name} to {id}");
     }
 
-    /// Ends it by SIGTERM; what it has printed since its introduction.
+    /// Stops it by SIGTERM; returns its output after the introduction.
     pub fn terminate(mut self) -> Vec<String> {
         self.signal("TERM");
         let lines = self.reader.take().unwrap().join().unwrap();

@@ -1,8 +1,9 @@
-//! Drawings of a merged machine: text for Graphviz and for Mermaid.
+//! Draws merged state machines for Graphviz and Mermaid.
 //!
-//! Both say the same. An arrow is a change of state, labelled `event [guard] / actions`; what is
-//! done without a change stands inside the state. To keep labels short, names lose their
-//! qualification and calls the parameters of the event, which are the same everywhere.
+//! Both outputs have the same content. An arrow is a change of state, labelled
+//! `event [guard] / actions`; internal actions are listed inside the state. To keep labels short,
+//! names lose their qualification, and calls lose the event's parameters, which are the same
+//! everywhere.
 
 use std::fmt::Write;
 
@@ -11,8 +12,7 @@ use super::{
     TransitionKind,
 };
 
-/// The machine as a graph in the language DOT, for `dot -Tsvg`. States with others inside are
-/// clusters.
+/// The machine as a graph in the language DOT, for `dot -Tsvg`. Composite states are clusters.
 pub fn dot(machine: &Machine<'_>) -> String {
     let mut out =
         String::from("digraph machine {\n    compound=true;\n    newrank=true;\n    rankdir=LR;\n");
@@ -59,12 +59,12 @@ fn dot_state(out: &mut String, machine: &Machine<'_>, index: StateIndex, depth: 
     let _ = writeln!(out, "{indent}}}");
 }
 
-/// A text between quotation marks in DOT.
+/// Escapes a text for a quoted DOT string.
 fn dot_text(text: &str) -> String {
     text.replace('\\', "\\\\").replace('"', "\\\"")
 }
 
-/// The machine as a Mermaid `stateDiagram-v2`. What a state does without a change is a note.
+/// The machine as a Mermaid `stateDiagram-v2`. Internal actions of a state are a note.
 pub fn mermaid(machine: &Machine<'_>) -> String {
     let mut out = String::from("stateDiagram-v2\n");
     let _ = writeln!(out, "    [*] --> {}", id(machine.start()));
@@ -111,8 +111,9 @@ fn mermaid_state(out: &mut String, machine: &Machine<'_>, index: StateIndex, dep
     let _ = writeln!(out, "{indent}}}");
 }
 
-/// Where an arrow begins. None of the programs can draw one from a state to another inside it: it
-/// is drawn from each state there that holds no others, unless one that comes first is always taken.
+/// The states where an arrow begins. Neither program can draw an arrow from a state to one of its
+/// substates: it is drawn from each of its leaf states, except where an earlier transition is
+/// always taken.
 fn tails(machine: &Machine<'_>, arrow: &Arrow<'_>) -> Vec<StateIndex> {
     if !within(machine, arrow.to, arrow.from) {
         return vec![arrow.from];
@@ -129,13 +130,13 @@ fn tails(machine: &Machine<'_>, arrow: &Arrow<'_>) -> Vec<StateIndex> {
     leaves.map(|(index, _)| index).collect()
 }
 
-/// Whether a state is another one or lies within it.
+/// Whether a state is `outer` or lies within it.
 fn within(machine: &Machine<'_>, inner: StateIndex, outer: StateIndex) -> bool {
     let around = |index: &StateIndex| machine.state(*index).parent;
     std::iter::successors(Some(inner), around).any(|index| index == outer)
 }
 
-/// Characters that mean something to Mermaid, as numbers.
+/// Replaces Mermaid's special characters by their codes.
 fn mermaid_text(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
@@ -148,7 +149,7 @@ fn mermaid_text(text: &str) -> String {
     escaped
 }
 
-/// A state's name in a drawing. Names of the definition need not be unique.
+/// Identifier of a state in a drawing. Names of the definition need not be unique.
 fn id(index: StateIndex) -> String {
     format!("s{}", index.number())
 }
@@ -160,8 +161,8 @@ struct Arrow<'a> {
     transition: &'a Transition,
 }
 
-/// All changes of state, in the order of the states. Where a `pop` leads only the past knows: it
-/// stands [inside](inside) the state.
+/// All changes of state, in the order of the states. The target of a `pop` depends on the history:
+/// it is listed [inside](inside) the state.
 fn arrows<'a>(machine: &Machine<'a>) -> Vec<Arrow<'a>> {
     let mut arrows = Vec::new();
     for (from, _) in machine.states() {
@@ -181,7 +182,7 @@ fn arrows<'a>(machine: &Machine<'a>) -> Vec<Arrow<'a>> {
     arrows
 }
 
-/// What is done on entry, on exit and without a change of state, a line each.
+/// Entry, exit and internal actions of a state, one per line.
 fn inside(machine: &Machine<'_>, index: StateIndex) -> Vec<String> {
     let state = machine.state(index);
     let effect = |word: &str, declared: &[Declared<'_, Action>]| {
@@ -238,7 +239,7 @@ fn action(action: &Action) -> String {
     shortened(&call).to_string()
 }
 
-/// A guard whose calls are shortened.
+/// A guard with shortened calls.
 fn short(guard: &Guard) -> Guard {
     let inner = |guard: &Guard| Box::new(short(guard));
     match guard {

@@ -1,8 +1,8 @@
 //! Guards: the conditions under which transitions are taken, for example
 //! `isSupported(msg) && ! eventExists(msg)`.
 //!
-//! Published guards are made of calls, `&&`, `||`, `!` and parentheses. Comparisons, which the
-//! reference tool set reads as well, are understood too.
+//! Published guards consist of calls, `&&`, `||`, `!` and parentheses. Comparisons are supported
+//! too, as in the reference tool set.
 
 use std::fmt;
 
@@ -17,22 +17,21 @@ use nom::{Finish, IResult, Parser};
 
 use super::Name;
 
-/// Longer guards are refused, which bounds the depth of the tree; published ones have up to 162
-/// characters.
+/// Maximum length, which bounds the depth of the tree; published guards have up to 162 characters.
 const LONGEST: usize = 1_000;
 
-/// Parentheses and negations within each other.
+/// Maximum nesting of parentheses and negations.
 const DEEPEST: usize = 16;
 
-/// The condition of a transition. Displayed with as few parentheses as possible, and the text
-/// reads back as the same guard.
+/// The condition of a transition. Displayed with as few parentheses as possible, in a form that
+/// parses to the same guard.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Guard {
-    /// A name alone, for example a parameter in a comparison.
+    /// A bare name, for example a parameter in a comparison.
     Name(Name),
-    /// A question to the service, for example `isControllingClient(transportData)`.
+    /// A call of the service, for example `isControllingClient(transportData)`.
     Call(Call),
-    /// A quoted text or an integer, as written but for the quotes; only sensible in a comparison.
+    /// A quoted text or an integer, as written without quotes; only useful in a comparison.
     Literal(Argument),
     /// `!`
     Not(Box<Self>),
@@ -44,21 +43,21 @@ pub enum Guard {
     Compare(Comparison, Box<Self>, Box<Self>),
 }
 
-/// A question that a guard puts to the service.
+/// A guard's call of the service.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Call {
-    /// Qualified by the aliases of the services on the way to the one that answers it.
+    /// Qualified by the aliases of the services up to the one that implements it.
     pub name: Name,
-    /// What it is asked about.
+    /// Arguments of the call.
     pub arguments: Vec<Argument>,
 }
 
-/// What an action or a guard's question is given.
+/// An argument of an action or of a guard's call.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Argument {
     /// A parameter of the transition, for example `msg` or `transportData`.
     Variable(Name),
-    /// A quoted text, blanks around it and the quotes left out.
+    /// A quoted text, without the quotes and surrounding blanks.
     Text(String),
     /// A decimal integer, as written.
     Integer(String),
@@ -78,16 +77,16 @@ pub enum Comparison {
 }
 
 impl Guard {
-    /// Reads a whole text.
+    /// Parses a whole text.
     ///
     /// # Errors
-    /// A phrase that says what is wrong, to follow a colon.
+    /// A phrase that describes the mistake, to follow a colon.
     pub fn parse(text: &str) -> Result<Self, String> {
         whole(text, |input| disjunction(input, 0))
     }
 
-    /// Whether the guard holds, when `ask` answers its names, calls, literals and comparisons.
-    /// Questions that do not matter any more are not asked.
+    /// Whether the guard holds; `ask` evaluates names, calls, literals and comparisons. Evaluation
+    /// short-circuits.
     pub fn holds(&self, ask: &mut impl FnMut(&Self) -> bool) -> bool {
         match self {
             Self::Not(inner) => !inner.holds(ask),
@@ -97,7 +96,7 @@ impl Guard {
         }
     }
 
-    /// How tightly it binds: an operand that binds less than its place asks for needs parentheses.
+    /// Precedence: an operand with a lower rank than its position requires gets parentheses.
     const fn rank(&self) -> u8 {
         match self {
             Self::Or(..) => 0,
@@ -118,15 +117,15 @@ impl Guard {
 }
 
 impl Argument {
-    /// Reads a whole text.
+    /// Parses a whole text.
     ///
     /// # Errors
-    /// A phrase that says what is wrong, to follow a colon.
+    /// A phrase that describes the mistake, to follow a colon.
     pub fn parse(text: &str) -> Result<Self, String> {
         whole(text, argument)
     }
 
-    /// The text between the quotes, if it is one.
+    /// The text between the quotes, if it is a text.
     pub fn text(&self) -> Option<&str> {
         match self {
             Self::Text(text) => Some(text),
@@ -149,7 +148,7 @@ impl fmt::Display for Guard {
             Self::Or(left, right) => (left, "||", right),
             Self::Compare(comparison, left, right) => (left, comparison.sign(), right),
         };
-        // Chains are read from left to right; comparisons do not form chains.
+        // Chains are parsed from left to right; comparisons cannot be chained.
         let chain = !matches!(self, Self::Compare(..));
         left.show(self.rank() + u8::from(!chain), f)?;
         write!(f, " {sign} ")?;
@@ -179,7 +178,7 @@ impl fmt::Display for Argument {
 }
 
 impl Comparison {
-    /// As it is written.
+    /// The operator as written.
     pub const fn sign(self) -> &'static str {
         match self {
             Self::Equal => "==",
@@ -190,7 +189,7 @@ impl Comparison {
     }
 }
 
-/// Reads all of a text with one rule of the grammar.
+/// Parses a whole text with one rule of the grammar.
 fn whole<'a, T>(text: &'a str, rule: impl Fn(&'a str) -> IResult<&'a str, T>) -> Result<T, String> {
     if text.len() > LONGEST {
         return Err(format!("it is longer than {LONGEST} characters"));
@@ -214,7 +213,7 @@ fn conjunction(input: &str, depth: usize) -> IResult<&str, Guard> {
     chain(input, depth, "&&", comparison, Guard::And)
 }
 
-/// Operands joined by one operator, from left to right.
+/// Parses operands joined by one operator, from left to right.
 fn chain<'a>(
     input: &'a str,
     depth: usize,
@@ -274,7 +273,7 @@ fn operand(input: &str, depth: usize) -> IResult<&str, Guard> {
     .parse(input)
 }
 
-/// A name, or a call if parentheses follow.
+/// Parses a name, or a call if parentheses follow.
 fn named(input: &str) -> IResult<&str, Guard> {
     let arguments = delimited(
         (multispace0, char('('), multispace0),
@@ -307,7 +306,7 @@ fn argument(input: &str) -> IResult<&str, Argument> {
     .parse(input)
 }
 
-/// Identifiers joined by dots.
+/// Parses identifiers joined by dots.
 pub(super) fn name(input: &str) -> IResult<&str, Name> {
     let identifier = || {
         recognize(pair(

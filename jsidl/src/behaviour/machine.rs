@@ -1,11 +1,10 @@
-//! A whole state machine: what a service and those it inherits from say about it, merged.
+//! Merged state machine of a service and its bases.
 //!
-//! States with the same path are the same state, whoever writes them down; the case of letters is
-//! passed over, because published definitions are not consistent in it. Every transition and
-//! action remembers the service that declares it, which decides which transition comes first:
-//! those of the most derived service before those of its bases, within a service those of the
-//! innermost state before those around it, and only then, in the same order, those of default
-//! states. This is the order in which the public JAUS Tool Set tries them.
+//! States with the same path are the same state in all services; letter case is ignored, because
+//! published definitions are inconsistent. Every transition and action keeps its declaring service,
+//! which determines the order of transitions: the most derived service before its bases, within a
+//! service the innermost state before the outer ones, and default states last, in the same order.
+//! The public JAUS Tool Set uses this order.
 
 use std::collections::HashMap;
 
@@ -13,12 +12,12 @@ use super::{Action, Guard, Name, State, StateMachine, Transition, TransitionKind
 use crate::library::Library;
 use crate::model::Service;
 
-/// Which state of a [`Machine`]; only meaningful for the machine that gave it out.
+/// Index of a state of a [`Machine`]; only meaningful for the machine that returned it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StateIndex(usize);
 
 impl StateIndex {
-    /// Its place among the [states](Machine::states) of the machine, from 0.
+    /// Its position among the [states](Machine::states) of the machine, from 0.
     pub const fn number(self) -> usize {
         self.0
     }
@@ -34,41 +33,41 @@ pub struct Machine<'a> {
     paths: HashMap<String, StateIndex>,
 }
 
-/// A state of a [`Machine`], with what all services say about it, the most derived first.
+/// A state of a [`Machine`], with the declarations of all services, the most derived first.
 #[derive(Debug, Clone)]
 pub struct MachineState<'a> {
     /// From the outermost state inwards.
     pub path: Name,
-    /// The state around it.
+    /// The enclosing state.
     pub parent: Option<StateIndex>,
-    /// The state within that is entered first; of a composite state never `None`.
+    /// The substate that is entered first; never `None` in a composite state.
     pub initial: Option<StateIndex>,
-    /// What the most derived service that names an initial state calls it.
+    /// The initial state named by the most derived service that names one.
     pub(crate) wanted_initial: Option<&'a str>,
-    /// The states within.
+    /// The substates.
     pub children: Vec<StateIndex>,
-    /// What is done when it is entered.
+    /// Actions on entry.
     pub entry: Vec<Declared<'a, Action>>,
-    /// What is done when it is left.
+    /// Actions on exit.
     pub exit: Vec<Declared<'a, Action>>,
-    /// Transitions that may be taken while it is active.
+    /// Transitions that can be taken while it is active.
     pub transitions: Vec<Declared<'a, Transition>>,
     /// Transitions that are tried when no other can be taken.
     pub default_transitions: Vec<Declared<'a, Transition>>,
 }
 
-/// Something that a service says about a state.
+/// A declaration about a state, with its service.
 #[derive(Debug)]
 pub struct Declared<'a, T> {
-    /// The service that says it.
+    /// The declaring service.
     pub service: &'a Service,
-    /// What it says.
+    /// The declaration.
     pub item: &'a T,
-    /// Steps of inheritance up to the service.
+    /// Inheritance distance to the service.
     distance: usize,
 }
 
-// Derived, these would ask that what is said can be copied, where only the reference is.
+// A derived `Clone` would require `T: Clone`, although only the reference is copied.
 impl<T> Clone for Declared<'_, T> {
     fn clone(&self) -> Self {
         *self
@@ -77,12 +76,12 @@ impl<T> Clone for Declared<'_, T> {
 
 impl<T> Copy for Declared<'_, T> {}
 
-/// Something that happens to a machine.
+/// An event for a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stimulus<'s> {
     /// The event's name, unqualified, for example `Receive`.
     pub event: &'s str,
-    /// The name of the message that it brings, if any.
+    /// The name of the received message, if any.
     pub message: Option<&'s str>,
 }
 
@@ -103,7 +102,7 @@ impl<'s> Stimulus<'s> {
         }
     }
 
-    /// What a transition waits for.
+    /// The stimulus that triggers a transition.
     pub fn of(transition: &'s Transition) -> Self {
         Self {
             event: transition.trigger.event.last(),
@@ -116,7 +115,7 @@ impl<'s> Stimulus<'s> {
         let same_message = match (self.message, trigger.message()) {
             (Some(message), Some(named)) => named.eq_ignore_ascii_case(message),
             (None, None) => true,
-            // The transport's own machine takes every envelope; that is no answer to a message.
+            // The transport's own machine accepts every envelope; that is no reaction to a message.
             _ => false,
         };
         same_message && trigger.event.last().eq_ignore_ascii_case(self.event)
@@ -124,28 +123,28 @@ impl<'s> Stimulus<'s> {
 }
 
 impl<'a> Machine<'a> {
-    /// As the most derived service that has it calls it.
+    /// The name in the most derived service that declares the machine.
     pub fn name(&self) -> &'a Name {
         self.name
     }
 
-    /// The state in which it begins, which holds no others.
+    /// The start state, a leaf state.
     pub fn start(&self) -> StateIndex {
         self.leaf(self.start)
     }
 
-    /// All states, each before those within it.
+    /// All states, each before its substates.
     pub fn states(&self) -> impl Iterator<Item = (StateIndex, &MachineState<'a>)> {
         let states = self.states.iter().enumerate();
         states.map(|(index, state)| (StateIndex(index), state))
     }
 
-    /// A state by its path, whatever the case of its letters.
+    /// Finds a state by its path, ignoring letter case.
     pub fn find(&self, path: &Name) -> Option<StateIndex> {
         self.paths.get(&key(path)).copied()
     }
 
-    /// What is known of a state.
+    /// The state with this index.
     ///
     /// # Panics
     /// If the index comes from a machine with more states.
@@ -153,8 +152,7 @@ impl<'a> Machine<'a> {
         &self.states[index.0]
     }
 
-    /// The state that becomes active when this one is entered: its initial state, and so on until
-    /// there is none within.
+    /// The leaf state that becomes active when this state is entered: its initial state, and so on.
     ///
     /// # Panics
     /// As [`state`](Self::state).
@@ -165,8 +163,7 @@ impl<'a> Machine<'a> {
             .unwrap_or(index)
     }
 
-    /// The transitions that a state has for a stimulus, in the order in which their guards are to
-    /// be tried.
+    /// The transitions of a state for a stimulus, in the order in which their guards are tried.
     ///
     /// # Panics
     /// As [`state`](Self::state).
@@ -190,9 +187,9 @@ impl<'a> Machine<'a> {
         own
     }
 
-    /// What is done when a change from one state to another leaves the first, which holds no
-    /// others: the exit actions from there outwards, up to what both are in. A state that is left
-    /// for itself is left and entered alone.
+    /// The exit actions of a change from the leaf state `from` to another state: from `from`
+    /// outwards, up to the innermost state around both. A self-transition leaves and enters only
+    /// the state itself.
     ///
     /// # Panics
     /// As [`state`](Self::state).
@@ -202,8 +199,8 @@ impl<'a> Machine<'a> {
         actions.map(|declared| declared.item)
     }
 
-    /// What is done when such a change enters the other state: the entry actions of the states
-    /// around it that are new, then its own. From nowhere, all are new.
+    /// The entry actions of such a change: of the newly entered enclosing states, then of the state
+    /// itself. Without `from`, all enclosing states are new.
     ///
     /// # Panics
     /// As [`state`](Self::state).
@@ -217,7 +214,8 @@ impl<'a> Machine<'a> {
         actions.map(|declared| declared.item)
     }
 
-    /// A state and those around it that are not around the other, from inside outwards.
+    /// A state and those of its enclosing states that do not enclose the other, from inside
+    /// outwards.
     fn alone(&self, one: StateIndex, other: Option<StateIndex>) -> Vec<StateIndex> {
         let around = |index: StateIndex| {
             let parent = self.state(index).parent;
@@ -228,8 +226,8 @@ impl<'a> Machine<'a> {
         std::iter::once(one).chain(alone).collect()
     }
 
-    /// The transition that a state takes on a stimulus, when `ask` answers the questions of the
-    /// guards; see [`Guard::holds`]. `None` if nothing happens.
+    /// The transition that a state takes on a stimulus; `ask` evaluates the guards, see
+    /// [`Guard::holds`]. `None` if there is none.
     ///
     /// # Panics
     /// As [`state`](Self::state).
@@ -246,8 +244,8 @@ impl<'a> Machine<'a> {
         })
     }
 
-    /// The state that is active after a transition, itself without others within; `None` for a
-    /// `pop`, which only the past decides, and for a state that does not exist.
+    /// The leaf state that is active after a transition; `None` for a `pop`, which depends on the
+    /// history, and for a state that does not exist.
     pub fn target(&self, from: StateIndex, transition: &Transition) -> Option<StateIndex> {
         match &transition.kind {
             TransitionKind::Internal | TransitionKind::Again => Some(from),
@@ -265,7 +263,7 @@ fn key(path: &Name) -> String {
 
 impl Library {
     /// The state machines of a service, its own and the inherited ones merged, for example
-    /// `ReceiveFSM`. A machine extends that of a base service which has the same unqualified name.
+    /// `ReceiveFSM`. A machine extends the base service's machine with the same unqualified name.
     pub fn machines<'a>(&'a self, service: &'a Service) -> Vec<Machine<'a>> {
         let mut machines: Vec<Vec<Part<'a>>> = Vec::new();
         for (distance, service) in self.lineage(service).enumerate() {
@@ -286,11 +284,11 @@ impl Library {
     }
 }
 
-/// What one service says about a machine.
+/// The declarations of one service about a machine.
 struct Part<'a> {
     service: &'a Service,
     machine: &'a StateMachine,
-    /// Steps of inheritance up to the service.
+    /// Inheritance distance to the service.
     distance: usize,
 }
 
@@ -309,7 +307,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// A machine that is being put together.
+/// A machine during the merge.
 #[derive(Default)]
 struct Merge<'a> {
     states: Vec<MachineState<'a>>,
@@ -317,7 +315,7 @@ struct Merge<'a> {
 }
 
 impl<'a> Merge<'a> {
-    /// Puts the parts together, the most derived first; `None` if there is no state at all.
+    /// Merges the parts, the most derived first; `None` without any state.
     fn run(mut self, parts: &[Part<'a>]) -> Option<Machine<'a>> {
         for part in parts {
             for state in &part.machine.states {
@@ -328,7 +326,7 @@ impl<'a> Merge<'a> {
         let first = parts.first()?;
         let mut starts = parts.iter().map(|part| key(&part.machine.start));
         let start = starts.find_map(|start| self.paths.get(&start).copied());
-        // Without a start that exists it begins in its first state, if there is one.
+        // Without a valid start it begins in its first state, if there is one.
         let start = start.or_else(|| (!self.states.is_empty()).then_some(StateIndex(0)))?;
         Some(Machine {
             name: &first.machine.name,
@@ -338,7 +336,7 @@ impl<'a> Merge<'a> {
         })
     }
 
-    /// Once all states are there: the initial state of a derived service may be one of its base.
+    /// Runs after all states exist: a derived service may name an initial state of its base.
     fn choose_initial_states(&mut self) {
         for state in &mut self.states {
             let wanted = state.wanted_initial.and_then(|initial| {
@@ -372,7 +370,7 @@ impl<'a> Merge<'a> {
             .extend(default.map(|item| part.declared(item)));
     }
 
-    /// The place of a state, which may have been there already.
+    /// The index of a state, which is added if it is new.
     fn place(&mut self, parent: Option<StateIndex>, state: &'a State) -> StateIndex {
         let mut path = parent.map_or_else(Vec::new, |parent| self.states[parent.0].path.0.clone());
         path.push(state.name.clone());

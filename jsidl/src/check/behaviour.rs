@@ -1,9 +1,9 @@
-//! Rules for state machines: what they speak of exists, in the same spelling, and a service that
-//! extends a machine keeps what its base promises.
+//! Rules for state machines: references resolve, with the same spelling, and an extended machine
+//! keeps the guarantees of its base.
 //!
-//! What no published definition needs is an error. Where published ones are careless and the
-//! merged machine has an answer (the case of letters is passed over, a composite state begins in
-//! its first state), it is a warning.
+//! A violation that no published definition has is an error. Where published definitions are
+//! careless and the merged machine is still defined (letter case is ignored, a composite state
+//! begins in its first state), it is a warning.
 
 use super::triggers::{Events, Triggers};
 use crate::behaviour::{
@@ -14,8 +14,8 @@ use crate::library::Library;
 use crate::model::Service;
 use crate::source::Span;
 
-/// Looks at what a service itself says about its machines, beside what it inherits.
-/// `states_left` bounds the work for all services together.
+/// Checks the machines that a service declares, against its inherited ones. `states_left` bounds
+/// the work for all services together.
 pub(crate) fn behaviour(
     report: &mut Report,
     library: &Library,
@@ -61,7 +61,7 @@ pub(crate) fn behaviour(
 struct Check<'a> {
     report: &'a mut Report,
     machine: &'a Machine<'a>,
-    /// The machine that this one extends.
+    /// The base machine that this one extends.
     base: Option<&'a Machine<'a>>,
     triggers: &'a Triggers<'a>,
 }
@@ -110,7 +110,7 @@ impl Check<'_> {
         }
     }
 
-    /// Of two transitions with the same trigger and guard the second is never taken.
+    /// The second of two transitions with the same trigger and guard is never taken.
     fn distinct(&mut self, transitions: &[Transition]) {
         for (position, transition) in transitions.iter().enumerate() {
             let same = |other: &&Transition| {
@@ -130,7 +130,7 @@ impl Check<'_> {
         }
     }
 
-    /// A state with others inside says in which of them it begins, as its base does.
+    /// A composite state names its initial state, the same as its base does.
     fn initial(&mut self, path: &Name, own: &State) {
         let merged = self.machine.find(path);
         let merged = merged.map(|index| self.machine.state(index));
@@ -162,8 +162,8 @@ impl Check<'_> {
         }
     }
 
-    /// Published machines name states that only other services have; the merged machine then begins
-    /// in its first state.
+    /// Published machines name states that exist only in other services; the merged machine then
+    /// begins in its first state.
     fn named_initial(&mut self, own: &State, path: &Name, merged: Option<&MachineState<'_>>) {
         if self.machine.find(path).is_some() {
             self.existing(own.span, "the `initial_state`", path);
@@ -198,7 +198,7 @@ impl Check<'_> {
         }
     }
 
-    /// A derived machine starts where its base does, or in a state within that.
+    /// A derived machine starts in its base's start state, or in a substate of it.
     fn refining(&mut self, own: &StateMachine) {
         let Some(base) = self.base else { return };
         let promised = &base.state(base.start()).path;
@@ -236,7 +236,7 @@ impl Check<'_> {
     }
 }
 
-/// What guards and actions are given although the trigger does not bring it along.
+/// Arguments of guards and actions that are no parameters of the trigger.
 fn unknown_variables(transition: &Transition) -> Vec<&Name> {
     let mut arguments = Vec::new();
     if let Some(guard) = &transition.guard {

@@ -5,12 +5,12 @@ use crate::model::{Count, Group, GroupKind, Item, Meaning, Number, Shape, Unsign
 use crate::source::{Span, Spanned};
 use crate::syntax::{CountField, Node};
 
-/// Octets of a string or elements of an array whose size is fixed. No transport carries more in
-/// one message without pain, and a decoder must not be made to believe in gigabytes.
+/// Maximum octets of a fixed length string, or elements of an array. No transport carries more in
+/// one message with reasonable effort, and a decoder must not be tricked into allocating gigabytes.
 const LARGEST: u32 = 1 << 20;
 
-/// The usual header is one record with one field, the message code. More fields may follow the
-/// code; they are what comes back.
+/// The usual header is one record with one field, the message code. Returns the fields that follow
+/// the code, if any.
 ///
 /// # Errors
 /// A sentence, if the message does not begin with its code.
@@ -49,7 +49,7 @@ fn is_code(item: &Item) -> bool {
             && !matches!(scalar.meaning, Meaning::Scaled(_)))
 }
 
-/// A presence vector is there exactly if some member is optional, and has a bit for each.
+/// A presence vector exists exactly if a member is optional, and has a bit for each.
 pub(crate) fn group(
     report: &mut Report,
     node: &Node,
@@ -105,8 +105,8 @@ pub(crate) fn group(
     (1..=bits).contains(&optional)
 }
 
-/// Only members of records and sequences may be optional. What has other errors (`None`) goes by
-/// what is written.
+/// Only members of records and sequences may be optional. Items with other errors (`None`) are
+/// judged by their syntax.
 pub(crate) fn required(report: &mut Report, what: &str, node: &Node, item: Option<&Item>) -> bool {
     let optional = item.map_or(node.optional == Some(true), |item| item.optional);
     if optional {
@@ -121,7 +121,7 @@ pub(crate) fn required(report: &mut Report, what: &str, node: &Node, item: Optio
     !optional
 }
 
-/// A limit of a count must be a number that the count can be.
+/// The limits of a count are representable in its type.
 pub(crate) fn count_limit(
     report: &mut Report,
     span: Span,
@@ -143,7 +143,7 @@ pub(crate) fn count_limit(
     limit
 }
 
-/// The least count is not above the greatest.
+/// The minimum count does not exceed the maximum.
 pub(crate) fn count(report: &mut Report, span: Span, count: Count) -> Option<Count> {
     if count.min <= count.max {
         return Some(count);
@@ -158,7 +158,7 @@ pub(crate) fn count(report: &mut Report, span: Span, count: Count) -> Option<Cou
     None
 }
 
-/// The tag of a variant must be able to tell the alternatives apart. It counts from 0.
+/// The tag of a variant can represent every alternative, from 0.
 pub(crate) fn tag(
     report: &mut Report,
     tag: &CountField,
@@ -192,7 +192,7 @@ pub(crate) fn tag(
     true
 }
 
-/// A fixed size is positive and not enormous.
+/// A fixed size is positive and limited.
 pub(crate) fn size(report: &mut Report, span: Span, attribute: &str, value: i128) -> Option<u32> {
     let size = u32::try_from(value)
         .ok()
@@ -206,7 +206,7 @@ pub(crate) fn size(report: &mut Report, span: Span, attribute: &str, value: i128
     size
 }
 
-/// All dimensions together are not enormous either.
+/// The total number of elements is limited, too.
 pub(crate) fn array(report: &mut Report, span: Span, dimensions: &[u32]) -> bool {
     let elements = dimensions
         .iter()

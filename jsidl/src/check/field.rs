@@ -21,8 +21,8 @@ pub(crate) fn one_meaning(report: &mut Report, field: &ScalarField) -> Option<()
     }
 }
 
-/// Scales need an unsigned integer, or one whose zero is the centre of the range, and two different
-/// limits in order.
+/// Scales need an unsigned integer, or one with its zero at the centre of the range, and two
+/// different limits in order.
 pub(crate) fn scale(
     report: &mut Report,
     range: &ScaleRange,
@@ -90,7 +90,7 @@ pub(crate) fn value_range(report: &mut Report, span: Span, range: &ValueRange) -
     !empty
 }
 
-/// What stands on the wire for a named value is not negative.
+/// The index of a named value is not negative.
 pub(crate) fn enum_index(report: &mut Report, span: Span, index: i128) -> Option<u64> {
     let sound = u64::try_from(index).ok();
     if sound.is_none() {
@@ -102,7 +102,7 @@ pub(crate) fn enum_index(report: &mut Report, span: Span, index: i128) -> Option
     sound
 }
 
-/// What stands on the wire for a format or a unit is one octet.
+/// The index of a format or unit fits one octet.
 pub(crate) fn octet_index(report: &mut Report, span: Span, index: i128) -> Option<u8> {
     let sound = u8::try_from(index).ok();
     if sound.is_none() {
@@ -114,7 +114,7 @@ pub(crate) fn octet_index(report: &mut Report, span: Span, index: i128) -> Optio
     sound
 }
 
-/// A value set is not empty, and its values are told apart.
+/// A value set is not empty, and its values differ.
 pub(crate) fn value_set(report: &mut Report, set: &syntax::ValueSet, resolved: &ValueSet) -> bool {
     if resolved.ranges.is_empty() && resolved.values.is_empty() {
         report.error(
@@ -208,7 +208,7 @@ fn lowest(set: &ValueSet) -> f64 {
     ranges.chain(values).fold(f64::INFINITY, f64::min)
 }
 
-/// The bits of a sub-field lie within the bit field, the lower one first.
+/// The bits of a sub-field lie within the bit field, the lower bound first.
 pub(crate) fn bits(
     report: &mut Report,
     field: &syntax::SubField,
@@ -260,7 +260,7 @@ pub(crate) fn overlap(
             )
             .note(written[other].from.span, "the other one");
         sound = false;
-        // With more sub-fields than bits everything overlaps: enough has been said.
+        // With more sub-fields than bits, overlaps are certain and already reported.
         if index >= 64 {
             break;
         }

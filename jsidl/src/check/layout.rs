@@ -1,8 +1,8 @@
-//! Whether two messages are the same on the wire and to the people who name their fields.
+//! Compares messages by wire layout and field names.
 
 use crate::model::{Item, Message, Shape};
 
-/// Same names, same octets. Descriptions, limits of counts and value sets may differ.
+/// Same names and same octets. Descriptions, limits of counts and value sets may differ.
 pub(super) fn same_message(a: &Message, b: &Message) -> bool {
     a.code == b.code
         && a.name == b.name

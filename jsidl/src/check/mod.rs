@@ -1,8 +1,8 @@
-//! The rules: what cannot be encoded, or could be read in two ways, is an error; what published
-//! definitions do all the same is a warning.
+//! Rules for definitions: what cannot be encoded or is ambiguous is an error, unless published
+//! definitions do it: then it is a warning.
 //!
-//! Each rule looks at one construct, says what it finds and answers whether the construct is
-//! sound. Following references is not its business.
+//! Each rule checks one construct, reports findings and returns whether the construct is sound.
+//! Rules do not follow references.
 
 mod behaviour;
 mod composite;
@@ -27,7 +27,7 @@ pub(crate) use layout::same_shape;
 pub(crate) use service::{ambiguous_codes, ambiguous_names, left_out, same_service};
 pub(crate) use triggers::Events;
 
-/// Names must differ, because they are how everyone speaks of the things. `what` is their plural.
+/// Names must differ, because users identify items by name. `what` is a plural.
 pub(crate) fn unique<'n>(
     report: &mut Report,
     what: &str,
@@ -58,7 +58,7 @@ pub(crate) fn unique_names(report: &mut Report, what: &str, nodes: &[Node]) -> b
     )
 }
 
-/// Indices must differ, because they are all that stands on the wire. `what` is a plural.
+/// Indices must differ, because only they are on the wire. `what` is a plural.
 pub(crate) fn unique_indices(
     report: &mut Report,
     what: &str,

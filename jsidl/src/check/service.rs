@@ -1,5 +1,4 @@
-//! Rules for services: what is lost of them, what is declared twice, what a receiver cannot tell
-//! apart.
+//! Rules for services: lost messages, duplicate declarations, ambiguous codes and names.
 
 use std::collections::HashMap;
 
@@ -10,7 +9,7 @@ use crate::model::{Message, Service};
 use crate::source::Span;
 use crate::syntax::{Declaration, ServiceDef};
 
-/// Says that a service has lost a message to an error elsewhere.
+/// Reports that a service has lost a message because of an error elsewhere.
 pub(crate) fn left_out(report: &mut Report, service: &ServiceDef, message: &Declaration) {
     report.error(
         message.span,
@@ -21,7 +20,7 @@ pub(crate) fn left_out(report: &mut Report, service: &ServiceDef, message: &Decl
     );
 }
 
-/// A service that is loaded twice should be the same both times; the first one counts.
+/// Two copies of a service should be identical; the first one counts.
 pub(crate) fn same_service(
     report: &mut Report,
     definition: &ServiceDef,
@@ -46,7 +45,7 @@ pub(crate) fn same_service(
     }
 }
 
-/// A code should stand for one message in a service and those that it inherits from.
+/// A code should identify one message in a service and its bases.
 pub(crate) fn ambiguous_codes(
     report: &mut Report,
     library: &Library,
@@ -78,7 +77,7 @@ pub(crate) fn ambiguous_codes(
     }
 }
 
-/// A name should stand for one message in a service.
+/// A name should identify one message in a service.
 pub(crate) fn ambiguous_names(report: &mut Report, service: &Service, places: &[Span]) {
     let mut codes: HashMap<&str, u16> = HashMap::new();
     for (message, &place) in service.messages().zip(places) {

@@ -1,7 +1,7 @@
-//! What can trigger a transition of a service: the events and messages that it, those it inherits
-//! from and those it is a client of declare, and whatever triggers transitions of its bases.
+//! Possible triggers of a service's transitions: events and messages of the service, its bases and
+//! the services that it is a client of, and all triggers of its bases.
 //!
-//! A service that declares no events, and whose bases declare none, leaves open what there is.
+//! If neither the service nor its bases declare events, any event is permitted.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,15 +9,15 @@ use crate::behaviour::Name;
 use crate::library::Library;
 use crate::model::{Id, Service};
 
-/// The internal events that services declare, by name.
+/// Internal events of services, by name.
 pub(crate) type Events<'a> = HashMap<&'a Id, Vec<&'a str>>;
 
-/// The names of events and messages, in lower case: published definitions differ in it.
+/// Names of events and messages, in lower case, because published definitions differ in it.
 pub(super) struct Triggers<'a> {
-    /// From the service itself to its outermost base, each with the alias that leads to it and
-    /// what is known from there on.
+    /// From the service itself to its outermost base, each with its alias and the names known from
+    /// there.
     lineage: Vec<(&'a str, HashSet<String>)>,
-    /// Whether there may be others.
+    /// Whether unknown names are permitted.
     open: bool,
 }
 
@@ -51,8 +51,8 @@ impl<'a> Triggers<'a> {
         Self { lineage, open }
     }
 
-    /// Whether there is such an event or message. An alias before the name says whose it is; one
-    /// that does not exist is passed over.
+    /// Whether an event or message exists. An alias before the name selects its service; an unknown
+    /// alias is ignored.
     pub(super) fn know(&self, event: &Name) -> bool {
         let aliases = &event.parts()[..event.parts().len() - 1];
         let below = self.lineage.iter().skip(1);

@@ -1,11 +1,11 @@
-//! Compares members: which there are, in which order, and what each looks like.
+//! Compares members: presence, order and layout.
 
 use super::Walk;
 use crate::check::same_shape;
 use crate::model::{Item, Shape};
 
 impl Walk<'_> {
-    /// Two members that stand for each other.
+    /// Compares two corresponding members.
     pub(super) fn item(&mut self, old: &Item, new: &Item) {
         let places = (Some(&old.location), Some(&new.location));
         self.inside(new.name.clone(), places.0, places.1, |walk| {
@@ -24,8 +24,8 @@ impl Walk<'_> {
         });
     }
 
-    /// Members of a group or alternatives of a variant. `what` is one of them; `appending` says
-    /// whether the wire is affected by more of them at the end.
+    /// Compares members of a group or alternatives of a variant. `what` names one of them;
+    /// `appending` is whether additions at the end affect the wire.
     pub(super) fn items(&mut self, what: &str, appending: bool, old: &[Item], new: &[Item]) {
         let pairs = pairs(old, new);
         let kept: Vec<_> = pairs.iter().filter_map(|(_, new)| *new).collect();
@@ -80,8 +80,8 @@ impl Walk<'_> {
     }
 }
 
-/// For every old member its position and that of the new one that stands for it: the one with the
-/// same name, or else one that looks the same in the same place.
+/// Pairs each old member's position with the position of its counterpart: the member with the same
+/// name, otherwise one with the same layout at the same place.
 fn pairs(old: &[Item], new: &[Item]) -> Vec<(usize, Option<usize>)> {
     let named = |item: &Item| new.iter().position(|other| other.name == item.name);
     let mut pairs: Vec<_> = old.iter().map(named).enumerate().collect();
@@ -98,7 +98,7 @@ fn pairs(old: &[Item], new: &[Item]) -> Vec<(usize, Option<usize>)> {
     pairs
 }
 
-/// Where a renamed member would stand: behind the one before it.
+/// The expected position of a renamed member: after its predecessor.
 fn candidate(pairs: &[(usize, Option<usize>)], position: usize) -> Option<usize> {
     match position.checked_sub(1) {
         None => Some(0),

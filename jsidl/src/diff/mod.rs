@@ -1,9 +1,8 @@
-//! What changed between two sets of definitions, and whether the octets of a message, or what they
-//! mean, are affected.
+//! Compares two sets of definitions, and determines which changes affect the wire.
 //!
-//! The wire is affected if two parties, one built from each side, would misunderstand each other or
-//! miss a message that one of them knew. A new message or a new service affects nothing that was
-//! there. Descriptions and state machines are not compared.
+//! A change affects the wire if two parties built from different sides would misinterpret a message
+//! or miss one that was known. New messages and services do not. Descriptions and state machines
+//! are not compared.
 
 mod item;
 mod service;
@@ -17,18 +16,18 @@ use crate::model::{Id, Location, Service};
 /// One difference. Displayed as a sentence without its place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Change {
-    /// The service, as the new side calls it, or the old one if it is gone.
+    /// The service, as named on the new side, or on the old side if it was removed.
     pub service: Id,
-    /// The message, its code in hexadecimal behind it, and the members that lead to the change,
-    /// for example `["ReportLights D101", "LightsRec", "Brightness"]`.
+    /// The message with its hexadecimal code, and the members down to the change, for example
+    /// `["ReportLights D101", "LightsRec", "Brightness"]`.
     pub path: Vec<String>,
-    /// What is different, for example "the type is `unsigned byte`, was `byte`".
+    /// The difference, for example "the type is `unsigned byte`, was `byte`".
     pub message: String,
     /// Whether the wire is affected.
     pub wire: bool,
-    /// Where it stood; `None` if it is new.
+    /// Position on the old side; `None` if it is new.
     pub old: Option<Location>,
-    /// Where it stands; `None` if it is gone.
+    /// Position on the new side; `None` if it was removed.
     pub new: Option<Location>,
 }
 
@@ -38,8 +37,8 @@ impl fmt::Display for Change {
     }
 }
 
-/// Compares two libraries, as far as `included` says of their services. A service is compared with
-/// the one of the same identity; if there is none on either side, with another version.
+/// Compares two libraries, for the services that `included` selects. A service is compared with the
+/// one of the same identity, or else with another version.
 pub fn compare(old: &Library, new: &Library, included: impl Fn(&Service) -> bool) -> Vec<Change> {
     let services = |library: &Library| -> Vec<_> {
         let services = library.services().filter(|service| included(service));
@@ -56,7 +55,7 @@ pub fn compare(old: &Library, new: &Library, included: impl Fn(&Service) -> bool
             None => added.push(service),
         }
     }
-    // What is left over on both sides may be another version of the same service.
+    // Unpaired services on both sides may be versions of the same service.
     added.retain(|service| {
         let mut others = pairs.iter_mut();
         let other = others.find(|(old, new)| new.is_none() && old.id.urn == service.id.urn);
@@ -77,7 +76,7 @@ pub fn compare(old: &Library, new: &Library, included: impl Fn(&Service) -> bool
     changes
 }
 
-/// A change that concerns a service which is on one side only. What is gone affects the wire.
+/// A change of a service on one side only. A removal affects the wire.
 fn whole(service: &Service, message: &str, gone: bool) -> Change {
     let location = Some(service.location.clone());
     let (old, new) = if gone {
@@ -95,7 +94,7 @@ fn whole(service: &Service, message: &str, gone: bool) -> Change {
     }
 }
 
-/// Collects the changes of one service; knows on the way down where it is.
+/// Collects the changes of one service, and tracks the current position.
 struct Walk<'c> {
     changes: &'c mut Vec<Change>,
     service: Id,
@@ -103,7 +102,7 @@ struct Walk<'c> {
     places: Vec<Places>,
 }
 
-/// The places of the thing that is looked at, on both sides.
+/// Positions of the current item on both sides.
 #[derive(Clone)]
 struct Places {
     old: Option<Location>,
@@ -111,7 +110,7 @@ struct Places {
 }
 
 impl Walk<'_> {
-    /// Looks at what is inside something.
+    /// Compares the inside of an item.
     fn inside(
         &mut self,
         name: String,
@@ -129,7 +128,7 @@ impl Walk<'_> {
         self.places.pop();
     }
 
-    /// As [`inside`](Self::inside), for what has no place of its own.
+    /// As [`inside`](Self::inside), for a part without a position.
     fn part(&mut self, name: String, look: impl FnOnce(&mut Self)) {
         self.path.push(name);
         look(self);

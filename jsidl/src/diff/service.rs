@@ -48,7 +48,7 @@ impl Walk<'_> {
         let mut gone = Vec::new();
         let mut left: Vec<_> = new.iter().collect();
         for (direction, message) in old {
-            // The same name in the same direction, then the same code, then the same name.
+            // Match by name and direction, then by code, then by name alone.
             let name = |other: &Message| other.name == message.name;
             let code = |other: &Message| other.code == message.code;
             let position = left

@@ -67,7 +67,7 @@ impl Walk<'_> {
         );
     }
 
-    /// The limits do not stand on the wire.
+    /// The limits are not on the wire.
     pub(super) fn count(&mut self, old: Count, new: Count) {
         self.unsigned("the type of the count", old.unsigned, new.unsigned);
         self.value(false, "the least count", &old.min, &new.min);
@@ -100,8 +100,8 @@ impl Walk<'_> {
         }
     }
 
-    /// Another index for a name affects the wire; more names or fewer do not, for unknown values
-    /// are kept.
+    /// A changed index of a name affects the wire; added or removed names do not, as unknown values
+    /// are preserved.
     fn values(&mut self, old: &ValueSet, new: &ValueSet) {
         for value in &old.values {
             let name = &value.name;

@@ -1,18 +1,18 @@
-//! What a page holds, before it is HTML or Markdown: the two are written from the same blocks.
+//! Content of a page, independent of HTML and Markdown.
 
 use std::fmt::Write as _;
 
 /// A page of the documentation.
 pub(super) struct Page {
-    /// File name without ending.
+    /// File name without extension.
     pub(super) name: String,
-    /// For the head of the page.
+    /// Title in the page's head.
     pub(super) title: String,
-    /// What may be jumped to, at the side of the page.
+    /// Navigation at the side of the page.
     pub(super) contents: Vec<Line>,
-    /// What it shows.
+    /// Content.
     pub(super) blocks: Vec<Block>,
-    /// Whether the rows of its tables can be searched.
+    /// Whether the rows of its tables are searchable.
     pub(super) searchable: bool,
 }
 
@@ -32,25 +32,25 @@ pub(super) enum Block {
     },
     /// A paragraph.
     Paragraph(Line),
-    /// Facts, each with what it is.
+    /// Name and value pairs.
     Facts(Vec<(&'static str, Cell)>),
     /// A table.
     Table(Table),
-    /// Something that most readers pass over.
+    /// A collapsed section.
     Details { summary: String, blocks: Vec<Self> },
     /// Source text of another language.
     Source {
-        /// Its name in a fence of Markdown.
+        /// Its name in a Markdown code fence.
         language: &'static str,
         text: String,
     },
-    /// States, those within others inside them.
+    /// States, with nested substates.
     States(Vec<StateBox>),
 }
 
 /// A table of [`Block::Table`].
 pub(super) struct Table {
-    /// What style it has.
+    /// Its style.
     pub(super) class: &'static str,
     pub(super) head: &'static [&'static str],
     pub(super) rows: Vec<Row>,
@@ -58,15 +58,15 @@ pub(super) struct Table {
 
 /// A row of a [`Table`].
 pub(super) struct Row {
-    /// How deep the thing lies within others.
+    /// Nesting depth of the row's item.
     pub(super) depth: usize,
-    /// Whether it is a heading of the rows that follow.
+    /// Whether it is a heading of the following rows.
     pub(super) heading: bool,
     pub(super) cells: Vec<Cell>,
 }
 
 impl Row {
-    /// An ordinary row, each cell of one line.
+    /// An ordinary row with one line per cell.
     pub(super) fn of(cells: impl IntoIterator<Item = Line>) -> Self {
         Self {
             depth: 0,
@@ -79,39 +79,39 @@ impl Row {
 /// A state of a machine.
 pub(super) struct StateBox {
     pub(super) name: String,
-    /// Whether the machine, or the state around it, begins here.
+    /// Whether the machine, or the enclosing state, begins here.
     pub(super) first: bool,
-    /// What happens in it, an entry for each.
+    /// Its transitions and actions, one entry each.
     pub(super) lines: Vec<Line>,
     pub(super) children: Vec<Self>,
 }
 
-/// A piece of a line.
+/// A part of a line.
 #[derive(Clone)]
 pub(super) enum Inline {
     /// Words.
     Text(String),
     /// A name or number of the language.
     Code(String),
-    /// What matters less.
+    /// Less important text.
     Muted(String),
     /// A label.
     Badge(&'static str),
-    /// Leads somewhere else.
+    /// A link.
     Link { text: String, to: Target },
 }
 
-/// A place in the documentation.
+/// Target of a link.
 #[derive(Clone)]
 pub(super) struct Target {
-    /// The page's name; the same page if it is empty.
+    /// The page's name; empty for the same page.
     pub(super) page: String,
-    /// The place on it.
+    /// The anchor on the page.
     pub(super) anchor: Option<String>,
 }
 
 impl Target {
-    /// Relative to a page beside it, where pages are files with this extension.
+    /// The relative address of a page with this file extension.
     pub(super) fn address(&self, extension: &str) -> String {
         let mut address = String::new();
         if !self.page.is_empty() {

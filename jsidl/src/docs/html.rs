@@ -1,4 +1,4 @@
-//! Pages as HTML: one file each, style and script in it, nothing loaded from elsewhere.
+//! Writes pages as HTML: one file each, with style and script, without external resources.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use super::block::{Block, Inline, Line, Page, Row, StateBox, Table};
 
 const STYLE: &str = include_str!("style.css");
 
-/// Shows the search box, which needs this script, and hides the rows that do not match.
+/// Shows the search box, which needs this script, and hides rows that do not match.
 const SCRIPT: &str = include_str!("search.js");
 
 /// A whole page.
@@ -112,7 +112,7 @@ fn table_row(out: &mut String, row: &Row, head: &[&str]) {
     let class = if row.heading { " class=\"group\"" } else { "" };
     let _ = write!(out, "<tr{class} style=\"--depth:{}\">", row.depth);
     for (cell, head) in row.cells.iter().zip(head) {
-        // On a narrow screen a row becomes a block, and the name of the column stands in it.
+        // On a narrow screen a row becomes a block, with the column's name in it.
         let content = lines(cell);
         let _ = if content.is_empty() {
             write!(out, "<td></td>")
@@ -176,7 +176,7 @@ fn inline(inline: &Inline) -> String {
     }
 }
 
-/// Text in which nothing is markup, within elements and within quoted attributes.
+/// Escapes text for elements and quoted attributes.
 pub(super) fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {

@@ -1,4 +1,4 @@
-//! The first page: all services by set, and all messages by code.
+//! Index page: all services by set, and all messages by code.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use super::block::{Block, Inline, Page, Row, Table, code, heading, link, muted, 
 use super::names::{self, Names};
 use crate::model::{Message, Service};
 
-/// The first page.
+/// The index page.
 pub(super) fn page(names: &Names, services: &[&Service]) -> Page {
     let mut sets: BTreeMap<&str, Vec<&Service>> = BTreeMap::new();
     for service in services {

@@ -1,5 +1,5 @@
-//! The wire layout of a message as a table: every field with its offset as far as that is fixed,
-//! its octets, type, unit and values.
+//! Wire layout of a message as a table: every field with its offset if that is fixed, its octets,
+//! type, unit and values.
 
 use super::block::{Cell, Inline, Line, Row, Table, code, muted, text};
 use super::values;
@@ -37,14 +37,14 @@ pub(super) fn table(message: &Message) -> Table {
     }
 }
 
-/// Where a field begins.
+/// Start of a field.
 #[derive(Clone, Copy, PartialEq)]
 enum Offset {
     /// Octets from the message code.
     Fixed(u64),
-    /// Octets from the beginning of the list's element.
+    /// Octets from the start of the list's element.
     Within(u64),
-    /// That depends on what stands before.
+    /// Depends on preceding fields.
     Open,
 }
 
@@ -67,19 +67,19 @@ impl Offset {
     }
 }
 
-/// How many octets a field takes.
+/// Size of a field in octets.
 #[derive(Clone, Default)]
 enum Octets {
     /// None of its own.
     #[default]
     None,
-    /// Always so many.
+    /// Constant.
     Fixed(u64),
-    /// As many as its count says.
+    /// Given by its count.
     Counted,
 }
 
-/// What a row says.
+/// Content of a row.
 #[derive(Default)]
 struct Entry {
     octets: Octets,
@@ -139,7 +139,7 @@ impl Layout {
         }
     }
 
-    /// A line over the rows of what a list repeats, or an alternative.
+    /// A heading of a repeated element or an alternative.
     fn title(&mut self, depth: usize, words: Line) {
         let mut cells = vec![Vec::new(); HEAD.len()];
         cells[2] = vec![words];
@@ -183,7 +183,7 @@ impl Layout {
         }
     }
 
-    /// A member of a group; composites get a line of their own.
+    /// A member of a group; composites get a row of their own.
     fn member(&mut self, item: &Item, path: &str, depth: usize, bit: Option<usize>) {
         let composite = matches!(
             item.shape,
@@ -379,7 +379,7 @@ impl Layout {
         self.offset = Offset::Open;
     }
 
-    /// A count, and what is counted by it.
+    /// A count, and the counted content.
     fn counted(
         &mut self,
         entry: Entry,
@@ -446,7 +446,7 @@ fn joined(path: &str, name: &str) -> String {
     }
 }
 
-/// A path whose last part stands out.
+/// A path with its last part emphasised.
 fn named(path: &str) -> Line {
     match path.rfind('.') {
         Some(dot) => vec![muted(&path[..=dot]), code(&path[dot + 1..])],
@@ -454,7 +454,7 @@ fn named(path: &str) -> Line {
     }
 }
 
-/// What belongs to a field but is not its value.
+/// A part of a field that is not its value.
 fn labelled(path: &str, what: &str) -> Line {
     let mut line = if path.is_empty() {
         Vec::new()

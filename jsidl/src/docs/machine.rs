@@ -1,4 +1,4 @@
-//! State machines: each state a box with what happens in it, those within others inside them.
+//! State machines as nested boxes: each state with its transitions and actions.
 
 use super::block::{Block, Inline, Line, StateBox, code, heading, muted, text};
 use crate::behaviour::{
@@ -7,7 +7,7 @@ use crate::behaviour::{
 use crate::library::Library;
 use crate::model::{Id, Service};
 
-/// The machines of a service, merged with those that it inherits; nothing if there are none.
+/// The machines of a service, merged with the inherited ones; empty if there are none.
 pub(super) fn blocks(library: &Library, service: &Service) -> Vec<Block> {
     let machines = library.machines(service);
     if machines.is_empty() {
@@ -122,7 +122,7 @@ fn inherited(service: &Service) -> Inline {
     muted(format!(" ({})", service.name))
 }
 
-/// An action without qualification and without the parameters that all of them are given.
+/// An action without qualification and without the parameters common to all.
 fn shown(action: &Action) -> String {
     let texts: Vec<_> = action.arguments.iter().filter_map(|a| a.text()).collect();
     match texts[..] {

@@ -1,4 +1,4 @@
-//! Pages as Markdown, in the dialect with tables that code hosts show.
+//! Writes pages as Markdown with tables, as code hosts display them.
 
 use std::fmt::Write as _;
 
@@ -59,7 +59,7 @@ fn block(out: &mut String, block: &Block) {
             writeln!(out, "</details>")
         }
         Block::Source { language, text } => {
-            // A fence that is longer than any run of its character in the text.
+            // A fence longer than any run of backticks in the text.
             let runs = text.split(|c| c != '`').map(str::len);
             let fence = "`".repeat(3.max(runs.max().unwrap_or(0) + 1));
             writeln!(out, "{fence}{language}\n{}\n{fence}", text.trim_end())
@@ -109,7 +109,7 @@ fn inline(inline: &Inline) -> String {
     }
 }
 
-/// Text in which nothing is markup.
+/// Escapes text for Markdown.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {

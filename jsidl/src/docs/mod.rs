@@ -1,8 +1,8 @@
-//! Documentation of services: linked pages in HTML or Markdown, made from definitions.
+//! Documentation of services: linked pages in HTML or Markdown, generated from definitions.
 //!
-//! [`pages`] gives an index, by set and by message code, and a page for every service with its
-//! inheritance, its messages with their layout on the wire, and its state machines. The HTML needs
-//! nothing but the files themselves; only the search on the index is a script.
+//! [`pages`] generates an index, by set and by message code, and a page per service with its
+//! inheritance, its messages with their wire layout, and its state machines. The HTML needs only
+//! its own files; the search on the index is the only script.
 //!
 //! ```
 //! use jsidl::docs::{Format, pages};
@@ -30,7 +30,7 @@ use std::collections::BTreeSet;
 use crate::library::Library;
 use crate::model::Service;
 
-/// In which language pages are written.
+/// Output format of pages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Format {
     /// HTML 5, style included.
@@ -45,11 +45,11 @@ pub enum Format {
 pub struct Page {
     /// File name, without directories.
     pub path: String,
-    /// What is in it.
+    /// Its content.
     pub text: String,
 }
 
-/// The pages of the services that are wanted, and of those that they inherit from; the index first.
+/// The pages of the selected services and of their bases; the index first.
 pub fn pages(
     library: &Library,
     mut wanted: impl FnMut(&Service) -> bool,

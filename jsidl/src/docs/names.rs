@@ -1,4 +1,4 @@
-//! Names of pages and of places on them.
+//! Names of pages and anchors.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,8 +8,8 @@ use crate::model::{Id, Message, Service};
 pub(crate) struct Names(BTreeMap<Id, String>);
 
 impl Names {
-    /// Gives every service a page whose name is its own even where the case of letters does not
-    /// count: `core.Discovery.1.1`.
+    /// Assigns a page to every service, with a name that is unique even without letter case:
+    /// `core.Discovery.1.1`.
     pub(crate) fn new<'a>(services: impl Iterator<Item = &'a Service>) -> Self {
         let mut taken = BTreeSet::from(["index".to_owned()]);
         let mut names = BTreeMap::new();
@@ -39,7 +39,7 @@ fn wanted(id: &Id) -> String {
     format!("{}.{}", last.join("."), id.version)
 }
 
-/// A name without characters that mean something in file names and addresses.
+/// A name without special characters of file names and addresses.
 fn plain(name: &str) -> String {
     let plain = |c: char| {
         if c.is_ascii_alphanumeric() || c == '-' {
@@ -56,7 +56,7 @@ pub(super) fn set(id: &Id) -> &str {
     id.urn.rsplit_once(':').map_or("", |(set, _)| set)
 }
 
-/// The place of a message on the page of its service.
+/// The anchor of a message on its service's page.
 pub(super) fn anchor(message: &Message) -> String {
     format!("{}-{:04X}", plain(&message.name), message.code)
 }

@@ -8,7 +8,7 @@ use crate::model::{Id, Message, Service};
 
 const HEAD: [&str; 3] = ["Code", "Message", "What it is"];
 
-/// Everything about a service.
+/// The page of a service.
 pub(super) fn page(library: &Library, names: &Names, service: &Service) -> Page {
     let mut blocks = vec![
         Block::Heading {
@@ -110,7 +110,7 @@ fn facts(library: &Library, names: &Names, service: &Service) -> Vec<(&'static s
     facts
 }
 
-/// A name with version that leads to the service's page, if there is one.
+/// A name with version, linked to the service's page if there is one.
 fn linked(names: &Names, name: &str, id: &Id) -> Inline {
     let words = format!("{name} {}", id.version);
     match names.page(id) {
@@ -134,7 +134,7 @@ fn listed(links: Vec<Inline>) -> Line {
     line
 }
 
-/// The messages of the services that it inherits from, each with a link to its page.
+/// The messages of its base services, linked to their pages.
 fn inherited(library: &Library, names: &Names, service: &Service) -> Vec<Block> {
     let mut tables = Vec::new();
     for base in library.lineage(service).skip(1) {
@@ -181,7 +181,7 @@ fn row(page: &str, message: &Message) -> Row {
     ])
 }
 
-/// The description, after what kind of message it is.
+/// The description, after the kind of message.
 fn described(message: &Message) -> Line {
     let mut line = Vec::new();
     if message.is_command {
@@ -191,7 +191,7 @@ fn described(message: &Message) -> Line {
     line
 }
 
-/// Its own messages, each once, in their order.
+/// Its own messages without duplicates, in order.
 fn distinct(service: &Service) -> Vec<&Message> {
     let mut distinct: Vec<&Message> = Vec::new();
     for message in service.messages() {

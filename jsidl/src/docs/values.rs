@@ -1,4 +1,4 @@
-//! The values that a number may have, in words.
+//! Describes the values of a number.
 
 use super::block::{Cell, Line, code, muted, text};
 use crate::dynamic::Steps;
@@ -21,7 +21,7 @@ fn scaled(scale: &Scale, kind: Number) -> Cell {
     [vec![text(limits)]].into_iter().chain(steps).collect()
 }
 
-/// Named values, a line each, and ranges.
+/// Named values, one per line, and ranges.
 pub(super) fn of_set(set: &ValueSet) -> Cell {
     let ranges = set.ranges.iter().map(range);
     let named = set.values.iter().map(|value| {
@@ -51,7 +51,7 @@ fn explained(mut line: Line, words: &str) -> Line {
     line
 }
 
-/// A limit, without the digits of π that nobody reads.
+/// A limit, without excess digits of π.
 fn number(value: f64) -> String {
     let shortened = (value * 1e6).round() / 1e6;
     if shortened != 0.0 && (shortened - value).abs() < 1e-6 {

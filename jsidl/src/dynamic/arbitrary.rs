@@ -1,14 +1,14 @@
-//! Values for tests and fuzzing: any value that a definition can express, made from octets.
+//! Generates values for tests and fuzzing: any value of a definition, from octets.
 
 use super::{Raw, Value};
 use crate::model::{Count, Group, Item, Message, Number, Shape, Signed, Unsigned, Variant};
 
-/// A value of the definition, chosen by the octets: the same octets give the same value, and the
-/// fewer and smaller they are, the smaller the value is. Without octets it is the least value: no
-/// optional member, shortest lists, numbers 0.
+/// A value of the definition, selected by the octets: the same octets give the same value, and
+/// fewer and smaller octets give a smaller value. Without octets it is the least value: no optional
+/// member, shortest lists, numbers 0.
 ///
-/// Every such value can be encoded, unless the definition cannot be met at all (a list that must
-/// hold more elements than this crate admits, for example).
+/// Every such value can be encoded, unless the definition is unsatisfiable (for example a list with
+/// a higher minimum than this crate permits).
 pub fn arbitrary(message: &Message, entropy: &[u8]) -> Value {
     let mut choice = Choice { entropy };
     let section = |item: &Option<Item>, choice: &mut Choice<'_>| {
@@ -38,7 +38,7 @@ impl Choice<'_> {
         u64::from_le_bytes(std::array::from_fn(|_| self.octet()))
     }
 
-    /// A number that is often one of the outermost, where mistakes live.
+    /// A number that is often at one of the limits, where bugs are likely.
     fn number_up_to(&mut self, max: u64) -> u64 {
         match self.octet() % 4 {
             0 => u64::from(self.octet()).min(max),
@@ -48,7 +48,7 @@ impl Choice<'_> {
         }
     }
 
-    /// A count that the entropy left over can fill.
+    /// A count that the remaining entropy can fill.
     fn count(&mut self, count: &Count) -> usize {
         let room = (self.entropy.len() as u64 / 2).min(count.max.saturating_sub(count.min));
         let extra = if room == 0 {
@@ -144,7 +144,7 @@ impl Choice<'_> {
         }
     }
 
-    /// Text that does not end in zeros, which decoding takes for padding.
+    /// Text that does not end in zeros, which decoding treats as padding.
     fn fixed_text(&mut self, length: u32) -> Vec<u8> {
         let room = u64::from(length).min(self.entropy.len() as u64);
         let length = usize::try_from(u64::from(self.octet()).min(room)).unwrap_or(0);

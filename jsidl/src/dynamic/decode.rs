@@ -1,7 +1,8 @@
-//! Octets to [`Value`], by walking the definition.
+//! Decodes octets to a [`Value`] by walking the definition.
 //!
-//! The walk goes no deeper than the definition, and every element of a list is read before room is
-//! made for the next: a count that the octets cannot pay for ends in an error, not in memory.
+//! The walk is no deeper than the definition, and every element of a list is read before memory is
+//! allocated for the next: a count beyond the available octets ends in an error, not in an
+//! allocation.
 
 use super::error::{DecodeError, DecodeProblem, Fault, Step};
 use super::trace::{Part, Place, Trace};
@@ -10,10 +11,11 @@ use crate::model::{
     Array, Count, Group, Item, List, Message, Number, Scalar, Shape, Signed, Unsigned, Variant,
 };
 
-/// Reads a whole message: its code, header, body and footer, and nothing behind it.
+/// Decodes a whole message: its code, header, body and footer, and nothing after it.
 ///
-/// What is accepted encodes back to the same octets. Numbers outside a range, unknown enumerated
-/// values, unknown formats and reserved bits are accepted and kept: layout does not depend on them.
+/// Accepted octets encode back to the same octets. Numbers outside a range, unknown enumerated
+/// values, unknown formats and reserved bits are accepted and preserved: the layout does not depend
+/// on them.
 ///
 /// # Errors
 /// If the octets are not one message of this definition: see [`DecodeProblem`].
@@ -21,7 +23,7 @@ pub fn decode(message: &Message, octets: &[u8]) -> Result<Value, DecodeError> {
     decode_with(message, octets, Limits::Enforced)
 }
 
-/// [`decode`] with a choice of what happens to counts outside the definition's limits.
+/// [`decode`] with a choice how to treat counts outside the definition's limits.
 ///
 /// # Errors
 /// As [`decode`], but no [`DecodeProblem::Count`] if limits are ignored.
@@ -29,7 +31,7 @@ pub fn decode_with(message: &Message, octets: &[u8], limits: Limits) -> Result<V
     decode_traced(message, octets, limits, ())
 }
 
-/// [`decode_with`], telling which octets became which field.
+/// [`decode_with`], with a trace of octets and fields.
 pub(crate) fn decode_traced<'m>(
     message: &'m Message,
     octets: &[u8],
@@ -161,7 +163,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
     }
 
     /// The presence vector; bits beyond the last optional member are refused, because encoding
-    /// could not bring them back.
+    /// could not restore them.
     fn presence(&mut self, group: &'m Group) -> Read<u64> {
         let Some(width) = group.presence else {
             return Ok(0);
@@ -337,7 +339,7 @@ impl<'a, 'm, T: Trace<'m>> Reader<'a, T> {
         Ok(taken)
     }
 
-    /// Tells what the octets since `start` are.
+    /// Traces the octets since `start`.
     fn told(&mut self, start: usize, part: Part<'m>) {
         self.trace.read(start..self.position, part);
     }

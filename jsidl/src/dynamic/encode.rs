@@ -1,7 +1,7 @@
-//! [`Value`] to octets, by walking the definition.
+//! Encodes a [`Value`] by walking the definition.
 //!
-//! Nothing is bent to fit: a value of another kind, a number too large or a string too long is an
-//! error that names the field.
+//! Nothing is adjusted to fit: a value of another kind, a number out of range or a string that is
+//! too long is an error that names the field.
 
 use super::error::{EncodeError, EncodeProblem, Fault, Step};
 use super::{EmptyElements, Limits, Raw, Value};
@@ -9,7 +9,7 @@ use crate::model::{
     Array, Count, Group, Item, List, Message, Number, Shape, Signed, Unsigned, Variant,
 };
 
-/// Writes a whole message: its code, header, body and footer.
+/// Encodes a whole message: its code, header, body and footer.
 ///
 /// # Errors
 /// If the definition cannot express the value: see [`EncodeProblem`].
@@ -17,8 +17,8 @@ pub fn encode(message: &Message, value: &Value) -> Result<Vec<u8>, EncodeError> 
     encode_with(message, value, Limits::Enforced)
 }
 
-/// [`encode`] with a choice of what happens to counts outside the definition's limits. A count
-/// that its type cannot hold is always an error.
+/// [`encode`] with a choice how to treat counts outside the definition's limits. A count beyond its
+/// type is always an error.
 ///
 /// # Errors
 /// As [`encode`].
@@ -234,7 +234,7 @@ impl Writer {
     }
 
     fn signed(&mut self, signed: Signed, raw: i64) -> Written {
-        // The octets beyond the type's size repeat the sign of those within, or it does not fit.
+        // The surplus high octets must repeat the sign, otherwise the number does not fit.
         let surplus = 64 - 8 * signed.size();
         if (raw << surplus) >> surplus != raw {
             return Err(unfit(Raw::Signed(raw), Number::Signed(signed)));
@@ -245,7 +245,7 @@ impl Writer {
     }
 }
 
-/// The slots of a group value, if they are as many as the definition has members.
+/// The slots of a group value, if their number matches the definition.
 pub(super) fn slots(
     value: &Value,
     expected: u64,

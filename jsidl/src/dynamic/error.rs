@@ -1,15 +1,15 @@
-//! What can be wrong with octets or values, and where.
+//! Errors of octets and values, with the path to the field.
 //!
-//! Every error names the message, the path to the field and, when reading, the octet at which the
-//! field begins (counted from 0 at the message code).
+//! Every error names the message, the path to the field and, when decoding, the offset of the field
+//! (from 0 at the message code).
 
 use std::fmt;
 
 use super::Raw;
 
-/// The way from a message to one of its fields, for example `NodeList[0].ComponentList[2].URI`.
+/// The path from a message to a field, for example `NodeList[0].ComponentList[2].URI`.
 ///
-/// It follows the JSON view: the name of the body's own composite is left out.
+/// It follows the JSON view: the body's own composite is left out.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Path(Vec<Step>);
 
@@ -51,7 +51,7 @@ pub struct DecodeError {
     pub path: Path,
     /// The octet at which the offending item begins, from 0.
     pub offset: usize,
-    /// What is wrong there.
+    /// The problem.
     pub problem: DecodeProblem,
 }
 
@@ -64,11 +64,11 @@ impl fmt::Display for DecodeError {
 
 impl std::error::Error for DecodeError {}
 
-/// What can be wrong with octets.
+/// Problems of octets.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecodeProblem {
-    /// Another message.
+    /// The code of another message.
     #[error("message code {found:04X}h where {expected:04X}h is expected")]
     Code {
         /// The definition's code.
@@ -81,13 +81,13 @@ pub enum DecodeProblem {
     Short {
         /// Octets that the item takes.
         needed: u64,
-        /// Octets that remain.
+        /// Remaining octets.
         left: usize,
     },
     /// Octets follow the message.
     #[error("octets after the end of the message: {left}")]
     Trailing {
-        /// How many.
+        /// Their number.
         left: usize,
     },
     /// The presence vector has bits that belong to no member.
@@ -113,7 +113,7 @@ pub enum DecodeProblem {
     Tag {
         /// The tag in the octets.
         tag: u64,
-        /// How many alternatives there are.
+        /// Number of alternatives.
         alternatives: usize,
     },
     /// The index of a `variable_field` names no type.
@@ -137,7 +137,7 @@ pub struct EncodeError {
     pub message: String,
     /// The field.
     pub path: Path,
-    /// What is wrong there.
+    /// The problem.
     pub problem: EncodeProblem,
 }
 
@@ -150,25 +150,24 @@ impl fmt::Display for EncodeError {
 
 impl std::error::Error for EncodeError {}
 
-/// What can be wrong with a value.
+/// Problems of a value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EncodeProblem {
-    /// Another kind of value than the definition has here.
+    /// A value of another kind than the definition requires.
     #[error("{found} where the definition has {expected}")]
     Kind {
-        /// What the definition has.
+        /// The required kind.
         expected: &'static str,
-        /// What the value is.
+        /// The actual kind.
         found: &'static str,
     },
-    /// A group with another number of slots than the definition has members, or an array with
-    /// another number of elements.
+    /// A group or array with a wrong number of slots or elements.
     #[error("{found} slots where the definition has {expected}")]
     Slots {
-        /// How many the definition has.
+        /// The number in the definition.
         expected: u64,
-        /// How many the value has.
+        /// The number in the value.
         found: usize,
     },
     /// A required member is absent.
@@ -208,7 +207,7 @@ pub enum EncodeProblem {
     Tag {
         /// The tag.
         tag: u64,
-        /// How many alternatives there are.
+        /// Number of alternatives.
         alternatives: usize,
     },
     /// The index of a `variable_field` names no type.
@@ -236,7 +235,7 @@ pub(super) fn write_place(f: &mut fmt::Formatter<'_>, message: &str, path: &Path
     Ok(())
 }
 
-/// A problem on its way out: each level that it leaves adds a step.
+/// A problem that is being returned: each level adds a step.
 #[derive(Debug)]
 pub(super) struct Fault<P> {
     problem: P,

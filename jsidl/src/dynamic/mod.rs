@@ -1,11 +1,11 @@
-//! The dynamic codec: reads and writes messages straight from their definitions at run time.
+//! Dynamic codec: encodes and decodes messages from their definitions at run time.
 //!
-//! Generated code is faster and typed; this codec serves the definitions that are only known when
-//! the program runs, and it is independent of the generated one, so that the two check each other.
-//! Both hold to the same rule: octets that are accepted encode back to exactly the same octets.
+//! Generated code is faster and typed; this codec serves definitions that become known at run time.
+//! It is independent of the generated code, so that the two verify each other. Both follow the same
+//! rule: accepted octets encode back to exactly the same octets.
 //!
-//! [`decode`] and [`encode`] turn octets into a [`Value`] and back; with the feature `json`,
-//! `to_json` and `from_json` do the same for the JSON view that people read and write.
+//! [`decode`] and [`encode`] convert between octets and a [`Value`]; with the feature `json`,
+//! `to_json` and `from_json` convert between a [`Value`] and the readable JSON view.
 
 mod decode;
 mod encode;
@@ -30,7 +30,7 @@ pub use json::{JsonError, JsonProblem, from_json, to_json};
 pub use scale::{Steps, raw_from_real, real_from_raw, shortest_real};
 pub use value::{Raw, Value};
 
-/// Whether the counts of a message must keep to the limits that its definition states.
+/// Whether the counts of a message must respect the limits of its definition.
 ///
 /// Layout never depends on `min_count` and `max_count`, and not every peer respects them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,7 +38,7 @@ pub enum Limits {
     /// A count outside its limits is an error.
     #[default]
     Enforced,
-    /// Every count that its type can hold is accepted: for reading real traffic.
+    /// Every count that its type can hold is accepted, for reading real traffic.
     Ignored,
 }
 
@@ -48,13 +48,13 @@ impl Limits {
     }
 }
 
-/// How many elements without any octets one message may hold.
+/// Maximum number of elements without octets in one message.
 ///
-/// Nothing in the input pays for such elements (a list of empty records, say), so that a count
-/// alone could ask for four thousand million of them. No published definition has any.
+/// Such elements (for example empty records) take no octets of the input, so a count alone could
+/// demand four thousand million of them. No published definition has any.
 const MOST_EMPTY_ELEMENTS: u32 = 4096;
 
-/// What remains of [`MOST_EMPTY_ELEMENTS`] in the message at hand.
+/// Remaining part of [`MOST_EMPTY_ELEMENTS`] in the current message.
 struct EmptyElements(u32);
 
 impl EmptyElements {
@@ -62,7 +62,7 @@ impl EmptyElements {
         Self(MOST_EMPTY_ELEMENTS)
     }
 
-    /// Takes one; false if there is none left.
+    /// Takes one; false if none is left.
     fn take(&mut self) -> bool {
         let left = self.0.checked_sub(1);
         self.0 = left.unwrap_or(0);

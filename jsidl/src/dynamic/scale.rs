@@ -1,29 +1,29 @@
-//! Scaled integers: real numbers in a range, sent as integers.
+//! Scaled integers: real numbers in a range, encoded as integers.
 //!
 //! A real number becomes the integer that the definition's `integer_function` gives for
-//! `(real - lower) * (2^n - 1) / (upper - lower)`, computed without any rounding error: limits and
-//! number are taken as the exact fractions that they are. (Floating point arithmetic is off by one
-//! in a few per cent of the numbers that lie halfway between two steps.)
+//! `(real - lower) * (2^n - 1) / (upper - lower)`, computed without rounding errors: limits and
+//! number are treated as exact fractions. (Floating point arithmetic is off by one for a few per
+//! cent of the numbers halfway between two steps.)
 
 use std::cmp::Ordering;
 
 use super::value::Raw;
 use crate::model::{Number, Rounding, Scale, Signed, Unsigned};
 
-/// The values of a scaled integer of any type, counted from its least one.
+/// The values of a scaled integer of any type, counted from the least one.
 #[derive(Debug, Clone, Copy)]
 pub struct Steps {
     scale: Scale,
     /// Steps from the lower limit to the upper one.
     max: u64,
-    /// Steps below the lower limit that the type has too.
+    /// Steps of the type below the lower limit.
     below: u64,
     /// The least integer, if the type is signed.
     least: Option<i64>,
 }
 
 impl Steps {
-    /// `None` if such numbers cannot be scaled.
+    /// `None` if numbers of this type cannot be scaled.
     pub fn of(scale: &Scale, number: Number) -> Option<Self> {
         let width = match number {
             Number::Unsigned(width) => return Some(Self::of_unsigned(scale, width)),
@@ -54,7 +54,7 @@ impl Steps {
         (self.scale.upper - self.scale.lower) / self.max as f64
     }
 
-    /// What people are shown: see [`shortest_real`]. `None` if the integer is of another type.
+    /// The displayed value: see [`shortest_real`]. `None` if the integer has another type.
     pub fn shown(&self, raw: Raw) -> Option<f64> {
         let count = match (raw, self.least) {
             (Raw::Unsigned(raw), None) => raw,
@@ -64,8 +64,8 @@ impl Steps {
         Some(self.shortest(count))
     }
 
-    /// The integer that stands for a real number: see [`raw_from_real`]. Of the values below the
-    /// range it takes those that stand for the least integer, so that this can be written too.
+    /// The integer for a real number: see [`raw_from_real`]. Below the range it accepts only the
+    /// value of the least integer, so that this can be encoded too.
     pub fn raw(&self, real: f64) -> Option<Raw> {
         let count = self.count(real)?;
         Some(match self.least {
@@ -75,12 +75,12 @@ impl Steps {
         })
     }
 
-    /// The real number that so many steps from the least integer stand for.
+    /// The real number at this number of steps from the least integer.
     fn real(&self, count: u64) -> f64 {
         (count as f64 - self.below as f64) * self.step() + self.scale.lower
     }
 
-    /// Steps from the least integer to the one for a real number.
+    /// Steps from the least integer to that of a real number.
     fn count(&self, real: f64) -> Option<u64> {
         let (lower, upper) = (self.scale.lower, self.scale.upper);
         if self.below > 0 && real < lower && real >= lower - 1.5 * self.step() {
@@ -90,7 +90,7 @@ impl Steps {
             return None;
         }
         let reaches = |raw| raw == 0 || self.reaches(real, raw);
-        // A conversion to an integer saturates, so that this is a number of the type or above it.
+        // The conversion saturates, so that the result is in the type's range or above it.
         let guess = ((real - lower) / self.step()) as u64;
         let mut least = guess.min(self.max).saturating_sub(2);
         let mut greatest = guess.saturating_add(2).min(self.max);
@@ -111,9 +111,9 @@ impl Steps {
         Some(least + self.below)
     }
 
-    /// Whether the integer for `real` is `raw` steps above the lower limit or more, exactly.
+    /// Whether the integer for `real` is at least `raw` steps above the lower limit, exactly.
     ///
-    /// That is so if `real` is at least (for `ceiling`: above) the threshold
+    /// That is the case if `real` is at least (for `ceiling`: above) the threshold
     /// `lower + k/2 * (upper - lower) / max`, where `k` counts half steps. Multiplied by `2 * max`,
     /// both sides are sums of integer multiples of the three numbers.
     fn reaches(&self, real: f64, raw: u64) -> bool {
@@ -140,15 +140,15 @@ impl Steps {
         if encodes_back(&0.0) {
             return 0.0;
         }
-        // With `floor` and `ceiling` the exact value is the edge of what encodes back, and the
-        // rounding error of its computation may put it beyond.
+        // With `floor` and `ceiling` the exact value is the boundary of what encodes back, and the
+        // rounding error of its computation may cross it.
         let step = self.step();
         let inside = match self.scale.rounding {
             Rounding::Round => exact,
             Rounding::Floor => exact + step / 2.0,
             Rounding::Ceiling => exact - step / 2.0,
         };
-        // Most candidates are so far away that they need no exact look.
+        // Most candidates are too far away to need an exact check.
         let near = |real: &f64| (real - exact).abs() <= 2.0 * step;
         let around = |number| {
             (1..=17)
@@ -162,22 +162,23 @@ impl Steps {
     }
 }
 
-/// The real number that an integer stands for: `raw * (upper - lower) / (2^n - 1) + lower`.
+/// The real number of an integer: `raw * (upper - lower) / (2^n - 1) + lower`.
 pub fn real_from_raw(scale: &Scale, width: Unsigned, raw: u64) -> f64 {
     Steps::of_unsigned(scale, width).real(raw)
 }
 
-/// The integer that stands for a real number, or `None` if the number lies outside of the range
-/// (its limits belong to it) or is not a number.
+/// The integer for a real number; `None` if the number is not a number or outside the range, which
+/// includes its limits.
 pub fn raw_from_real(scale: &Scale, width: Unsigned, real: f64) -> Option<u64> {
     Steps::of_unsigned(scale, width).count(real)
 }
 
 /// The decimal with the fewest significant digits that encodes back to `raw`.
 ///
-/// Zero counts as a number without digits, so that the middle of a symmetric range reads 0. Among
-/// decimals of equally many digits the one nearest to [`real_from_raw`] is taken. Where steps are
-/// finer than `f64` can express and no decimal encodes back, it is [`real_from_raw`] itself.
+/// Zero counts as a number without digits, so that the middle of a symmetric range displays as 0.
+/// Of several decimals with equally many digits, the nearest to [`real_from_raw`] is chosen. Where
+/// steps are finer than `f64` can express and no decimal encodes back, the result is
+/// [`real_from_raw`] itself.
 pub fn shortest_real(scale: &Scale, width: Unsigned, raw: u64) -> f64 {
     Steps::of_unsigned(scale, width).shortest(raw)
 }
@@ -224,7 +225,7 @@ fn parts(number: f64) -> (i64, i32) {
     )
 }
 
-/// The two decimals of so many significant digits around a number other than 0, the nearer first.
+/// The two decimals with `digits` significant digits around a nonzero number, the nearer first.
 fn neighbours(number: f64, digits: usize) -> impl Iterator<Item = f64> {
     // "-1.25e-3" is read as -125 * 10^-5.
     let text = format!("{:.*e}", digits - 1, number.abs());
@@ -238,7 +239,7 @@ fn neighbours(number: f64, digits: usize) -> impl Iterator<Item = f64> {
     let nearest = decimal(whole, exponent);
     let other = match nearest {
         Some(nearest) if nearest.abs() <= number.abs() => decimal(whole + 1, exponent),
-        // Below a power of ten decimals are ten times as dense.
+        // Below a power of ten, decimals are ten times as dense.
         _ if whole == 10_u64.pow(digits as u32 - 1) => decimal(whole * 10 - 1, exponent - 1),
         _ => decimal(whole - 1, exponent),
     };

@@ -1,6 +1,6 @@
-//! What the decoder tells while it reads: which octets became which field.
+//! Traces the decoder: which octets became which field.
 //!
-//! The plain way is traced by `()`, which hears nothing; the compiler leaves no trace of it.
+//! `()` is the tracer that ignores everything; the compiler removes it.
 
 use std::ops::Range;
 
@@ -9,18 +9,18 @@ use crate::model::{
     BitField, Choice, Count, Format, Group, Item, Message, Scalar, Unsigned, Variant,
 };
 
-/// Hears what a decoder reads, in the order of the octets.
+/// Receives the decoded parts, in the order of the octets.
 ///
-/// Only what was found to be right is told. After a mistake nothing follows, so that not every
-/// [`enter`](Self::enter) has its [`leave`](Self::leave).
+/// Only valid parts are traced. After an error nothing follows, so an [`enter`](Self::enter) may
+/// lack its [`leave`](Self::leave).
 pub(crate) trait Trace<'m> {
-    /// Octets were read; none for an empty string, say.
+    /// Octets were read; possibly none, for example of an empty string.
     fn read(&mut self, octets: Range<usize>, part: Part<'m>);
 
-    /// An optional member is not there.
+    /// An optional member is absent.
     fn absent(&mut self, member: &'m Item);
 
-    /// What follows belongs to a member, until [`leave`](Self::leave).
+    /// The following parts belong to a member, until [`leave`](Self::leave).
     fn enter(&mut self, place: Place<'m>);
 
     /// The member ends.
@@ -34,16 +34,16 @@ impl Trace<'_> for () {
     fn leave(&mut self) {}
 }
 
-/// Where a step leads to.
+/// Target of a step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Place<'m> {
-    /// A member of a group, or the chosen alternative of a variant.
+    /// A member of a group, or the selected alternative of a variant.
     Member(&'m Item),
     /// An element of a list or array, counted from 0 in the order of the wire.
     Element(usize),
 }
 
-/// What a run of octets is.
+/// Kind of an octet run.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Part<'m> {
     /// The message code.
@@ -56,14 +56,14 @@ pub(crate) enum Part<'m> {
     Tag(&'m Variant, u64),
     /// The index of a `variable_format_field`.
     Format(&'m [Format], u8),
-    /// The index of a `variable_field`, and what it chose.
+    /// The index of a `variable_field`, and the selected choice.
     Index(&'m Choice),
     /// A number.
     Number(&'m Scalar, Raw),
     /// The integer of a bit field.
     Bits(&'m BitField, u64),
-    /// A string, with the zeros that pad it.
+    /// A string, including its padding zeros.
     Text,
-    /// Octets of a declared format, for example `JAUS MESSAGE`; empty if the format is not known.
+    /// Octets of a declared format, for example `JAUS MESSAGE`; empty if the format is unknown.
     Octets(&'m str),
 }

@@ -1,16 +1,16 @@
-//! The value tree: what a message holds, without its definition's names.
+//! Value tree: the content of a message, without names.
 //!
 //! A [`Value`] mirrors the [`Shape`](crate::model::Shape) of its definition member by member. It
-//! keeps the integers of the wire, so that decoding and encoding is exact; what they mean (names,
+//! keeps the integers of the wire, so that decoding and encoding are exact; their meaning (names,
 //! units, scaling) is in the definition.
 
 use crate::model::{Array, Number, Shape, Signed, SubField, Unsigned};
 
-/// What a message or a part of it holds.
+/// The content of a message or a part of it.
 ///
-/// The value of a whole message is that of its body; an empty body is an empty group. Only where a
-/// definition puts something between the code and the body or behind the body, the value is a
-/// group of three slots: header, body, footer.
+/// The value of a message is that of its body; an empty body is an empty group. If the definition
+/// has fields between the code and the body or after the body, the value is a group of three slots:
+/// header, body, footer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     /// `record` or `sequence`: one slot for every member of the definition, in its order; `None`
@@ -18,33 +18,33 @@ pub enum Value {
     Group(Vec<Option<Self>>),
     /// The elements of a `list`.
     List(Vec<Self>),
-    /// The chosen alternative of a `variant`.
+    /// The selected alternative of a `variant`.
     Variant {
         /// Its zero-based position; 0 in a variant without alternatives.
         tag: u64,
-        /// What it holds; `None` only in a variant without alternatives.
+        /// Its value; `None` only in a variant without alternatives.
         value: Option<Box<Self>>,
     },
-    /// `fixed_field`. A scaled integer is the integer.
+    /// `fixed_field`. A scaled integer is kept as the integer.
     Number(Raw),
     /// `bit_field`: the whole integer, bits that no sub-field owns included.
     Bits(u64),
-    /// `fixed_length_string` (without the zeros that pad it) or `variable_length_string`.
+    /// `fixed_length_string` (without padding zeros) or `variable_length_string`.
     Text(Vec<u8>),
     /// `variable_length_field`.
     Blob(Vec<u8>),
     /// `variable_format_field`.
     Formatted {
-        /// The format's index on the wire; unknown ones are kept.
+        /// The format's index on the wire; unknown ones are preserved.
         format: u8,
         /// The data.
         octets: Vec<u8>,
     },
     /// `variable_field`.
     Measure {
-        /// The index on the wire, which chooses type and units.
+        /// The index on the wire, which selects type and units.
         index: u8,
-        /// The number. A scaled integer is the integer.
+        /// The number. A scaled integer is kept as the integer.
         number: Raw,
     },
     /// `array`: all elements in wire order, the first dimension fastest.
@@ -52,7 +52,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// What kind of value it is, in the words of the language.
+    /// The kind of value, in JSIDL terms.
     pub(super) const fn kind(&self) -> &'static str {
         match self {
             Self::Group(_) => "a record or sequence",
@@ -69,9 +69,9 @@ impl Value {
     }
 }
 
-/// A number as it stands on the wire.
+/// A number on the wire.
 ///
-/// Two floating point numbers are equal here if their octets are: a NaN equals itself.
+/// Floating point numbers are equal if their octets are: a NaN equals itself.
 #[derive(Debug, Clone, Copy)]
 pub enum Raw {
     /// An unsigned integer of any size.
@@ -110,7 +110,7 @@ impl std::fmt::Display for Raw {
 }
 
 impl Shape {
-    /// What kind of value belongs here, in the same words as [`Value::kind`].
+    /// The kind of value that belongs here, in the same terms as [`Value::kind`].
     pub(crate) const fn kind(&self) -> &'static str {
         match self {
             Self::Group(_) => "a record or sequence",
@@ -128,7 +128,7 @@ impl Shape {
 }
 
 impl Number {
-    /// The type as the language spells it.
+    /// The type in JSIDL spelling.
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Unsigned(Unsigned::U8) => "unsigned byte",
@@ -146,7 +146,7 @@ impl Number {
 }
 
 impl Array {
-    /// How many elements it has in all dimensions together.
+    /// Total number of elements in all dimensions.
     pub(crate) fn elements(&self) -> u64 {
         let sizes = self.dimensions.iter().map(|&size| u64::from(size));
         if sizes.clone().any(|size| size == 0) {
@@ -158,7 +158,7 @@ impl Array {
 }
 
 impl SubField {
-    /// The bits that it owns; none where the definition reaches beyond 64.
+    /// The bits of the sub-field; none where the definition exceeds 64.
     pub(crate) const fn mask(&self) -> u64 {
         if self.from > self.to || self.to >= u64::BITS as u8 {
             return 0;

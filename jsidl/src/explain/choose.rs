@@ -1,4 +1,4 @@
-//! Which definition octets are explained by.
+//! Chooses the definition that explains given octets.
 
 use std::cmp::Reverse;
 use std::fmt;
@@ -9,21 +9,21 @@ use super::{Explanation, Kind, Row, explain_as};
 use crate::library::Library;
 use crate::model::{Id, Message, Service, Version};
 
-/// Messages within each other that are taken apart.
+/// Maximum depth of nested messages that are explained.
 const DEEPEST: usize = 4;
 
-/// A service as people name it: by its URN or the last part of it, with or without a version, as in
+/// A service name given by a user: the URN or its last part, with or without a version, as in
 /// `urn:jaus:jss:core:Events`, `urn:jaus:jss:core:Events 1.0` and `Events@1.0`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ServiceName {
-    /// The URN, or what stands behind its last colon.
+    /// The URN, or the part after its last colon.
     pub urn: String,
-    /// The version; any if not given.
+    /// The version; `None` for any.
     pub version: Option<Version>,
 }
 
 impl ServiceName {
-    /// Whether the service may be meant.
+    /// Whether the name matches a service.
     pub fn matches(&self, id: &Id) -> bool {
         let last = id.urn.rsplit(':').next().unwrap_or_default();
         let named = self.urn.eq_ignore_ascii_case(&id.urn) || self.urn.eq_ignore_ascii_case(last);
@@ -67,14 +67,14 @@ impl fmt::Display for ServiceName {
     }
 }
 
-/// Why octets cannot be explained at all.
+/// Reason why octets cannot be explained.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unexplained {
-    /// Fewer octets than a message code has.
+    /// Fewer octets than a message code.
     #[error("a message begins with the two octets of its code, here are {length}")]
     TooShort {
-        /// How many there are.
+        /// Number of octets.
         length: usize,
     },
     /// No definition has this code.
@@ -86,7 +86,7 @@ pub enum Unexplained {
     /// No service has this name.
     #[error("there is no service {name}{}", .similar.as_ref().map_or_else(String::new, |id| format!("; perhaps {id} is meant")))]
     UnknownService {
-        /// What was asked for.
+        /// The requested name.
         name: ServiceName,
         /// A service with a similar name.
         similar: Option<Id>,
@@ -94,17 +94,17 @@ pub enum Unexplained {
     /// The service has no message with this code.
     #[error("{name} has no message {code:04X}h; it is in {}", listed(.services))]
     NotInService {
-        /// What was asked for.
+        /// The requested name.
         name: ServiceName,
         /// The code.
         code: u16,
-        /// Who has it.
+        /// The services that have it.
         services: Vec<Id>,
     },
-    /// Not the version of a service.
+    /// An invalid version.
     #[error("`{text}` is not a version; write it like 1.0")]
     Version {
-        /// What was given.
+        /// The given text.
         text: String,
     },
 }
@@ -114,15 +114,15 @@ fn listed(ids: &[Id]) -> String {
     ids.join(", ")
 }
 
-/// Explains a whole message, which begins with its code.
+/// Explains a whole message, beginning with its code.
 ///
-/// Where several definitions have the code, newer versions are tried first, and the first that can
-/// be read to the end is taken; if there is none, the one that gets farthest. A service name
-/// restricts the choice to what that service declares or inherits.
+/// If several definitions have the code, newer versions are tried first, and the first one that
+/// decodes completely is chosen; otherwise the one that decodes the most. A service name restricts
+/// the choice to what that service declares or inherits.
 ///
 /// # Errors
-/// If there is no code, or no such definition. What is wrong within a message is no error here:
-/// [`Explanation::stop`] tells it.
+/// If there is no code or no such definition. Mistakes within the message are no error here:
+/// [`Explanation::stop`] describes them.
 pub fn explain(
     library: &Library,
     octets: &[u8],
@@ -133,7 +133,7 @@ pub fn explain(
     Ok(explanation)
 }
 
-/// Puts the rows of messages that are carried within a message in the place of their octets.
+/// Replaces the octets of embedded messages by their rows.
 fn opened(library: &Library, rows: Vec<Row>, depth: usize) -> Vec<Row> {
     if depth == 0 {
         return rows;
@@ -181,7 +181,7 @@ fn outermost(
         .into_iter()
         .map(|(service, message)| explain_with(service, message, octets))
         .collect();
-    // The sort is stable: among equals the newest stays first.
+    // The sort is stable: of equal candidates the newest stays first.
     explained.sort_by_key(|e| {
         e.stop
             .as_ref()
@@ -255,7 +255,7 @@ fn of_service<'a>(
     })
 }
 
-/// A service whose name holds what was asked for and little else, the newest of its versions.
+/// A service with a similar name, in its newest version.
 fn similar(library: &Library, name: &ServiceName) -> Option<Id> {
     let wanted = name.urn.to_lowercase();
     let wanted = wanted.rsplit(':').next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Explanations for other programs.
+//! JSON form of explanations.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -6,8 +6,8 @@ use super::{Explanation, Row};
 use crate::dynamic::Raw;
 
 impl Row {
-    /// An object with the keys `offset`, `octets` (hexadecimal), `kind`, `field`, and as far as
-    /// there is one, `raw`, `value` (of a scaled integer), `units`, `name` and `note`.
+    /// An object with the keys `offset`, `octets` (hexadecimal), `kind`, `field`, and where
+    /// applicable `raw`, `value` (of a scaled integer), `units`, `name` and `note`.
     pub fn to_json(&self) -> Json {
         let octets: String = self.octets.iter().map(|o| format!("{o:02x}")).collect();
         let mut object = Map::new();
@@ -43,8 +43,7 @@ fn raw(raw: Raw) -> Json {
 
 impl Explanation {
     /// An object with the keys `code` (four hexadecimal digits), `message`, `service`, `version`,
-    /// `rows`, and where there are any, `error` with `offset` (counted from the message code), and
-    /// `others`.
+    /// `rows`, and where applicable `error` with `offset` (from the message code), and `others`.
     pub fn to_json(&self) -> Json {
         let mut json = json!({
             "code": format!("{:04X}", self.code),

@@ -1,7 +1,7 @@
-//! Explains the octets of a message one by one: which field each belongs to, what it says, and
-//! where reading stopped if something is wrong.
+//! Explains a message octet by octet: the field of each octet, its meaning, and where decoding
+//! stopped on an error.
 //!
-//! [`explain`] looks the message up by its code and makes the [`Row`]s; [`table`] prints them as an
+//! [`explain`] finds the message by its code and creates the [`Row`]s; [`table`] prints them as an
 //! annotated hex dump. Every octet is in exactly one row, and the rows are in order.
 //!
 //! ```
@@ -39,16 +39,16 @@ pub struct Explanation {
     pub code: u16,
     /// The service that defines it.
     pub service: Id,
-    /// All octets in order; what was not read is in the last row.
+    /// All octets in order; undecoded ones are in the last row.
     pub rows: Vec<Row>,
-    /// Where reading stopped and why, if it did. Its offset counts from the message code.
+    /// Where and why decoding stopped, if it did. The offset counts from the message code.
     pub stop: Option<DecodeError>,
-    /// Services that define other messages with the same code, which would be read differently.
+    /// Services that define other messages with the same code and another layout.
     pub others: Vec<Id>,
 }
 
 impl Explanation {
-    /// Lets the rows count from an octet before the message: for a message in a datagram.
+    /// Adds an offset to the rows, for a message within a datagram.
     #[must_use]
     pub fn shifted(mut self, by: usize) -> Self {
         for row in &mut self.rows {
@@ -58,15 +58,15 @@ impl Explanation {
     }
 }
 
-/// The rows of octets that are read by this definition, and where and why reading stopped.
+/// Rows of octets decoded by this definition, and where and why decoding stopped.
 ///
-/// Counts outside the limits of the definition are noted and do not stop it.
+/// Counts outside the limits of the definition are noted, but do not stop it.
 pub fn explain_as(message: &Message, octets: &[u8]) -> (Vec<Row>, Option<DecodeError>) {
     let mut rows = Vec::new();
     let recorder = rows::Recorder::new(octets, &mut rows);
     let stop = decode_traced(message, octets, Limits::Ignored, recorder).err();
     if let Some(error) = &stop {
-        // The octets at fault themselves were read, but told of as nothing: they come last.
+        // The faulty octets were read but not traced: they come last.
         let read = rows
             .iter()
             .map(|row| row.offset + row.octets.len())

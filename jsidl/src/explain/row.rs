@@ -1,37 +1,36 @@
-//! One line of an explanation.
+//! A row of an explanation.
 
 use std::fmt;
 
 use crate::dynamic::Raw;
 
-/// A run of octets and what it is; or, without octets, something that they say.
+/// A run of octets with its meaning; or, without octets, additional information.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Where it begins, counted from 0 at the first octet of the whole input.
+    /// Offset from the first octet of the input.
     pub offset: usize,
-    /// The octets, as many as it takes; none for a sub-field of a bit field and for an absent
-    /// member.
+    /// The octets; none for a sub-field of a bit field and for an absent member.
     pub octets: Vec<u8>,
-    /// What it is.
+    /// Kind of row.
     pub kind: Kind,
-    /// The way to the field that it belongs to, as in errors and in the JSON view, for example
-    /// `NodeList[0].NodeID`; empty for the message itself.
+    /// Path of the field, as in errors and in the JSON view, for example `NodeList[0].NodeID`;
+    /// empty for the message itself.
     pub field: String,
     /// The number on the wire.
     pub raw: Option<Raw>,
-    /// The real number that a scaled integer stands for.
+    /// The real value of a scaled integer.
     pub real: Option<f64>,
-    /// The units, unless the number is a mere number.
+    /// The units, unless the number is dimensionless.
     pub units: Option<String>,
-    /// What the value is called: an enumerated value, a format, the chosen alternative; of a
-    /// string, the text.
+    /// Name of the value: an enumerated value, a format, the selected alternative; for a string,
+    /// the text.
     pub name: Option<String>,
-    /// What else there is to know.
+    /// Additional remarks.
     pub note: Option<String>,
 }
 
 impl Row {
-    /// A row of which nothing is known but what it is and where.
+    /// A row with kind and position only.
     pub fn new(kind: Kind, field: impl Into<String>, offset: usize, octets: &[u8]) -> Self {
         Self {
             offset,
@@ -46,28 +45,28 @@ impl Row {
         }
     }
 
-    /// The same with an unsigned number.
+    /// Sets an unsigned number.
     #[must_use]
     pub fn with_number(mut self, number: u64) -> Self {
         self.raw = Some(Raw::Unsigned(number));
         self
     }
 
-    /// The same with a name for its value.
+    /// Sets the name of the value.
     #[must_use]
     pub fn with_name(mut self, name: impl Into<String>) -> Self {
         self.name = Some(name.into());
         self
     }
 
-    /// The same with a note.
+    /// Adds a note.
     #[must_use]
     pub fn with_note(mut self, note: impl Into<String>) -> Self {
         self.note = Some(note.into());
         self
     }
 
-    /// The field with what the row is, where that is not simply the field's value.
+    /// The field, with the kind of row where that is not the field's value.
     pub fn label(&self) -> String {
         match (self.kind, self.field.is_empty()) {
             (Kind::Header | Kind::Value | Kind::Bits | Kind::SubField | Kind::Absent, _) => {
@@ -78,7 +77,7 @@ impl Row {
         }
     }
 
-    /// The number on the wire as people read it: codes and vectors of bits in hexadecimal.
+    /// The number on the wire as displayed: codes and bit vectors in hexadecimal.
     pub fn raw_text(&self) -> String {
         match (self.kind, self.raw) {
             (_, None) => String::new(),
@@ -90,7 +89,7 @@ impl Row {
         }
     }
 
-    /// What the number means: its value with its units, its name, and what else there is to know.
+    /// The meaning of the number: value with units, name and remarks.
     pub fn meaning(&self) -> String {
         let number = match (self.real, self.kind) {
             (Some(real), _) => Some(real.to_string()),
@@ -110,11 +109,11 @@ impl Row {
     }
 }
 
-/// What a [`Row`] is.
+/// Kind of a [`Row`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Kind {
-    /// What the transport puts around a message.
+    /// Transport header.
     Header,
     /// The message code.
     Code,
@@ -130,15 +129,15 @@ pub enum Kind {
     Index,
     /// The value of a field.
     Value,
-    /// A message within the message, which is not taken apart.
+    /// An embedded message that is not explained.
     Message,
     /// The integer of a bit field.
     Bits,
-    /// A part of the bit field before; it has no octets of its own.
+    /// A part of the preceding bit field; it has no octets of its own.
     SubField,
-    /// An optional member that is not there; it has no octets.
+    /// An absent optional member; it has no octets.
     Absent,
-    /// What was not read, because something before it is wrong.
+    /// Undecoded octets after an error.
     Unread,
 }
 

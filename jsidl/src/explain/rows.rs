@@ -1,4 +1,4 @@
-//! The rows of a message, made while the decoder reads it.
+//! Creates the rows of a message while the decoder reads it.
 
 use std::ops::Range;
 
@@ -10,16 +10,16 @@ use crate::model::{
     Variant,
 };
 
-/// Writes a row for everything that the decoder tells.
+/// Creates a row for every traced part.
 pub(super) struct Recorder<'m, 'a> {
     octets: &'a [u8],
     rows: &'a mut Vec<Row>,
-    /// The levels between the message and the place at hand, the message's own first.
+    /// The levels from the message down to the current position.
     levels: Vec<Level<'m>>,
     path: String,
 }
 
-/// What is known of a level while its members are read.
+/// State of a level while its members are read.
 #[derive(Default)]
 struct Level<'m> {
     /// Length of the path up to here.
@@ -135,7 +135,7 @@ impl<'m> Trace<'m> for Recorder<'m, '_> {
 }
 
 impl Row {
-    /// Adds a note behind the one that it has.
+    /// Adds a note after the existing one.
     fn noting(mut self, note: String) -> Self {
         self.note = Some(match self.note {
             Some(before) => format!("{before}; {note}"),
@@ -164,7 +164,7 @@ fn presence(row: Row, group: &Group, width: Unsigned, vector: u64) -> Row {
     match present.len() {
         0 => row.with_note(format!("none of {optional} optional members follows")),
         n if n == optional => row.with_note("all optional members follow"),
-        // Small vectors are told in full; of large ones the rows that follow tell enough.
+        // List small vectors completely; for large ones the following rows are enough.
         _ if width == Unsigned::U8 => row.with_note(format!("with {}", present.join(", "))),
         n => row.with_note(format!("{n} of {optional} optional members follow")),
     }
@@ -220,7 +220,7 @@ fn number(mut row: Row, scalar: &Scalar, raw: Raw) -> Row {
     }
 }
 
-/// The name of an enumerated value, or that it has none.
+/// The name of an enumerated value, or a note that it has none.
 fn named(row: Row, values: &ValueSet, raw: Raw) -> Row {
     let index = match raw {
         Raw::Unsigned(n) => Some(n),

@@ -1,20 +1,20 @@
-//! Rows as an annotated hex dump.
+//! Formats rows as an annotated hex dump.
 
 use std::fmt::Write as _;
 
 use super::Row;
 
-/// Octets on one line.
+/// Octets per line.
 const OCTETS: usize = 8;
 
-/// The widest that the column of fields becomes for the sake of one long path.
+/// Maximum width of the field column.
 const WIDEST_FIELD: usize = 44;
 
-/// The widest that the column of numbers becomes.
+/// Maximum width of the number column.
 const WIDEST_RAW: usize = 20;
 
-/// Prints rows as columns: offset, octets, field, number on the wire, meaning. Long runs of octets
-/// go on over several lines.
+/// Formats rows in columns: offset, octets, field, number on the wire, meaning. Long runs of octets
+/// continue on further lines.
 pub fn table(rows: &[Row]) -> String {
     let fields: Vec<_> = rows.iter().map(Row::label).collect();
     let raws: Vec<_> = rows.iter().map(Row::raw_text).collect();

@@ -1,6 +1,6 @@
-//! The canonical layout of a definition: two blanks a level, attributes in one order, lines of at
-//! most [`WIDTH`] characters, comments and text kept. Formatting twice changes nothing more, and the
-//! meaning never changes: white space in attributes and descriptions is folded when it is read.
+//! Canonical layout of a definition: two blanks per level, attributes in one order, lines of at
+//! most [`WIDTH`] characters, comments and text preserved. Formatting is idempotent and preserves
+//! the meaning: reading folds white space in attributes and descriptions.
 
 mod read;
 mod write;
@@ -11,13 +11,13 @@ use crate::diagnostic::{Diagnostics, Report};
 use crate::source::Sources;
 use crate::syntax;
 
-/// Characters in a line, where words allow it.
+/// Maximum line length, where words allow it.
 pub const WIDTH: usize = 116;
 
-/// Lays a definition out. `name` is what findings call it.
+/// Formats a definition. `name` is its name in findings.
 ///
 /// # Errors
-/// The findings, if the text is not XML, or no definition.
+/// The findings, if the text is not XML or not a definition.
 ///
 /// ```
 /// let text = r#"<declared_const_set xmlns="urn:jaus:jsidl:1.1" id="urn:me:C" version='1.0'

@@ -1,15 +1,15 @@
-//! An XML text as nodes that keep every character which matters for its layout: names, values and
-//! texts as they are written, comments, and where lines were left blank.
+//! Parses XML into nodes that preserve everything relevant to layout: names, values and texts as
+//! written, comments, and blank lines.
 //!
-//! The text is known to be well-formed, so nothing is checked here again.
+//! The text is known to be well-formed, so nothing is validated here.
 
-/// What stands beside each other in an element or a document.
+/// A child of an element or of the document.
 #[derive(Debug)]
 pub(super) struct Node<'t> {
     pub(super) kind: Kind<'t>,
-    /// Whether a blank line stands before it.
+    /// Whether a blank line precedes it.
     pub(super) apart: bool,
-    /// Whether it stands on the line of what is before it.
+    /// Whether it starts on the last line of its predecessor.
     pub(super) same_line: bool,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Element<'t> {
     pub(super) content: Content<'t>,
 }
 
-/// As written: references to characters stay what they are.
+/// As written: character references are not expanded.
 #[derive(Debug)]
 pub(super) struct Attribute<'t> {
     pub(super) name: &'t str,
@@ -41,7 +41,7 @@ pub(super) struct Attribute<'t> {
 #[derive(Debug)]
 pub(super) enum Content<'t> {
     Nodes(Vec<Node<'t>>),
-    /// All between the tags, if that is more than elements and comments.
+    /// Everything between the tags, if that includes text.
     Text(&'t str),
 }
 
@@ -99,7 +99,7 @@ impl<'t> Reader<'t> {
         }
     }
 
-    /// What begins here; `None` at an end tag and at the end of the text.
+    /// Parses the node that begins here; `None` at an end tag and at the end of the text.
     fn node(&mut self, has_text: &mut bool) -> Option<Kind<'t>> {
         let rest = self.rest();
         if rest.is_empty() || rest.starts_with("</") {
@@ -153,7 +153,7 @@ impl<'t> Reader<'t> {
         Attribute { name, value, quote }
     }
 
-    /// What stands between a start tag and its end tag.
+    /// Parses the content between a start tag and its end tag.
     fn content(&mut self) -> Content<'t> {
         let start = self.at;
         let (nodes, has_text) = self.nodes();

@@ -1,10 +1,10 @@
-//! Lays nodes out.
+//! Writes nodes in the canonical layout.
 
 use super::WIDTH;
 use super::read::{Attribute, Content, Element, Kind, Node};
 
-/// The order of attributes: what a thing is called, what it is, its limits. Others follow as they
-/// come, then the interpretation and the namespaces.
+/// The order of attributes: name, kind, limits. Others follow in document order, then the
+/// interpretation and the namespaces.
 const ORDER: &[&str] = &[
     "name",
     "id",
@@ -48,10 +48,10 @@ const ORDER: &[&str] = &[
     "offset_to_lower_limit",
 ];
 
-/// Short elements that stand on one line with what they hold, if that fits.
+/// Short elements that share one line with their content, if it fits.
 const INLINE: &[&str] = &["action", "send_action", "simple", "push", "pop"];
 
-/// Blanks before the further lines of a tag, beyond those of the first.
+/// Extra indentation of a tag's continuation lines, in blanks.
 const CONTINUED: usize = 4;
 
 /// A whole document.
@@ -101,7 +101,7 @@ impl Writer {
         !comment.contains('\n') && width(last) + 1 + width(comment) <= WIDTH
     }
 
-    /// The further lines of a comment keep their places relative to each other.
+    /// Continuation lines of a comment keep their relative indentation.
     fn comment(&mut self, comment: &str, indent: usize) {
         let (first, rest) = comment.split_once('\n').unwrap_or((comment, ""));
         self.line(indent, first.trim_end());
@@ -153,7 +153,7 @@ impl Writer {
         }
     }
 
-    /// The lines of a start tag, without its end, and the end.
+    /// The lines of a start tag without its end, then the end.
     fn tag(&mut self, lines: &[String], indent: usize, end: &str) {
         for (position, line) in lines.iter().enumerate() {
             let indent = indent + if position == 0 { 0 } else { CONTINUED };
@@ -162,7 +162,7 @@ impl Writer {
         }
     }
 
-    /// A line of text, in several if it is too long.
+    /// Writes a line of text, wrapped if it is too long.
     fn filled(&mut self, line: &str, indent: usize) {
         let words = line.trim_start();
         let indent = indent + line.len() - words.len();
@@ -179,11 +179,11 @@ impl Writer {
     }
 }
 
-/// A start tag without its end, the attributes in order; in several lines if it is too long.
+/// A start tag without its end, attributes in order, wrapped if it is too long.
 fn tag(element: &Element<'_>, indent: usize) -> Vec<String> {
     let mut attributes: Vec<_> = element.attributes.iter().collect();
     attributes.sort_by_key(|attribute| rank(attribute.name));
-    // The end of the tag, at most two characters, needs room as well.
+    // Reserve room for the end of the tag, at most two characters.
     let room = WIDTH.saturating_sub(indent + CONTINUED + 2);
     let mut parts = vec![format!("<{}", element.name)];
     for attribute in attributes {
@@ -201,7 +201,7 @@ fn tag(element: &Element<'_>, indent: usize) -> Vec<String> {
     fill(parts.into_iter(), room)
 }
 
-/// Puts parts into lines of at most this many characters, joined by blanks.
+/// Joins parts with blanks into lines of at most `room` characters.
 fn fill(parts: impl Iterator<Item = String>, room: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for part in parts {
@@ -237,7 +237,7 @@ fn attribute_text(attribute: &Attribute<'_>) -> String {
     format!("{}={quote}{}{quote}", attribute.name, words.join(" "))
 }
 
-/// An element that holds nothing but small ones, on one line.
+/// An element with only small children, on one line.
 fn in_line(element: &Element<'_>, start: &[String], nodes: &[Node<'_>]) -> Option<String> {
     let [start] = start else { return None };
     if !INLINE.contains(&element.name) {
@@ -262,10 +262,10 @@ fn in_line(element: &Element<'_>, start: &[String], nodes: &[Node<'_>]) -> Optio
     Some(line)
 }
 
-/// The lines of a text without their common indentation, and at most one blank line between them.
+/// The lines of a text without common indentation and with at most one blank line in a row.
 fn paragraph(text: &str) -> Vec<String> {
     let lines: Vec<_> = text.lines().map(untabbed).collect();
-    // What follows the tag on its line is not indented.
+    // Text on the line of the tag is not indented.
     let common = common_indent(lines.iter().skip(1));
     let mut paragraph: Vec<String> = Vec::new();
     for (position, line) in lines.iter().enumerate() {
@@ -292,7 +292,7 @@ fn common_indent<'l>(lines: impl Iterator<Item = &'l String>) -> usize {
         .unwrap_or(0)
 }
 
-/// A line whose indentation is made of blanks.
+/// A line with its indentation converted to blanks.
 fn untabbed(line: &str) -> String {
     let words = line.trim_start();
     let indentation = &line[..line.len() - words.len()];

@@ -1,7 +1,7 @@
-//! The fields that a filter can name: unique, typed, and called alike wherever they mean alike.
+//! Filter fields of the dissector: unique and typed, with one name per meaning.
 //!
-//! Wireshark lets several fields have one name if their types go together. So equal names in one
-//! message share the name of the filter, and only where the types differ one of them gets its type
+//! Wireshark allows several fields with one name if their types are compatible. Equal names in one
+//! message therefore share the filter name; where the types differ, one of them gets its type
 //! appended, as in `jaus.setx.value_text`.
 
 use std::collections::{BTreeMap, HashMap};
@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use super::text;
 use crate::model::{NamedValue, Number, Signed, Unsigned};
 
-/// The names that stand for the transport's and for all messages' fields, below `jaus.`.
+/// Names below `jaus.` that are reserved for the transport and for fields common to all messages.
 const RESERVED: [&str; 31] = [
     "acknowledgement",
     "address",
@@ -45,7 +45,7 @@ const RESERVED: [&str; 31] = [
     "whole_in",
 ];
 
-/// What kind of values a field has; where two claim one name, the lesser gets it.
+/// Value type of a field; if two types claim one name, the lesser gets it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Kind {
     /// Unsigned, up to 4 octets.
@@ -62,7 +62,7 @@ pub(super) enum Kind {
     Text,
     /// Raw octets.
     Octets,
-    /// A composite, which is there or not.
+    /// A composite, present or absent.
     None,
 }
 
@@ -80,7 +80,7 @@ impl Kind {
         }
     }
 
-    /// The largest value that can be given a name.
+    /// The largest value that can have a name.
     const fn greatest(self) -> u64 {
         match self {
             Self::Int => i32::MAX as u64,
@@ -112,7 +112,7 @@ impl From<Number> for Kind {
     }
 }
 
-/// What filters call a message.
+/// Filter prefix of a message.
 pub(super) fn prefix(message: &str) -> String {
     let name = plain(message);
     if RESERVED.contains(&name.as_str()) {
@@ -122,17 +122,17 @@ pub(super) fn prefix(message: &str) -> String {
     }
 }
 
-/// What filters call a message of the Reference Architecture.
+/// Filter prefix of a Reference Architecture message.
 pub(super) fn ra_prefix(message: &str) -> String {
     format!("jaus.ra.{}", plain(message))
 }
 
-/// What filters call a field of the message that they call `prefix`.
+/// Filter name of a field of the message with this prefix.
 pub(super) fn within(prefix: &str, field: &str) -> String {
     format!("{prefix}.{}", plain(field))
 }
 
-/// Lower case, and nothing but letters, digits and `_`.
+/// Lower case; only letters, digits and `_`.
 fn plain(name: &str) -> String {
     let character = |c: char| {
         if c.is_ascii_alphanumeric() {
@@ -144,7 +144,7 @@ fn plain(name: &str) -> String {
     name.chars().map(character).collect()
 }
 
-/// All fields, and the names of values that they share.
+/// All fields and their shared tables of value names.
 #[derive(Debug, Default)]
 pub(super) struct Fields {
     entries: Vec<Entry>,
@@ -164,7 +164,8 @@ struct Entry {
 }
 
 impl Fields {
-    /// The number (from 1) of a field; `values` is a number given by [`names`](Self::names).
+    /// Registers a field and returns its number (from 1); `values` is a number from
+    /// [`names`](Self::names).
     pub(super) fn field(
         &mut self,
         filter: String,
@@ -196,7 +197,7 @@ impl Fields {
         place
     }
 
-    /// The number (from 1) of a table of named values; none if there is nothing to name.
+    /// Registers a table of named values; returns its number (from 1), or `None` without names.
     pub(super) fn names(&mut self, kind: Kind, values: &[NamedValue]) -> Option<usize> {
         let mut named: BTreeMap<u64, &str> = BTreeMap::new();
         for value in values.iter().filter(|v| v.index <= kind.greatest()) {
@@ -205,7 +206,7 @@ impl Fields {
         self.names_of(named)
     }
 
-    /// As [`names`](Self::names), for values that are numbered.
+    /// As [`names`](Self::names), for numbered values.
     pub(super) fn names_of<'n>(
         &mut self,
         named: impl IntoIterator<Item = (u64, &'n str)>,
@@ -226,7 +227,7 @@ impl Fields {
         Some(place)
     }
 
-    /// Ends the claiming of names.
+    /// Ends the registration of names.
     pub(super) fn settle(&mut self) {
         self.settled = true;
     }

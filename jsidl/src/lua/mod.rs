@@ -1,14 +1,14 @@
-//! A Wireshark dissector in Lua for everything in a library.
+//! Generates a Wireshark dissector in Lua for every message of a library.
 //!
-//! [`dissector`] writes one self-contained script. Most of it is an interpreter that is the same for
-//! all definitions (`runtime/*.lua`); what is generated is tables: the fields that a filter can
-//! name, and the layout of every message. The script knows JUDP and JTCP, the older headers, and
-//! puts large messages together across packets.
+//! [`dissector`] writes one self-contained script. Most of it is an interpreter that is the same
+//! for all definitions (`runtime/*.lua`). The generated part is tables: the filter fields and the
+//! layout of every message. The script decodes JUDP and JTCP, the older headers, and reassembles
+//! large messages across packets.
 //!
-//! A field is called `jaus.<message>.<field>` in filters, in lower case, wherever in the message it
-//! stands; a message is `jaus.<message>`. Messages of the Reference Architecture have the codes and
-//! names of others: they have a table of their own, and are `jaus.ra.<message>`. Which is meant is
-//! told by header and source.
+//! Filters address a field as `jaus.<message>.<field>`, in lower case, at any depth in the message;
+//! a message is `jaus.<message>`. Reference Architecture messages reuse the codes and names of
+//! others, so they have a table of their own and are `jaus.ra.<message>`. Header and source decide
+//! between the two.
 
 mod fields;
 mod shapes;
@@ -23,7 +23,7 @@ use crate::catalogue::{self, Entry};
 use crate::library::Library;
 use crate::model::{Message, Service};
 
-/// The parts of the interpreter, in the order in which they need each other.
+/// The parts of the interpreter, dependencies first.
 const RUNTIME: [&str; 6] = [
     include_str!("runtime/fields.lua"),
     include_str!("runtime/read.lua"),
@@ -35,10 +35,10 @@ const RUNTIME: [&str; 6] = [
 
 /// The script for every message of a library.
 ///
-/// Where several definitions share a code, Wireshark tries those first that do not come with this
-/// crate, then newer versions before older ones, and shows the first that fits the octets. The
-/// [Reference Architecture](crate::catalogue::Entry::of_reference_architecture)'s are tried for its
-/// messages alone.
+/// If several definitions share a code, Wireshark tries definitions from outside this crate first,
+/// then newer versions before older ones, and shows the first that fits the octets. The definitions
+/// of the [Reference Architecture](crate::catalogue::Entry::of_reference_architecture) are tried
+/// only for its own messages.
 ///
 /// ```
 /// let mut loader = jsidl::Loader::new();
@@ -55,7 +55,7 @@ pub fn dissector(library: &Library) -> String {
         let of_ra = layouts(&of_ra, fields::ra_prefix, fields);
         [("message_table", services), ("ra_message_table", of_ra)]
     };
-    // Once to learn which names are claimed by what, once to write.
+    // First pass: learn which names are claimed. Second pass: write.
     both(&mut fields);
     fields.settle();
     let tables = both(&mut fields);
@@ -77,7 +77,7 @@ pub fn dissector(library: &Library) -> String {
     out
 }
 
-/// One layout of a message, and who declares it.
+/// One layout of a message, with its declaring services.
 struct Layout<'m> {
     message: &'m Message,
     /// The field that stands for the message.
@@ -102,8 +102,8 @@ impl Layout<'_> {
     }
 }
 
-/// All layouts of services, those of one code in the order in which they are to be tried. Filters
-/// call a message as `prefix` says.
+/// All layouts of services; layouts with one code in trial order. `prefix` gives a message's filter
+/// prefix.
 fn layouts<'m>(
     services: &[&'m Service],
     prefix: fn(&str) -> String,
@@ -135,7 +135,7 @@ fn layouts<'m>(
     by_code.into_values().flatten().collect()
 }
 
-/// Services in the order in which their messages are to be tried.
+/// Services in the order in which their messages are tried.
 fn in_order(library: &Library) -> Vec<&Service> {
     let mut services: Vec<_> = library.services().map(AsRef::<Service>::as_ref).collect();
     services.sort_by_key(|service| {
@@ -147,7 +147,7 @@ fn in_order(library: &Library) -> Vec<&Service> {
     services
 }
 
-/// Whether a service is one of the Reference Architecture.
+/// Whether a service belongs to the Reference Architecture.
 fn is_of_ra(service: &&Service) -> bool {
     catalogue::find(&service.id).is_some_and(Entry::of_reference_architecture)
 }

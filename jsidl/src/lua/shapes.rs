@@ -1,7 +1,7 @@
-//! Layouts as Lua tables, which `runtime/read.lua` reads.
+//! Writes layouts as Lua tables for `runtime/read.lua`.
 //!
-//! Every shape is a table that begins with what it is and the number of its field; what follows is
-//! said where each is written.
+//! Every table begins with the kind of shape and the number of its field; each method documents the
+//! further entries.
 
 use super::fields::{Fields, Kind, within};
 use super::text;
@@ -10,7 +10,7 @@ use crate::model::{
     Scalar, Shape, Signed, Unsigned, Variant,
 };
 
-/// Header, body and footer, those that there are.
+/// The header, body and footer that exist.
 pub(super) fn sections(message: &Message, prefix: &str, fields: &mut Fields) -> String {
     let mut emitter = Emitter { prefix, fields };
     let sections = [&message.header, &message.body, &message.footer];
@@ -65,7 +65,7 @@ impl Emitter<'_> {
             Shape::Blob { count, format } => {
                 let field = self.field(name, Kind::Octets, None);
                 let (size, message) = (count.unsigned.size(), is_message(format));
-                // The field, the count's size and limits, whether a message is inside.
+                // Field, size and limits of the count, whether the content is a message.
                 let (min, max) = limits_or_nil(count);
                 format!("{{\"blob\",{field},{size},{min},{max},{message}}}")
             }
@@ -102,7 +102,7 @@ impl Emitter<'_> {
         format!("{{\"variant\",{field},{size},{{{alternatives}}}}}")
     }
 
-    /// The size, and field, lowest and highest bit of every part.
+    /// The size, then field, lowest and highest bit of every part.
     fn bits(&mut self, name: &str, bits: &BitField) -> String {
         let field = self.field(name, bits.base.into(), None);
         let parts = bits.fields.iter().map(|part| {
@@ -131,7 +131,7 @@ impl Emitter<'_> {
         format!("{{\"formatted\",{field},{size},{format},{{{messages}}}{limits}}}")
     }
 
-    /// The field of the index, and the shape of the value for every index.
+    /// The field of the index, then the value's shape for every index.
     fn measure(&mut self, name: &str, choices: &[Choice]) -> String {
         let field = self.field(name, Kind::Real, None);
         let named = choices.iter().map(|choice| {
@@ -147,7 +147,7 @@ impl Emitter<'_> {
         format!("{{\"measure\",{field},{index},{{{}}}}}", choices.join(","))
     }
 
-    /// The number of elements in all dimensions together, element.
+    /// The total number of elements, then the element.
     fn array(&mut self, name: &str, array: &Array) -> String {
         let field = self.field(name, Kind::None, None);
         let element = self.item(&array.element);
@@ -219,7 +219,7 @@ const fn type_of(number: Number) -> &'static str {
     }
 }
 
-/// Limits as further entries of a table; nothing if every count that fits is defined.
+/// Limits as further table entries; empty if every representable count is valid.
 fn limits(count: &Count) -> String {
     if count.min == 0 && count.max == count.unsigned.max() {
         String::new()
@@ -236,7 +236,7 @@ fn limits_or_nil(count: &Count) -> (String, String) {
     }
 }
 
-/// Whether octets of this format are a message that begins with its code.
+/// Whether this format holds a message that begins with its code.
 fn is_message(format: &str) -> bool {
     format.eq_ignore_ascii_case("JAUS MESSAGE")
 }

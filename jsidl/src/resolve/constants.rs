@@ -7,7 +7,7 @@ use crate::model::Number;
 use crate::source::Span;
 use crate::syntax::{ConstSet, Expr, SetRef, TypeSetIndex};
 
-/// The sets whose constants an expression sees.
+/// The constant sets visible to an expression.
 #[derive(Debug, Clone, Copy)]
 enum Scope {
     TypeSet(TypeSetIndex),
@@ -15,7 +15,7 @@ enum Scope {
 }
 
 impl Resolver<'_> {
-    /// Computes an expression that stands in a type set.
+    /// Computes an expression of a type set.
     pub(super) fn value(&mut self, scope: TypeSetIndex, expression: &Expr) -> Option<Value> {
         self.evaluate(Scope::TypeSet(scope), expression)
     }
@@ -38,13 +38,13 @@ impl Resolver<'_> {
         integer
     }
 
-    /// Computes the constants of a set, whether they are used or not.
+    /// Computes all constants of a set, used or not.
     pub(super) fn const_set(&mut self, set: usize) {
         let definitions = &self.program.const_sets[set].definitions;
         let names = definitions.iter().map(|d| (d.name.as_str(), d.value.span));
         check::unique(self.report, "constants", names);
         for position in 0..definitions.len() {
-            // A constant that is wrong has been reported.
+            // The faulty constant is already reported.
             let _ = self.constant(set, position);
         }
     }

@@ -1,4 +1,4 @@
-//! Resolves the fields: computes their limits and gathers their values.
+//! Resolves fields: computes their limits and collects their values.
 
 use super::Resolver;
 use crate::check;

@@ -1,7 +1,7 @@
 //! Finds type sets, constant sets and services by URN and version.
 //!
-//! Published directories carry copies of each other's sets under one identity. Among copies the
-//! one nearest to the file that asks is meant.
+//! Published directories carry copies of each other's sets under one identity. A reference means
+//! the copy nearest to the referring file.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -11,11 +11,10 @@ use crate::model::{Id, Version};
 use crate::source::{Sources, Span};
 use crate::syntax::{ConstSet, Program, TypeSet, TypeSetIndex};
 
-/// Copies of a set beyond these are not looked at.
+/// Maximum number of copies of a set that are compared.
 const MOST_COPIES: usize = 64;
 
-/// Everything that has an identity, by position in the [`Program`], and what the sets declare, by
-/// name.
+/// Everything with an identity, by position in the [`Program`]; declarations of the sets by name.
 pub(super) struct Index<'a> {
     pub(super) type_sets: Identities<'a>,
     pub(super) const_sets: Identities<'a>,
@@ -24,10 +23,10 @@ pub(super) struct Index<'a> {
     constants: Vec<Names<'a>>,
 }
 
-/// Positions in a set; of several things with one name the first.
+/// Positions in a set; the first of several declarations with one name.
 type Names<'a> = HashMap<&'a str, usize>;
 
-/// Things of one kind by URN and version.
+/// Declarations of one kind by URN and version.
 #[derive(Default)]
 pub(super) struct Identities<'a>(BTreeMap<(&'a str, Version), Vec<(usize, Span)>>);
 
@@ -66,7 +65,7 @@ impl<'a> Index<'a> {
         self.constants[set].get(name).copied()
     }
 
-    /// Warns of sets that are declared twice where nobody can say which one is nearer.
+    /// Warns of duplicate sets of which neither is nearer.
     pub(super) fn report_copies(&self, sources: &Sources, report: &mut Report) {
         self.type_sets.report_copies("type set", sources, report);
         self.const_sets
@@ -87,12 +86,12 @@ impl<'a> Identities<'a> {
         identities
     }
 
-    /// The one that was loaded first.
+    /// The declaration loaded first.
     pub(super) fn first(&self, id: &Id) -> Option<usize> {
         self.copies(id).first().map(|(position, _)| *position)
     }
 
-    /// The one nearest to the file that asks; among equally near ones the first.
+    /// The declaration nearest to the referring file; the first of equally near ones.
     pub(super) fn nearest(&self, id: &Id, from: Span, sources: &Sources) -> Option<usize> {
         let copies = self.copies(id);
         if let [(only, _)] = copies {
@@ -106,7 +105,7 @@ impl<'a> Identities<'a> {
         nearest.map(|(position, _)| *position)
     }
 
-    /// What to do about a reference to something that is not loaded.
+    /// Advice for a reference to a missing declaration.
     pub(super) fn advice(&self, id: &Id) -> String {
         let urn = &*id.urn;
         let least = Version { major: 0, minor: 0 };
@@ -155,7 +154,7 @@ fn names<'a>(names: impl Iterator<Item = &'a str>) -> Names<'a> {
     positions
 }
 
-/// Steps from one file to another through the tree of directories.
+/// Steps from one file to another through the directory tree.
 fn steps(from: &Path, to: &Path) -> usize {
     let common = from
         .components()

@@ -11,7 +11,7 @@ use crate::source::{Span, Spanned};
 use crate::syntax::{CountField, Dimension, Kind, Node, Target, TypeSetIndex};
 
 impl Resolver<'_> {
-    /// Resolves a field or composite, with what it costs to copy it.
+    /// Resolves a field or composite and measures its copy cost.
     pub(super) fn whole(&mut self, scope: TypeSetIndex, node: &Node) -> Option<Rc<Whole>> {
         let item = self.item(scope, node)?;
         let (items, height) = measure(&item);
@@ -43,7 +43,7 @@ impl Resolver<'_> {
         item.filter(|_| node.sound)
     }
 
-    /// A copy of the target in which what the reference says itself prevails.
+    /// A copy of the target, overridden by what the reference specifies itself.
     fn referred(&mut self, scope: TypeSetIndex, node: &Node, target: &Target) -> Option<Item> {
         let Resolved::Node(whole) = self.follow(scope, target)? else {
             return None;
@@ -63,8 +63,8 @@ impl Resolver<'_> {
         })
     }
 
-    /// Takes what a copy costs from what is left. `None` if that is too little, which is reported
-    /// once, because everything that follows has the same cause.
+    /// Deducts the cost of a copy from the remaining budget. `None` if the budget is exceeded,
+    /// which is reported once, because all later failures have the same cause.
     pub(super) fn spend(&mut self, items: usize, span: Span) -> Option<()> {
         let left = self.items_left?;
         self.items_left = left.checked_sub(items);
@@ -146,7 +146,7 @@ impl Resolver<'_> {
         })
     }
 
-    /// All of them, so that every mistake is found; `None` if one is faulty.
+    /// Resolves all items to find every mistake; `None` if one is faulty.
     fn items(&mut self, scope: TypeSetIndex, nodes: &[Node]) -> Option<Vec<Item>> {
         let items: Vec<_> = nodes.iter().map(|node| self.item(scope, node)).collect();
         items.into_iter().collect()
@@ -214,7 +214,7 @@ impl Resolver<'_> {
     }
 }
 
-/// What it costs to copy an item, in fields of usual size, and how deep it is nested.
+/// Copy cost of an item, in fields of usual size, and its nesting depth.
 pub(super) fn measure(item: &Item) -> (usize, usize) {
     let inner: &mut dyn Iterator<Item = &Item> = match &item.shape {
         Shape::Group(group) => &mut group.members.iter(),
@@ -232,7 +232,7 @@ pub(super) fn measure(item: &Item) -> (usize, usize) {
     (items, height + 1)
 }
 
-/// What the enumerations of a field cost.
+/// Copy cost of a field's enumerations.
 fn entries(shape: &Shape) -> usize {
     match shape {
         Shape::Scalar(scalar) => scalar_entries(scalar),
@@ -267,7 +267,7 @@ fn values(set: &ValueSet) -> usize {
     ranges.chain(values).sum()
 }
 
-/// What a text costs: nothing if it is short.
+/// Copy cost of a text: 0 if it is short.
 pub(super) fn text(text: &str) -> usize {
     text.len() / 256
 }

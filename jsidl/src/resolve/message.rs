@@ -43,7 +43,7 @@ impl Resolver<'_> {
         sections.iter().all(Option::is_some).then_some(())
     }
 
-    /// Resolves what a section holds; `Some(None)` if it is empty.
+    /// Resolves the content of a section; `Some(None)` if it is empty.
     pub(super) fn section(
         &mut self,
         scope: TypeSetIndex,
@@ -66,7 +66,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// The item itself, or a copy if a declaration keeps it.
+    /// The item itself, or a copy if a declaration still holds it.
     fn taken(&mut self, whole: Option<Rc<Whole>>, section: &Section) -> Option<Option<Item>> {
         let Some(whole) = whole else {
             return Some(None);
@@ -80,7 +80,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// The message under the name that a reference gives it.
+    /// The message, renamed as the reference says.
     pub(super) fn renamed(
         &mut self,
         message: Arc<Message>,
@@ -89,7 +89,7 @@ impl Resolver<'_> {
         if message.name == reference.name {
             return Some(message);
         }
-        // Nothing is measured when nothing is left: that takes time as well.
+        // With an exhausted budget nothing is measured, as that takes time too.
         self.spend(1, reference.span)?;
         let items = message.body.as_ref().map_or(0, |body| measure(body).0);
         self.spend(items + text(&message.description), reference.span)?;
@@ -98,7 +98,7 @@ impl Resolver<'_> {
         Some(Arc::new(renamed))
     }
 
-    /// What a header holds beside the message code.
+    /// The content of a header besides the message code.
     fn header(&mut self, section: &Section, header: Option<&Whole>) -> Option<Option<Item>> {
         match check::header(header.map(|whole| &whole.item)) {
             Ok(rest) => Some(rest),

@@ -1,8 +1,8 @@
-//! From syntax to meaning: follows every reference, computes every constant and builds the
-//! [`model`](crate::model), asking [`check`](crate::check) on the way.
+//! Resolves the syntax tree: follows every reference, computes every constant and builds the
+//! [`model`](crate::model), which [`check`](crate::check) validates on the way.
 //!
-//! Every declaration is resolved once and remembered, whoever refers to it, so that a mistake is
-//! reported once. What is wrong is `None` from then on; what depends on it is left out.
+//! Every declaration is resolved once and memoised, so a mistake is reported once. A faulty
+//! declaration is `None` from then on, and its dependents are left out.
 
 mod constants;
 mod field;
@@ -26,17 +26,17 @@ use crate::syntax::{Program, TypeSetIndex};
 
 use index::Index;
 
-/// Composites within each other, references followed; published definitions need 9.
+/// Maximum depth of composites and references; published definitions need 9.
 const DEEPEST: usize = 32;
 
-/// Services that inherit from each other in a row; published definitions need 7.
+/// Maximum length of an inheritance chain; published definitions need 7.
 const LONGEST_LINEAGE: usize = 32;
 
-/// How many items references may add to what is written: a few lines that double their size with
-/// each step must not fill the memory. All published definitions together need 5 000.
+/// Maximum number of items added by references: a few lines that double their size with each step
+/// must not exhaust memory. All published definitions together need 5 000.
 const MOST_ITEMS: usize = 200_000;
 
-/// Resolves everything that was read. What is sound comes back, what is not is in the report.
+/// Resolves a whole program. Returns the sound services and reports all mistakes.
 pub(crate) fn resolve(program: &Program, sources: &Sources, report: &mut Report) -> Library {
     let lost = program.services.iter().filter(|service| !service.sound);
     let mut resolver = Resolver {
@@ -69,20 +69,20 @@ struct Resolver<'a> {
     declarations: Vec<Vec<Memo<Resolved>>>,
     /// By constant set and position in it.
     constants: HashMap<(usize, usize), Memo<Value>>,
-    /// Services that are there but cannot be kept.
+    /// Services that exist but cannot be kept.
     lost: HashSet<&'a Id>,
-    /// Places about which something has been said that is to be said once.
+    /// Positions with a complaint that must not be repeated.
     complained: HashSet<Span>,
     nesting: usize,
     /// `None` once the limit has been exceeded and reported.
     items_left: Option<usize>,
 }
 
-/// What is known of a declaration.
+/// Resolution state of a declaration.
 #[derive(Debug, Clone)]
 enum Memo<T> {
     Unseen,
-    /// Being resolved: whoever meets it now goes round in a circle.
+    /// Being resolved; a reference to it closes a cycle.
     Active,
     Faulty,
     Done(T),
@@ -98,7 +98,7 @@ enum Resolved {
     Event,
 }
 
-/// An item with what it costs to copy it, see [`item::measure`].
+/// An item with its copy cost, see [`item::measure`].
 #[derive(Debug)]
 struct Whole {
     item: Item,
@@ -111,13 +111,13 @@ impl Resolver<'_> {
         self.sources.location(span)
     }
 
-    /// Whether this is the first complaint about a place.
+    /// Whether this is the first complaint about a position.
     fn first_complaint(&mut self, span: Span) -> bool {
         self.complained.insert(span)
     }
 
-    /// Resolves every declaration, so that mistakes in unused ones are found too, and before any
-    /// service uses them.
+    /// Resolves every declaration before any service uses it, so that mistakes in unused ones are
+    /// found too.
     fn sets(&mut self) {
         for set in 0..self.program.type_sets.len() {
             self.type_set(set);
@@ -132,7 +132,7 @@ impl Resolver<'_> {
         let names = set.declarations.iter().map(|d| (d.name.as_str(), d.span));
         check::unique(self.report, "declarations", names);
         for declaration in 0..set.declarations.len() {
-            // A declaration that is wrong has been reported.
+            // A faulty declaration is already reported.
             let _ = self.declaration(index, declaration);
         }
     }

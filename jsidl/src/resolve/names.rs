@@ -1,15 +1,15 @@
-//! Walks dotted names: every part but the last is a local alias of a set, the last one is what
-//! that set declares.
+//! Walks dotted names: every part but the last is a local alias of a set; the last one is a
+//! declaration in that set.
 
 use super::{Memo, Resolved, Resolver};
 use crate::source::Span;
 use crate::syntax::{Construct, DeclarationKind, SetRef, Target, TypeSetIndex};
 
-/// References that refer to references.
+/// Maximum length of a chain of references.
 const LONGEST_CHAIN: usize = super::DEEPEST;
 
 impl<'a> Resolver<'a> {
-    /// Resolves what a reference refers to. `None` if that is impossible, which is reported.
+    /// Resolves the target of a reference. `None` if that is impossible, which is reported.
     pub(super) fn follow(&mut self, scope: TypeSetIndex, target: &Target) -> Option<Resolved> {
         let (set, position) = self.find(scope, target)?;
         let declaration = &self.program.type_sets[set].declarations[position];
@@ -50,7 +50,7 @@ impl<'a> Resolver<'a> {
         resolved
     }
 
-    /// Resolves a declaration of a type set, or remembers how that went.
+    /// Resolves a declaration of a type set and memoises the result.
     pub(super) fn declaration(&mut self, set: TypeSetIndex, position: usize) -> Option<Resolved> {
         match &self.declarations[set][position] {
             Memo::Done(resolved) => return Some(resolved.clone()),
@@ -87,7 +87,7 @@ impl<'a> Resolver<'a> {
             return Some((set, position));
         }
         let declarations = &self.program.type_sets[set].declarations;
-        // A hint is not worth much time.
+        // Limits the time spent on a hint.
         let similar = declarations
             .iter()
             .take(1000)
@@ -135,8 +135,8 @@ impl<'a> Resolver<'a> {
         found
     }
 
-    /// An alias that a set does not declare, but one of the sets that it refers to. Published
-    /// definitions rely on that, so it is a warning.
+    /// An alias that the set does not declare, but one of the sets that it refers to does.
+    /// Published definitions rely on this, so it is a warning.
     fn borrowed(&mut self, set: TypeSetIndex, alias: &str) -> Option<&'a SetRef> {
         let program = self.program;
         let own = &program.type_sets[set];
@@ -163,7 +163,7 @@ impl<'a> Resolver<'a> {
             .nearest(&reference.id, reference.span, self.sources)
     }
 
-    /// Complains, once for each reference, about a set that is not loaded.
+    /// Reports a set that is not loaded, once per reference.
     pub(super) fn missing_set(&mut self, reference: &SetRef, what: &str, advice: &str) {
         if self.first_complaint(reference.span) {
             let message = format!("the {what} `{}` is not loaded: {advice}", reference.id);
@@ -171,7 +171,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// Says that definitions are nested too deeply.
+    /// Reports definitions that are nested too deeply.
     pub(super) fn too_deep(&mut self, span: Span) {
         let limit = super::DEEPEST;
         self.report.error(

@@ -1,4 +1,4 @@
-//! Resolves services: their vocabulary and the services that they refer to.
+//! Resolves services: their vocabulary and the services that they reference.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -12,11 +12,11 @@ use crate::syntax::{
     Declaration, DeclarationKind, Program, ServiceDef, SetRef, Target, TypeSetIndex,
 };
 
-/// States of all services, inherited ones counted again: a long lineage must not multiply a large
-/// machine. All published definitions together have 20 000.
+/// Maximum number of states of all services, inherited ones counted again: a long lineage must not
+/// multiply a large machine. All published definitions together have 20 000.
 const MOST_STATES: usize = 500_000;
 
-/// Messages of a set, each with the place where the service names it.
+/// Messages of a set, each with its position in the service.
 type Vocabulary = Vec<(Arc<Message>, Span)>;
 
 impl Resolver<'_> {
@@ -49,7 +49,7 @@ impl Resolver<'_> {
         library
     }
 
-    /// A service, and where it names each of its messages.
+    /// A service with the positions of its messages.
     fn service(&mut self, definition: &ServiceDef) -> (Service, Vec<Span>) {
         let scope = definition.types;
         let inputs = self.vocabulary(scope, definition, &definition.inputs);
@@ -81,7 +81,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// The messages of an input or output set that are sound.
+    /// The sound messages of an input or output set.
     fn vocabulary(
         &mut self,
         scope: TypeSetIndex,
@@ -100,7 +100,7 @@ impl Resolver<'_> {
                 }
                 _ => None,
             };
-            // Of two messages with one name the first counts.
+            // The first of two messages with one name counts.
             let message = message.filter(|_| declaration.sound && names.insert(&declaration.name));
             messages.extend(message.map(|message| (message, declaration.span)));
         }
@@ -118,7 +118,7 @@ impl Resolver<'_> {
         let before = self.report.errors();
         match self.follow(scope, target) {
             Some(Resolved::Message(message)) => self.renamed(message, declaration),
-            // What is wrong has been reported where it is, and that may be far away.
+            // The cause is reported at its own position, which may be far away.
             None if self.report.errors() == before => {
                 check::left_out(self.report, service, declaration);
                 None
@@ -134,7 +134,7 @@ impl Resolver<'_> {
             declarations.iter().map(|d| (d.name.as_str(), d.span)),
         );
         for declaration in declarations {
-            // Events do not leave the component: what is wrong with them is reported, no more.
+            // Events do not leave the component: their mistakes are only reported.
             match &declaration.kind {
                 DeclarationKind::Event(event) => drop(self.event(scope, event)),
                 DeclarationKind::Reference(target) => drop(self.follow(scope, target)),
@@ -158,7 +158,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// Whether every service that this one inherits from is there.
+    /// Whether every base of this service exists.
     fn lineage_is_sound(&mut self, heir: &ServiceDef) -> bool {
         let program = self.program;
         let Some(own) = &heir.inherits_from else {
@@ -191,7 +191,7 @@ impl Resolver<'_> {
         false
     }
 
-    /// Each service that is left out says why, at its own `inherits_from`.
+    /// Each service that is left out is reported at its own `inherits_from`.
     fn missing_base(
         &mut self,
         heir: &ServiceDef,
@@ -220,7 +220,7 @@ impl Resolver<'_> {
     }
 }
 
-/// The names of the events that each service declares; of two with one identity the first counts.
+/// Names of the events that each service declares; the first of two with one identity counts.
 fn internal_events(program: &Program) -> check::Events<'_> {
     let mut events = check::Events::new();
     for service in program.services.iter().filter(|s| s.sound) {

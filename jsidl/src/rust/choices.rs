@@ -1,4 +1,4 @@
-//! Enums: `variant` and `variable_field`.
+//! Generates enums for `variant` and `variable_field`.
 
 use super::docs;
 use super::types::{Field, Type, unsigned_type};
@@ -161,7 +161,7 @@ fn variant_view(out: &mut Writer, ident: &str, alternatives: &[Field<'_>]) {
     out.push(format!("codec::view::serde_by_view!({ident});\n}}"));
 }
 
-/// A variant without alternatives is its tag alone, 0.
+/// A variant without alternatives consists of its tag, 0.
 fn without_alternatives(out: &mut Writer, ident: &str, tag: &str, size: usize) {
     out.push("#[derive(Debug, Clone, Copy, Default, PartialEq)]");
     out.push(format!("pub struct {ident};"));

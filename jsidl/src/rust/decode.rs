@@ -1,4 +1,4 @@
-//! How octets become values: `read`.
+//! Generates the decoder: `read`.
 
 use super::encode::all_bits;
 use super::ident::local;
@@ -44,8 +44,8 @@ pub(super) fn group(out: &mut Writer, body: &Body<'_>) {
     construct(out, fields);
 }
 
-/// Writes `fn read_some` of a struct with a fast path: what is left of `read` when a member is
-/// absent, kept apart so that the fast path stays small.
+/// Writes `fn read_some` of a struct with a fast path: the part of `read` for absent members,
+/// separate to keep the fast path small.
 pub(super) fn some(out: &mut Writer, fields: &[Field<'_>]) {
     let names = Locals::beside(fields);
     let Locals {
@@ -64,7 +64,7 @@ pub(super) fn some(out: &mut Writer, fields: &[Field<'_>]) {
     construct(out, fields);
 }
 
-/// Builds the struct from variables of the names of its fields.
+/// Builds the struct from variables with the names of its fields.
 fn construct(out: &mut Writer, fields: &[Field<'_>]) {
     let idents: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
     out.push("Ok(Self {");
@@ -72,7 +72,7 @@ fn construct(out: &mut Writer, fields: &[Field<'_>]) {
     out.push("})\n}");
 }
 
-/// Local variables, named unlike any field.
+/// Local variables with names that differ from all fields.
 struct Locals {
     input: String,
     place: String,
@@ -92,7 +92,7 @@ impl Locals {
     }
 }
 
-/// The fast path: all optional members are there, and everything has one size.
+/// The fast path: all optional members are present, and the size is fixed.
 fn full(out: &mut Writer, fields: &[Field<'_>], names: &Locals) {
     let (run, present, all) = (&names.run, &names.present, all_bits(fields));
     out.push(format!("if {present} == {all:#x} {{"));
@@ -112,7 +112,7 @@ fn full(out: &mut Writer, fields: &[Field<'_>], names: &Locals) {
     out.push("});\n}");
 }
 
-/// Takes the octets of several values of fixed size under one check.
+/// Reads several values of fixed size with one length check.
 fn take_run(out: &mut Writer, fields: &[Field<'_>], names: &Locals) {
     let sizes: Vec<_> = fields
         .iter()

@@ -1,9 +1,9 @@
-//! Documentation of generated items, from what the definition says.
+//! Generates documentation from the definition.
 
 use super::types::{Field, Type};
 use crate::model::{Count, Item, Meaning, Scalar, Shape, ValueRange, ValueSet};
 
-/// Text of a definition as Markdown: nothing in it is markup.
+/// Escapes text of a definition for Markdown.
 pub(super) fn prose(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for word in text.split_whitespace() {
@@ -37,7 +37,7 @@ pub(super) fn field(field: &Field<'_>) -> String {
     }
 }
 
-/// What the definition states about values of a shape.
+/// The definition's statements about values of a shape.
 fn facts(shape: &Shape, ty: &Type) -> Vec<String> {
     match shape {
         Shape::Scalar(scalar) => scalar_facts(scalar),
@@ -97,7 +97,7 @@ pub(super) fn ranges(set: &ValueSet) -> Option<String> {
     (!ranges.is_empty()).then(|| ranges.join(" or "))
 }
 
-/// What the author says about an item.
+/// The author's text about an item.
 pub(super) fn interpretation(item: &Item) -> String {
     prose(&item.interpretation)
 }

@@ -1,4 +1,4 @@
-//! How values become octets: `encoded_len` and `write`.
+//! Generates the encoder: `encoded_len` and `write`.
 
 use super::ident::local;
 use super::structs::{Body, optional};
@@ -6,7 +6,7 @@ use super::types::{Field, Type, unsigned_type};
 use super::writer::Writer;
 use crate::model::{Count, Number, Unsigned};
 
-/// The code at the beginning of a message, as a value of fixed size.
+/// The message code, as a value of fixed size.
 const CODE: (&str, Type) = (
     "<Self as codec::Message>::CODE",
     Type::Number(Number::Unsigned(Unsigned::U16)),
@@ -61,7 +61,7 @@ fn sum(out: &mut Writer, constant: usize, terms: &[String]) {
     out.push(all.join("\n+ "));
 }
 
-/// Octets of a value, if all have the same number.
+/// The size of a value in octets, if it is constant.
 fn constant_len(ty: &Type) -> Option<usize> {
     match ty {
         Type::FixedText(length) => Some(*length as usize),
@@ -73,7 +73,7 @@ fn constant_len(ty: &Type) -> Option<usize> {
     }
 }
 
-/// An expression for the octets of a value at a place.
+/// An expression for the size of a value.
 pub(super) fn length(ty: &Type, value: &str) -> String {
     if let Some(size) = constant_len(ty) {
         return size.to_string();
@@ -99,7 +99,7 @@ pub(super) fn length(ty: &Type, value: &str) -> String {
             let flat = ".as_flattened()".repeat(dimensions.len() - 1);
             total(&format!("{value}{flat}"), element)
         }
-        // `value` is the reference of a closure or a pattern, anything else a place.
+        // `value` is the reference of a closure or a pattern, anything else a place expression.
         _ if value == "value" => "codec::Composite::encoded_len(value)".to_owned(),
         _ => format!("codec::Composite::encoded_len(&{value})"),
     }
@@ -113,12 +113,12 @@ fn times(size: usize, count: &str) -> String {
     }
 }
 
-/// The octets of all elements.
+/// An expression for the size of all elements.
 fn total(elements: &str, element: &Type) -> String {
     format!("{elements}.iter().map({}).sum::<usize>()", measure(element))
 }
 
-/// A function for the octets of a value: a path or a closure.
+/// A function for the size of a value: a path or a closure.
 fn measure(ty: &Type) -> String {
     match ty {
         Type::Composite { .. } => "codec::Composite::encoded_len".to_owned(),
@@ -142,8 +142,8 @@ fn write(out: &mut Writer, body: &Body<'_>) {
     out.push("Ok(())\n}");
 }
 
-/// Writes `fn write_some` of a struct with a fast path: what is left of `write` when a member is
-/// absent, kept apart so that the fast path stays small.
+/// Writes `fn write_some` of a struct with a fast path: the part of `write` for absent members,
+/// separate to keep the fast path small.
 pub(super) fn some(out: &mut Writer, body: &Body<'_>) {
     out.push("#[inline(never)]");
     out.push("fn write_some(&self, output: &mut codec::Writer<'_>) {");
@@ -191,7 +191,7 @@ fn members(out: &mut Writer, body: &Body<'_>) {
     }
 }
 
-/// The fast path: all optional members are there, and everything has one size.
+/// The fast path: all optional members are present, and the size is fixed.
 fn full(out: &mut Writer, body: &Body<'_>, presence: Unsigned) {
     let Body { fields, .. } = body;
     let taken: Vec<_> = fields.iter().map(|field| field.ident.as_str()).collect();
@@ -218,7 +218,7 @@ fn full(out: &mut Writer, body: &Body<'_>, presence: Unsigned) {
     out.push("return Ok(());\n}");
 }
 
-/// The name of a field's value beside the variables `run` and `output`.
+/// The name of a field's value that does not collide with `run` and `output`.
 fn binding(field: &Field<'_>, taken: &[&str]) -> String {
     if matches!(field.ident.as_str(), "run" | "output") {
         local(&field.ident, taken)
@@ -227,7 +227,7 @@ fn binding(field: &Field<'_>, taken: &[&str]) -> String {
     }
 }
 
-/// The presence vector with all bits that have a meaning.
+/// The presence vector with all defined bits set.
 pub(super) fn all_bits(fields: &[Field<'_>]) -> u64 {
     fields
         .iter()
@@ -235,7 +235,7 @@ pub(super) fn all_bits(fields: &[Field<'_>]) -> u64 {
         .fold(0, |bits, _| bits << 1 | 1)
 }
 
-/// Several values of fixed size as one block of octets.
+/// Writes several values of fixed size as one block of octets.
 fn put_run<'t>(out: &mut Writer, values: impl IntoIterator<Item = (String, &'t Type)>) {
     let values: Vec<_> = values.into_iter().collect();
     match &values[..] {
@@ -271,7 +271,7 @@ fn named(out: &mut Writer, name: &str, write: &str) {
     out.push(format!("output.member({name:?}, |output| {write})?;"));
 }
 
-/// An expression that writes the value behind a reference, of type `Result`.
+/// An expression that writes the referenced value, of type `Result`.
 pub(super) fn value(ty: &Type, place: &str) -> String {
     let limits = |count: &Count| format!("{}, {}", count.min, count.max);
     let counted = |call: &str, count: &Count| {

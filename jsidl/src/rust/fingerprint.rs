@@ -1,5 +1,5 @@
-//! When two definitions are the same type: everything that people or the wire can see, but neither
-//! the place of a definition nor its prose.
+//! Fingerprints of types: two definitions with the same fingerprint are one type. They cover
+//! everything visible to users or on the wire, but not position and prose.
 
 use std::fmt::Write;
 
@@ -7,8 +7,8 @@ use crate::model::{
     Count, Group, Item, Meaning, Message, NamedValue, Number, Scalar, Shape, ValueSet,
 };
 
-/// What two declarations of a message share if one type can serve both: the layout, the names, the
-/// scales. Units and named values may differ; the newest declaration's are taken.
+/// Fingerprint of a message's layout, names and scales: declarations with the same one share a
+/// type. Units and named values may differ; those of the newest declaration are used.
 pub(super) fn layout(message: &Message) -> String {
     let mut text = String::new();
     let sections = [&message.header, &message.body, &message.footer];
@@ -21,7 +21,7 @@ pub(super) fn layout(message: &Message) -> String {
     text
 }
 
-/// What two types share that are one.
+/// Fingerprint of a type.
 pub(super) fn content(shape: &Shape) -> String {
     let mut text = String::new();
     shape_into(&mut text, shape, Detail::All);

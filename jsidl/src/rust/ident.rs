@@ -1,10 +1,10 @@
-//! Names of the definition as identifiers of Rust: case, keywords, collisions.
+//! Converts names of the definition to Rust identifiers: case, keywords, collisions.
 
 use std::collections::HashSet;
 
 use heck::{ToShoutySnakeCase, ToSnakeCase, ToUpperCamelCase};
 
-/// Keywords that may be written as raw identifiers.
+/// Keywords that can be raw identifiers.
 const KEYWORDS: &[&str] = &[
     "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "do", "dyn",
     "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let",
@@ -13,10 +13,10 @@ const KEYWORDS: &[&str] = &[
     "virtual", "where", "while", "yield",
 ];
 
-/// Keywords that may not.
+/// Keywords that cannot.
 const PATH_KEYWORDS: &[&str] = &["crate", "self", "super", "_"];
 
-/// Names from the prelude that generated code uses.
+/// Prelude names used by generated code.
 const PRELUDE: &[&str] = &[
     "Self",
     "Option",
@@ -58,21 +58,21 @@ const PRELUDE: &[&str] = &[
     "Extend",
 ];
 
-/// The identifiers of one namespace, each given once.
+/// The identifiers of one namespace, without duplicates.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Names {
     taken: HashSet<String>,
 }
 
 impl Names {
-    /// A namespace in which some names are taken from the start.
+    /// A namespace with reserved names.
     pub(super) fn reserving(names: &[&str]) -> Self {
         Self {
             taken: names.iter().map(|&name| name.to_owned()).collect(),
         }
     }
 
-    /// A field, a function, a module: `Position_RMS` becomes `position_rms`.
+    /// Identifier of a field, function or module: `Position_RMS` becomes `position_rms`.
     pub(super) fn snake(&mut self, name: &str) -> String {
         let ident = self.unique(leading(&name.to_snake_case(), "_"), "_");
         if KEYWORDS.contains(&ident.as_str()) {
@@ -82,13 +82,13 @@ impl Names {
         }
     }
 
-    /// A type or an alternative: `ReportServiceList`.
+    /// Identifier of a type or an alternative: `ReportServiceList`.
     pub(super) fn camel(&mut self, name: &str) -> String {
         let ident = leading(&name.to_upper_camel_case(), "N");
         self.unique(ident, "")
     }
 
-    /// A constant: `STREAM_NOT_FOUND`.
+    /// Identifier of a constant: `STREAM_NOT_FOUND`.
     pub(super) fn shouty(&mut self, name: &str) -> String {
         self.unique(leading(&name.to_shouty_snake_case(), "N"), "_")
     }
@@ -107,7 +107,7 @@ impl Names {
     }
 }
 
-/// Gives an identifier a letter to begin with, and keeps what Rust can read.
+/// Makes an identifier begin with a letter, and drops invalid characters.
 fn leading(ident: &str, letter: &str) -> String {
     let ident: String = ident
         .chars()
@@ -120,7 +120,7 @@ fn leading(ident: &str, letter: &str) -> String {
     }
 }
 
-/// An identifier that is none of those taken, for a local variable beside fields.
+/// An identifier that differs from those taken, for a local variable beside fields.
 pub(super) fn local(base: &str, taken: &[&str]) -> String {
     let mut ident = base.to_owned();
     while taken.contains(&ident.as_str()) {

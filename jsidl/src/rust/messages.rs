@@ -1,4 +1,4 @@
-//! A message: its struct, its codec, and the module of its nested types.
+//! Generates a message: its struct, its codec, and the module of its nested types.
 
 use std::collections::HashMap;
 
@@ -8,23 +8,23 @@ use super::writer::Writer;
 use super::{choices, decode, docs, encode, newtypes, random, structs, view};
 use crate::model::{Group, Id, Item, Message, Shape, Unsigned};
 
-/// A message type that is to be written.
+/// A message type to generate.
 #[derive(Debug)]
 pub(super) struct Plan<'m> {
     pub(super) message: &'m Message,
-    /// The type's name, and the name of the module of its nested types.
+    /// Name of the type, and of the module with its nested types.
     pub(super) ident: String,
     pub(super) module: String,
     /// The module of an older layout; `None` for the newest.
     pub(super) version: Option<String>,
-    /// The services that declare it, the newest version first.
+    /// The declaring services, the newest version first.
     pub(super) services: Vec<&'m Id>,
-    /// Whether only the client in control may give it.
+    /// Whether the command requires control.
     pub(super) needs_control: bool,
 }
 
 impl Plan<'_> {
-    /// The type as seen from the root of the set.
+    /// The type's path from the root of the set.
     pub(super) fn path(&self) -> String {
         match &self.version {
             Some(version) => format!("{version}::{}", self.ident),
@@ -33,7 +33,7 @@ impl Plan<'_> {
     }
 }
 
-/// What the struct of a message holds.
+/// Members of a message's struct.
 enum Content<'m> {
     /// The members of the body's group.
     Flat(Vec<Field<'m>>, Option<Unsigned>),
@@ -123,8 +123,8 @@ fn services(services: &[&Id]) -> String {
     names.join(", ")
 }
 
-/// The parts of a message that its struct shows as members: those of header, body and footer, if
-/// there is more than a body.
+/// The parts of a message that are members of its struct: header, body and footer, if it has more
+/// than a body.
 pub(super) fn sections(message: &Message) -> Vec<Item> {
     if message.header.is_none() && message.footer.is_none() {
         return Vec::new();

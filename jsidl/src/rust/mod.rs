@@ -1,10 +1,11 @@
-//! Rust from resolved services: typed messages over the codec runtime of the crate `jaus`.
+//! Generates Rust from resolved services: typed messages over the codec runtime of the crate
+//! `jaus`.
 //!
-//! The text comes out indented and documented, to be included from a build script's `OUT_DIR`;
+//! The output is indented and documented, to be included from a build script's `OUT_DIR`;
 //! [`build`](crate::build) does all of that. Messages are flat in the module; the types inside a
-//! message are in a module of its name. A message that several services or versions declare with
-//! one layout is one type; an older layout stands in a module of its version, such as `v1_0`. The
-//! state machine of a service is in the service's module.
+//! message are in a module with its name. A message that several services or versions declare with
+//! one layout is one type; an older layout is in a module of its version, such as `v1_0`. The state
+//! machine of a service is in the service's module.
 
 mod choices;
 mod decode;
@@ -31,7 +32,7 @@ use self::writer::Writer;
 use crate::library::Library;
 use crate::model::{Id, Message, Service, Version};
 
-/// The Rust module of a set of services, which may inherit from other services of the library.
+/// Generates the Rust module of a set of services, which may inherit from others in the library.
 ///
 /// `runtime` is the path of the codec runtime as the generated module sees it, for example
 /// `::jaus::codec`.
@@ -62,8 +63,8 @@ pub fn module<'m>(
     out.finish()
 }
 
-/// Which types there are to be: one for every code, name and layout; sorted by code, the newest
-/// layout of a message first.
+/// Plans the types: one for every code, name and layout; sorted by code, the newest layout of a
+/// message first.
 fn plan<'m>(library: &Library, services: &[&'m Service], names: &mut Names) -> Vec<Plan<'m>> {
     let mut messages: BTreeMap<(u16, &str), Vec<Declared<'m>>> = BTreeMap::new();
     for service in services {
@@ -98,14 +99,14 @@ fn plan<'m>(library: &Library, services: &[&'m Service], names: &mut Names) -> V
             });
         }
     }
-    // The modules of versions are names of the root, too.
+    // The modules of versions are names in the root, too.
     for version in versions.keys() {
         names.snake(version);
     }
     plans
 }
 
-/// One layout of a message and who declares it.
+/// One layout of a message with its declaring services.
 struct Declared<'m> {
     layout: String,
     /// The newest declaration.

@@ -1,4 +1,4 @@
-//! Newtypes over integers: scaled, enumerated and bit fields.
+//! Generates newtypes over integers: scaled, enumerated and bit fields.
 
 use super::docs;
 use super::types::{SubType, number_type, unsigned_type, width};
@@ -187,7 +187,7 @@ fn sub_field(out: &mut Writer, base: Unsigned, sub: &SubType<'_>) {
     ));
 }
 
-/// The least and the greatest value that the definition allows, as far as the bits hold them.
+/// The range that the definition permits, limited to the available bits.
 fn limits(sub: &SubType<'_>) -> (u64, u64) {
     let field = sub.field;
     let most = u64::MAX >> (63 - (field.to - field.from));

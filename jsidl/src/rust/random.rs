@@ -1,4 +1,4 @@
-//! Random valid values for tests: `Arbitrary`.
+//! Generates `Arbitrary`: random valid values for tests.
 
 use super::structs::optional;
 use super::types::{Field, Type};
@@ -90,7 +90,7 @@ fn value(ty: &Type) -> String {
     }
 }
 
-/// A function that makes a random value: a path or a closure.
+/// A function that creates a random value: a path or a closure.
 fn maker(ty: &Type) -> String {
     let value = value(ty);
     match value.strip_suffix("(random)") {

@@ -1,4 +1,4 @@
-//! The tables of a set: services by identity, messages by code.
+//! Generates the tables of a set: services by identity, messages by code.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use super::messages::Plan;
 use super::writer::Writer;
 use crate::model::{Id, Message, Service};
 
-/// The constants of services: identity to path from the root of the set.
+/// Constants of the services: identity to path from the root of the set.
 pub(super) type ServicePaths<'m> = BTreeMap<&'m Id, String>;
 
-/// The versions of one service, the newest first, and the name of their module.
+/// Versions of one service, the newest first, with the name of their module.
 pub(super) struct Versions<'m> {
     pub(super) services: Vec<&'m Service>,
     module: String,
 }
 
-/// Which modules of services there are to be.
+/// The modules of services to generate.
 pub(super) fn versions<'m>(services: &[&'m Service], names: &mut Names) -> Vec<Versions<'m>> {
     let mut by_urn: BTreeMap<&str, Vec<&Service>> = BTreeMap::new();
     for &service in services {
@@ -32,7 +32,7 @@ pub(super) fn versions<'m>(services: &[&'m Service], names: &mut Names) -> Vec<V
     named.collect()
 }
 
-/// Writes a module for every service, all versions in one: constants and state machines.
+/// Writes a module per service, for all versions: constants and state machines.
 pub(super) fn services<'m>(
     out: &mut Writer,
     all: &[Versions<'m>],
@@ -123,7 +123,7 @@ pub(super) fn tables(
     out.push("];");
 }
 
-/// The constant of a service of the set, or the identity of another one.
+/// The constant of the set's service, or the identity of a foreign one.
 fn service_id(id: &Id, paths: &ServicePaths<'_>) -> String {
     paths.get(id).cloned().unwrap_or_else(|| {
         let (urn, version) = (&id.urn, id.version);

@@ -1,4 +1,4 @@
-//! Structs: message bodies, records and sequences, with accessors in engineering units.
+//! Generates structs: message bodies, records and sequences, with accessors in engineering units.
 
 use super::docs;
 use super::ident::{Names, unit_suffix};
@@ -6,7 +6,7 @@ use super::types::{Field, Type};
 use super::writer::Writer;
 use crate::model::Unsigned;
 
-/// Writes a struct with its accessors; the documentation stands already.
+/// Writes a struct with its accessors, after its documentation.
 pub(super) fn declare(
     out: &mut Writer,
     ident: &str,
@@ -45,7 +45,7 @@ pub(super) fn optional(field: &Field<'_>) -> bool {
     field.item.optional
 }
 
-/// What the octets of a struct are made of.
+/// Layout of a struct.
 pub(super) struct Body<'a> {
     pub(super) fields: &'a [Field<'a>],
     pub(super) presence: Option<Unsigned>,
@@ -54,7 +54,7 @@ pub(super) struct Body<'a> {
 }
 
 impl Body<'_> {
-    /// Whether everything together is a block of one size once all optional members are there.
+    /// Whether the struct has one fixed size if all optional members are present.
     pub(super) fn has_fast_path(&self) -> bool {
         self.presence.is_some() && self.fields.iter().all(|field| field.ty.size().is_some())
     }
@@ -68,7 +68,7 @@ impl Body<'_> {
         if self.message { 2 } else { 0 }
     }
 
-    /// The least number of octets.
+    /// Minimum number of octets.
     pub(super) fn least(&self) -> usize {
         let required = self.fields.iter().filter(|field| !optional(field));
         let members = required.map(|field| field.ty.least()).sum::<usize>();
@@ -85,7 +85,7 @@ fn rust_type(field: &Field<'_>, prefix: &str) -> String {
     }
 }
 
-/// For arrays that are too long for the standard library's `Default`.
+/// Implements `Default` for arrays too long for the standard library's.
 fn default_impl(out: &mut Writer, ident: &str, fields: &[Field<'_>]) {
     out.gap();
     out.push(format!("impl Default for {ident} {{"));
@@ -105,7 +105,7 @@ fn default_impl(out: &mut Writer, ident: &str, fields: &[Field<'_>]) {
     out.push("}\n}\n}");
 }
 
-/// Getters and setters that speak in the unit of the field.
+/// Getters and setters in the unit of the field.
 fn accessors(out: &mut Writer, ident: &str, fields: &[Field<'_>], prefix: &str) {
     let scaled = |field: &&Field<'_>| matches!(field.ty, Type::Newtype { scale: Some(_), .. });
     if !fields.iter().any(|field| scaled(&field)) {
@@ -162,7 +162,7 @@ fn accessors(out: &mut Writer, ident: &str, fields: &[Field<'_>], prefix: &str) 
     out.push("}");
 }
 
-/// Writes the codec of a struct whose values all have one size.
+/// Writes the codec of a fixed size struct.
 pub(super) fn fixed(out: &mut Writer, ident: &str, fields: &[Field<'_>]) {
     let size: usize = fields.iter().filter_map(|field| field.ty.size()).sum();
     let mut at = 0;

@@ -1,7 +1,7 @@
-//! Which Rust types a message needs: the step between the model and the text.
+//! Determines the Rust types of a message, between the model and the generated text.
 //!
-//! The nested types of a message live in a module of the message's name. A type that another
-//! message has already defined in the same way is used again instead of defined twice.
+//! Nested types of a message are in a module with the message's name. A type that another message
+//! has already defined in the same way is reused.
 
 use std::collections::HashMap;
 
@@ -25,7 +25,7 @@ pub(super) enum Type {
         number: Number,
         scale: Option<(Scale, String)>,
     },
-    /// A record whose members all have one size.
+    /// A record with members of fixed size.
     Record {
         ident: String,
         size: usize,
@@ -68,7 +68,7 @@ pub(super) struct Definition<'m> {
 /// What a nested type is.
 #[derive(Debug)]
 pub(super) enum Kind<'m> {
-    /// Defined by another message, at a path from the root of the set.
+    /// Defined by another message, at this path from the root of the set.
     Reused(String),
     Struct {
         item: &'m Item,
@@ -103,7 +103,7 @@ pub(super) enum Kind<'m> {
     },
 }
 
-/// A sub-field of a bit field: its accessor, and its type if its values have names.
+/// A sub-field of a bit field: its accessor, and its type if it has named values.
 #[derive(Debug)]
 pub(super) struct SubType<'m> {
     pub(super) field: &'m SubField,
@@ -147,7 +147,7 @@ impl<'m, 's> Nested<'m, 's> {
             .collect()
     }
 
-    /// The type of an item, defined if it must be.
+    /// The type of an item, defined if necessary.
     pub(super) fn item(&mut self, item: &'m Item) -> Type {
         match &item.shape {
             Shape::Group(group) => self.group(item, group),
@@ -183,7 +183,7 @@ impl<'m, 's> Nested<'m, 's> {
         }
     }
 
-    /// Defines a type once per name and content; `make` is asked only if there is none yet.
+    /// Defines a type once per name and content; `make` is called only if it is new.
     fn define(
         &mut self,
         name: &str,
@@ -196,7 +196,7 @@ impl<'m, 's> Nested<'m, 's> {
         }
         let ident = self.names.camel(name);
         self.known.insert(key.clone(), ident.clone());
-        // Built even if it is reused, so that the types inside it get their names here too.
+        // Built even if it is reused, so that its nested types get their names here, too.
         let kind = make(self);
         let kind = match self.shared.get(&key) {
             Some(path) => Kind::Reused(path.clone()),
@@ -310,7 +310,7 @@ impl<'m, 's> Nested<'m, 's> {
         }
     }
 
-    /// The type of a number. `name` becomes the type's name, `field` is what errors call it.
+    /// The type of a number. `name` is the type's name, `field` the name in errors.
     fn scalar(&mut self, name: &str, field: &'m str, scalar: &'m Scalar) -> Type {
         let content = fingerprint::scalar(scalar);
         match (&scalar.meaning, scalar.number) {
@@ -415,7 +415,7 @@ pub(super) fn width(field: &SubField) -> Unsigned {
 }
 
 impl Type {
-    /// Octets on the wire, if every value takes the same number and the runtime can read it as one.
+    /// The size on the wire, if it is constant and the runtime can read it as one value.
     pub(super) fn size(&self) -> Option<usize> {
         match self {
             Self::Number(number) | Self::Newtype { number, .. } => Some(number.size()),
@@ -431,7 +431,7 @@ impl Type {
         }
     }
 
-    /// The names and sizes of the fields that a value of fixed size consists of.
+    /// Names and sizes of the fields in a value of fixed size.
     pub(super) fn named_sizes(&self, name: &str) -> Vec<(String, usize)> {
         match self {
             Self::Record { fields, .. } => {
@@ -442,7 +442,7 @@ impl Type {
         }
     }
 
-    /// The least number of octets that a value takes.
+    /// Minimum size of a value in octets.
     pub(super) fn least(&self) -> usize {
         match self {
             Self::FixedText(length) => *length as usize,
@@ -460,7 +460,7 @@ impl Type {
         }
     }
 
-    /// The type in Rust, seen from where its module is called `prefix` (`report_x::` or nothing).
+    /// The Rust type, seen from where its module is called `prefix` (`report_x::` or nothing).
     pub(super) fn rust(&self, prefix: &str) -> String {
         match self {
             Self::Number(number) => number_type(*number).to_owned(),
@@ -484,7 +484,7 @@ impl Type {
         }
     }
 
-    /// Whether `Default` can be derived for it; the standard library stops at arrays of 32.
+    /// Whether `Default` can be derived; the standard library implements it for arrays up to 32.
     pub(super) fn derives_default(&self) -> bool {
         match self {
             Self::Array {

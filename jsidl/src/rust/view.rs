@@ -1,9 +1,9 @@
-//! What people read and write: `View` of structs.
+//! Generates the JSON view of structs.
 
 use super::types::Field;
 use super::writer::Writer;
 
-/// Writes the view of a struct whose members are shown as an object.
+/// Writes the view of a struct as an object.
 pub(super) fn group(out: &mut Writer, ident: &str, fields: &[Field<'_>]) {
     let names: Vec<_> = fields
         .iter()
@@ -55,7 +55,7 @@ fn begin(out: &mut Writer, ident: &str) {
     out.gap();
     out.push("codec::if_serde! {");
     out.push(format!("impl codec::view::View for {ident} {{"));
-    // The registry refers to these functions; copies of them would only take room.
+    // The registry references these functions; inlined copies would only cost space.
     out.push("#[inline(never)]\nfn view(&self) -> codec::view::Value {");
 }
 

@@ -1,4 +1,4 @@
-//! Rust text that is indented as it is written.
+//! Collects Rust text and indents it.
 
 /// Collects lines and indents them by the brackets at their ends.
 #[derive(Debug, Default)]
@@ -8,8 +8,8 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// Writes lines; a line that begins with a closing bracket is one step to the left, and one
-    /// that ends with an opening bracket moves what follows to the right.
+    /// Writes lines; a closing bracket at the start of a line decreases the indentation, an opening
+    /// one at the end increases it.
     pub(super) fn push(&mut self, lines: impl AsRef<str>) {
         for line in lines.as_ref().lines() {
             self.line(line.trim());
@@ -31,7 +31,7 @@ impl Writer {
         }
     }
 
-    /// Leaves a line free, unless a block has just begun.
+    /// Adds a blank line, unless a block has just begun.
     pub(super) fn gap(&mut self) {
         let begun = self.text.is_empty() || self.text.ends_with(['{', '(', '[']);
         let last = self.text.trim_end_matches('\n');
@@ -40,7 +40,7 @@ impl Writer {
         }
     }
 
-    /// Writes documentation, folded to a readable width. An empty paragraph is left out.
+    /// Writes documentation, wrapped to a readable width. Empty paragraphs are left out.
     pub(super) fn doc<'a>(&mut self, paragraphs: impl IntoIterator<Item = &'a str>) {
         let mut first = true;
         for paragraph in paragraphs.into_iter().filter(|text| !text.is_empty()) {
@@ -55,13 +55,13 @@ impl Writer {
         }
     }
 
-    /// All that was written.
+    /// The collected text.
     pub(super) fn finish(self) -> String {
         self.text
     }
 }
 
-/// Breaks text at blanks into lines of at most `width` characters.
+/// Wraps text at blanks into lines of at most `width` characters.
 fn fold(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {

@@ -1,11 +1,11 @@
-//! JSON Schema (draft 2020-12) of the JSON view of messages: what
+//! JSON Schema (draft 2020-12) of the JSON view of messages, the view that
 //! [`dynamic::to_json`](crate::dynamic::to_json) writes and
 //! [`dynamic::from_json`](crate::dynamic::from_json) reads.
 //!
-//! [`of_service`] gives one schema for a service. Its `$defs` hold the body of every message by the
-//! message's name; the schema itself describes a message with its name, as
-//! `{"message": "QueryIdentification", "body": {…}}`, other keys admitted: a line of
-//! `jaus decode` and `jaus encode`. Units are in the annotation `x-units`.
+//! [`of_service`] returns one schema for a service. Its `$defs` hold the body of every message
+//! under the message's name; the schema itself describes a message with its name, as
+//! `{"message": "QueryIdentification", "body": {…}}`, other keys admitted: a line of `jaus decode`
+//! and `jaus encode`. Units are in the annotation `x-units`.
 //!
 //! ```
 //! let mut loader = jsidl::Loader::new();
@@ -26,10 +26,10 @@ use crate::docs::names::Names;
 use crate::library::Library;
 use crate::model::{Message, Service};
 
-/// The dialect in which the schemas are written.
+/// JSON Schema dialect.
 pub const DIALECT: &str = "https://json-schema.org/draft/2020-12/schema";
 
-/// The schemas of all services that are wanted, each with the name of its file, for example
+/// Schemas of all services that `wanted` selects, each with its file name, for example
 /// `core.Discovery.1.1.schema.json`.
 pub fn files(library: &Library, wanted: impl Fn(&Service) -> bool) -> Vec<(String, Json)> {
     let wanted = || library.services().map(AsRef::as_ref).filter(|s| wanted(s));
@@ -41,7 +41,7 @@ pub fn files(library: &Library, wanted: impl Fn(&Service) -> bool) -> Vec<(Strin
     wanted().map(file).collect()
 }
 
-/// The schema of the messages that a service declares itself.
+/// Schema of the messages that a service declares itself.
 pub fn of_service(service: &Service) -> Json {
     let mut definitions = Map::new();
     let mut lines = Vec::new();
@@ -76,7 +76,7 @@ pub fn of_service(service: &Service) -> Json {
     });
     describe(&mut schema, &service.description);
     if lines.is_empty() {
-        // A service without messages of its own: nothing is one of them.
+        // A service without its own messages: the schema matches nothing.
         schema["not"] = json!({});
     } else {
         schema["anyOf"] = lines.into();
@@ -85,7 +85,7 @@ pub fn of_service(service: &Service) -> Json {
     schema
 }
 
-/// The schema of a message's JSON view, without the key `$schema`.
+/// Schema of a message's JSON view, without the key `$schema`.
 pub fn of_message(message: &Message) -> Json {
     let mut schema = if message.header.is_none() && message.footer.is_none() {
         match &message.body {
@@ -112,7 +112,7 @@ pub fn of_message(message: &Message) -> Json {
     schema
 }
 
-/// The message's name; with its code where another has the name already.
+/// The message's name, with its code if another message already has the name.
 fn key(definitions: &Map<String, Json>, message: &Message) -> String {
     if definitions.contains_key(&message.name) {
         format!("{}-{:04X}", message.name, message.code)
@@ -121,7 +121,7 @@ fn key(definitions: &Map<String, Json>, message: &Message) -> String {
     }
 }
 
-/// A key as a part of a JSON pointer in a URI.
+/// Escapes a key for a JSON pointer in a URI.
 fn pointer(key: &str) -> String {
     let mut escaped = String::with_capacity(key.len());
     for octet in key.bytes() {
@@ -142,7 +142,7 @@ fn describe(schema: &mut Json, words: &str) {
     }
 }
 
-/// An object that admits these keys only.
+/// An object that admits only these keys.
 fn object(properties: Map<String, Json>, required: &[&str]) -> Json {
     let mut schema = json!({ "type": "object" });
     if !properties.is_empty() {

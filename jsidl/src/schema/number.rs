@@ -1,11 +1,11 @@
-//! The schema of numbers: their range, the names that stand for values, and units.
+//! Schemas of numbers: range, named values and units.
 
 use serde_json::{Map, Value as Json, json};
 
 use super::{describe, object};
 use crate::model::{BitField, Meaning, Number, Scalar, SubField, ValueSet};
 
-/// The key for the bits of a bit field that no sub-field owns.
+/// The key of the bits that no sub-field owns.
 const RESERVED: &str = "_reserved";
 
 /// A `fixed_field`, or the value of a `variable_field`.
@@ -28,7 +28,7 @@ fn plain(number: Number) -> Json {
         Number::Unsigned(width) => integer(width.max()),
         Number::Signed(_) => {
             let (least, greatest) = number.integers().unwrap_or((0, 0));
-            // These limits fit: no signed number has more than 64 bits.
+            // The limits fit: no signed number has more than 64 bits.
             json!({ "type": "integer", "minimum": least as i64, "maximum": greatest as i64 })
         }
         Number::F32 | Number::F64 => {
@@ -41,7 +41,7 @@ fn integer(greatest: u64) -> Json {
     json!({ "type": "integer", "minimum": 0, "maximum": greatest })
 }
 
-/// The number, or the name of a value. Numbers without a name occur and are kept.
+/// A number or the name of a value. Unnamed numbers occur and are preserved.
 fn named(number: Json, values: &ValueSet) -> Json {
     if values.values.is_empty() {
         return number;
@@ -56,7 +56,7 @@ fn named(number: Json, values: &ValueSet) -> Json {
     schema
 }
 
-/// A `bit_field`: an object of its sub-fields, each 0 if it is left out.
+/// A `bit_field`: an object of its sub-fields, each 0 if omitted.
 pub(super) fn bits(bits: &BitField) -> Json {
     let mut properties = Map::new();
     let mut owned = 0;

@@ -1,4 +1,4 @@
-//! The schema of each construct of the language, after the table of the JSON view.
+//! Schema of each language construct, following the table of the JSON view.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -41,7 +41,7 @@ fn closed<const N: usize>(properties: [(&str, Json); N], required: &[&str]) -> J
     object(Map::from_iter(properties), required)
 }
 
-/// The schema of an item with its author's text.
+/// Schema of an item with its author's text.
 fn item(item: &Item) -> Json {
     let mut schema = of(&item.shape);
     describe(&mut schema, &item.interpretation);
@@ -54,7 +54,7 @@ fn group(group: &Group) -> Json {
     for member in &group.members {
         let mut schema = item(member);
         if member.optional {
-            // What is absent may also be said to be nothing.
+            // An absent member may also be `null`.
             schema = json!({ "anyOf": [schema, { "type": "null" }] });
         } else {
             required.push(member.name.as_str());
@@ -81,8 +81,8 @@ fn variant(variant: &Variant) -> Json {
     json!({ "anyOf": alternatives })
 }
 
-/// Text, or octets that are not UTF-8. A character takes one octet or more, so that the limits of
-/// octets are wide ones for characters.
+/// Text, or octets that are not UTF-8. A character takes at least one octet, so octet limits are
+/// loose upper bounds for characters.
 fn text(min: u64, max: u64) -> Json {
     let mut schema = json!({ "type": "string", "maxLength": max });
     if min > 0 {
@@ -100,7 +100,7 @@ fn hex(count: Option<&Count>) -> Json {
     schema
 }
 
-/// States the limits of a count, as far as they say more than nothing.
+/// States the limits of a count that actually restrict it.
 fn limits(schema: &mut Json, [least, greatest]: [&str; 2], count: &Count, each: u64) {
     if count.min > 0 {
         schema[least] = count.min.saturating_mul(each).into();

@@ -1,7 +1,6 @@
 //! Reads `protocol_behavior`: state machines with their states, transitions and actions.
 //!
-//! What is wrong in a machine leaves that machine out, not the service: its messages do not
-//! depend on it.
+//! A mistake in a machine drops that machine but not the service: its messages do not depend on it.
 
 use roxmltree::Node as Xml;
 
@@ -13,7 +12,7 @@ use crate::behaviour::{
 use crate::check::unique;
 use crate::source::{Span, Spanned};
 
-/// States of a service; published ones have up to 17.
+/// Maximum number of states of a service; published ones have up to 17.
 const MOST_STATES: usize = 500;
 
 /// `start`
@@ -23,17 +22,17 @@ struct Start {
     state: Name,
 }
 
-/// What a `transition` and a `default_transition` hold.
+/// Parts of a `transition` or `default_transition`.
 struct TransitionParts {
     parameters: Vec<(Span, Parameter)>,
     guard: Result<Option<Guard>, Faulty>,
-    /// `None` if it is missing or wrong.
+    /// `None` if it is missing or invalid.
     kind: Option<TransitionKind>,
     actions: Vec<Action>,
 }
 
 impl Reader<'_> {
-    /// The machines that could be read without an error.
+    /// The machines without errors.
     pub(super) fn behaviour(&mut self, xml: Xml<'_, '_>) -> Vec<StateMachine> {
         self.only(xml, &["is_stateless"]);
         let stateless = self.attribute(xml, "is_stateless");
@@ -76,7 +75,7 @@ impl Reader<'_> {
         machines
     }
 
-    /// A service without states has machines of one state each.
+    /// A service declared stateless has machines of one state each.
     fn stateless(&mut self, flag: &Spanned<String>, machines: &[StateMachine]) {
         for machine in machines {
             let states = machine.all_states().count();
@@ -93,7 +92,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Adds the name of a machine and the state in which it starts; once for each machine.
+    /// Adds the start state of a machine; once per machine.
     fn add_start(&mut self, starts: &mut Vec<Start>, xml: Xml<'_, '_>) {
         self.only(xml, &["state_machine_name", "state_name", "interpretation"]);
         let machine = self.dotted(xml, "state_machine_name");
@@ -141,7 +140,7 @@ impl Reader<'_> {
         for child in self.children(xml) {
             match child.tag_name().name() {
                 "state" => self.add_state(&mut states, child),
-                // Where a diagram editor draws the arrow to the first state.
+                // The position of the start arrow in a diagram editor.
                 "pseudo_start_state" => {}
                 _ => self.misplaced(child, "state_machine", "`state`s"),
             }
@@ -170,7 +169,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Adds a state that could be named to those beside it.
+    /// Adds a named state to its siblings.
     fn add_state(&mut self, states: &mut Vec<State>, xml: Xml<'_, '_>) {
         let Some(state) = self.state(xml) else {
             return;
@@ -364,8 +363,8 @@ impl Reader<'_> {
         })
     }
 
-    /// The standard lets a `pop` name a transition to be taken afterwards, with arguments; no
-    /// published one does.
+    /// The standard permits a subsequent transition with arguments in a `pop`; published
+    /// definitions have none.
     fn pop(&mut self, xml: Xml<'_, '_>) -> TransitionKind {
         self.only(xml, &["transition", "interpretation"]);
         if let Some(transition) = self.attribute(xml, "transition") {
@@ -435,7 +434,7 @@ impl Reader<'_> {
         )
     }
 
-    /// As a transition, without what a trigger would bring along.
+    /// As a transition, but without trigger parameters.
     fn default_transition(&mut self, xml: Xml<'_, '_>) {
         self.only(xml, &["interpretation"]);
         let parts = self.transition_parts(xml, "default_transition");
@@ -462,12 +461,12 @@ impl Reader<'_> {
     }
 
     fn send_action(&mut self, xml: Xml<'_, '_>) {
-        // Its mistakes count all the same.
+        // Its mistakes are reported nevertheless.
         let _ = self.action(xml);
         self.not_understood(xml);
     }
 
-    /// Elements of the standard that no published definition has.
+    /// Elements of the standard without support, as no published definition uses them.
     fn not_understood(&mut self, xml: Xml<'_, '_>) {
         let name = xml.tag_name().name();
         let message = format!(

@@ -1,4 +1,4 @@
-//! Reads records, sequences, lists, variants and arrays, and decides which construct may stand
+//! Reads records, sequences, lists, variants and arrays, and checks which constructs are permitted
 //! where.
 
 use roxmltree::Node as Xml;
@@ -8,7 +8,7 @@ use super::{Construct, CountField, Dimension, Kind, Node, Target};
 use crate::model::{GroupKind, Unsigned};
 use crate::source::{Span, Spanned};
 
-/// Where a field or composite stands, which decides what it may be.
+/// Position of a field or composite, which determines what is permitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Place {
     /// Only fields.
@@ -41,11 +41,11 @@ impl Place {
     }
 }
 
-/// The attributes that every construct has.
+/// The attributes of every construct.
 const COMMON: [&str; 3] = ["name", "optional", "interpretation"];
 
 impl Reader<'_> {
-    /// Reads a field, a composite or a reference to one. `None` if it is something else, which is
+    /// Reads a field, a composite or a reference to one. `None` for anything else, which is
     /// reported.
     pub(super) fn node(&mut self, xml: Xml<'_, '_>, place: Place) -> Option<Node> {
         let element = xml.tag_name().name();
@@ -74,7 +74,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Reads what a `declared_…` element refers to.
+    /// Reads the target of a `declared_…` element.
     pub(super) fn reference(
         &mut self,
         xml: Xml<'_, '_>,
@@ -146,7 +146,7 @@ impl Reader<'_> {
                 });
             }
         }
-        // The members are kept even then, so that their own references are looked at.
+        // The members are kept nevertheless, so that their references are checked.
         if !sound {
             members.push(self.faulty(xml));
         }
@@ -267,7 +267,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Keeps the first of elements of which one is allowed.
+    /// Keeps the first of several elements where one is permitted.
     pub(super) fn once<'a, 'x>(
         &mut self,
         slot: &mut Option<Xml<'a, 'x>>,
@@ -281,7 +281,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads a `count_field` or `vtag_field`, which must be there.
+    /// Reads a mandatory `count_field` or `vtag_field`.
     pub(super) fn count(
         &mut self,
         parent: Xml<'_, '_>,
@@ -312,7 +312,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Where the first of several attributes stands, or else the element.
+    /// The position of the first of several attributes, or else of the element.
     pub(super) fn span_of(&self, xml: Xml<'_, '_>, attribute: &str) -> Span {
         self.attribute(xml, attribute)
             .map_or_else(|| self.span(xml), |a| a.span)

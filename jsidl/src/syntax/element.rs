@@ -1,5 +1,5 @@
-//! A cursor over XML elements that knows the habits of the language: two namespaces for the same
-//! elements, attributes with runs of white space, and the wish to report everything at once.
+//! Cursor over XML elements with the rules of JSIDL: two namespaces for the same elements, runs of
+//! white space in attributes, and reports of all mistakes at once.
 
 use roxmltree::{ExpandedName, Node as Xml};
 
@@ -12,13 +12,13 @@ use crate::source::{Source, Span, Spanned};
 /// AS5684 and AS5684A; files mix them.
 const NAMESPACES: [&str; 2] = ["urn:jaus:jsidl:1.0", "urn:jaus:jsidl:1.1"];
 
-/// JSIDL+: wraps several services into one file and adds what a diagram editor needs.
+/// JSIDL+: wraps several services into one file and adds data of a diagram editor.
 const PLUS: &str = "urn:jaus:jsidl:plus";
 
-/// Longer names and URNs are refused: findings repeat them.
+/// Maximum length of names and URNs: findings repeat them.
 const LONGEST_NAME: usize = 200;
 
-/// Folds runs of white space into single blanks and trims.
+/// Replaces runs of white space by single blanks and trims.
 pub(super) fn fold(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -29,7 +29,7 @@ pub(super) struct Reader<'r> {
     pub(super) report: &'r mut Report,
 }
 
-/// What belongs to an element of the language.
+/// Namespace of an element.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Belongs {
     Jsidl,
@@ -46,7 +46,7 @@ pub(super) fn belongs(xml: Xml<'_, '_>) -> Belongs {
 }
 
 impl Reader<'_> {
-    /// Where an element begins.
+    /// The position of an element.
     pub(super) fn span(&self, xml: Xml<'_, '_>) -> Span {
         self.source.span(xml.range().start)
     }
@@ -56,8 +56,8 @@ impl Reader<'_> {
         self.source.location(self.span(xml))
     }
 
-    /// The child elements. Drawing data of JSIDL+ is passed over; other foreign elements and text
-    /// are reported.
+    /// The child elements. Drawing data of JSIDL+ is skipped; other foreign elements and text are
+    /// reported.
     pub(super) fn children<'a, 'x>(&mut self, xml: Xml<'a, 'x>) -> Vec<Xml<'a, 'x>> {
         let parent = xml.tag_name().name();
         let mut elements = Vec::new();
@@ -91,7 +91,7 @@ impl Reader<'_> {
         elements
     }
 
-    /// Reports attributes that the element does not have.
+    /// Reports unknown attributes.
     pub(super) fn only(&mut self, xml: Xml<'_, '_>, known: &[&str]) {
         for attribute in xml.attributes() {
             let name = attribute.name();
@@ -110,7 +110,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reports an element that stands where it may not.
+    /// Reports a misplaced element.
     pub(super) fn misplaced(&mut self, xml: Xml<'_, '_>, parent: &str, allowed: &str) {
         let name = xml.tag_name().name();
         let at = self.span(xml);
@@ -120,7 +120,7 @@ impl Reader<'_> {
         );
     }
 
-    /// Reports a second element where one is allowed.
+    /// Reports a duplicate of an element that may occur once.
     pub(super) fn repeated(&mut self, xml: Xml<'_, '_>, parent: &str) {
         let name = xml.tag_name().name();
         let at = self.span(xml);
@@ -130,7 +130,7 @@ impl Reader<'_> {
         );
     }
 
-    /// Reports that a required child is missing.
+    /// Reports a missing child.
     pub(super) fn lacks(&mut self, xml: Xml<'_, '_>, child: &str) {
         let name = xml.tag_name().name();
         let at = self.span(xml);
@@ -151,7 +151,7 @@ impl Reader<'_> {
         })
     }
 
-    /// An attribute that must be there and not be empty.
+    /// A mandatory, nonempty attribute.
     pub(super) fn required(&mut self, xml: Xml<'_, '_>, name: &str) -> Option<Spanned<String>> {
         let found = self.attribute(xml, name);
         let element = xml.tag_name().name();
@@ -182,7 +182,7 @@ impl Reader<'_> {
             .unwrap_or_default()
     }
 
-    /// The attribute `name`, which must be an identifier.
+    /// The attribute `name`, an identifier.
     pub(super) fn name(&mut self, xml: Xml<'_, '_>) -> Option<String> {
         let name = self.required(xml, "name")?;
         self.identifier(name)
@@ -205,7 +205,7 @@ impl Reader<'_> {
         None
     }
 
-    /// Looks an attribute's text up among the words that it may be.
+    /// Looks an attribute's text up among the permitted words.
     pub(super) fn word<T: Copy>(
         &mut self,
         attribute: &Spanned<String>,
@@ -227,7 +227,7 @@ impl Reader<'_> {
         found.map(|(_, value)| *value)
     }
 
-    /// An attribute that is `true` or `false`. `Ok(None)` if there is none.
+    /// A Boolean attribute. `Ok(None)` if it is absent.
     pub(super) fn flag(&mut self, xml: Xml<'_, '_>, name: &str) -> Result<Option<bool>, Faulty> {
         match self.attribute(xml, name) {
             None => Ok(None),
@@ -353,7 +353,7 @@ fn begins_like_a_name(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
 }
 
-/// The beginning of a text that is too long to be repeated.
+/// The beginning of a text that is too long to be quoted.
 pub(super) fn shortened(text: &str) -> String {
     match text.char_indices().nth(40) {
         Some((end, _)) => format!("{}…", &text[..end]),
@@ -361,11 +361,11 @@ pub(super) fn shortened(text: &str) -> String {
     }
 }
 
-/// Something was wrong and has been reported.
+/// An error that is already reported.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Faulty;
 
-/// The words of a flag.
+/// Words of a Boolean attribute.
 pub(super) const FLAGS: [(&str, bool); 4] =
     [("true", true), ("false", false), ("1", true), ("0", false)];
 

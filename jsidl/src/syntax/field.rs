@@ -1,4 +1,4 @@
-//! Reads the fields: numbers, bit fields, strings, octets, and the value sets within them.
+//! Reads fields: numbers, bit fields, strings, octets, and their value sets.
 
 use roxmltree::Node as Xml;
 
@@ -7,7 +7,7 @@ use super::{ChoiceEnum, FormatEnum, Kind, ScalarField, ScaleRange, SubField, Val
 use super::{ValueRange, ValueSet};
 use crate::model::Rounding;
 
-/// The namespace of the attributes that JSIDL does not have.
+/// Namespace of our attributes beyond JSIDL.
 const EXTENSION: &str = "urn:jaus-rs:jsidl";
 
 impl Reader<'_> {
@@ -67,7 +67,7 @@ impl Reader<'_> {
     }
 
     /// Reads the attribute `bias` of our own namespace, which makes the zero of a signed integer
-    /// the centre of its range: the Reference Architecture has such numbers, JSIDL has no word for
+    /// the centre of its range: the Reference Architecture has such numbers, JSIDL cannot express
     /// them.
     fn centred(&mut self, xml: Xml<'_, '_>) -> Option<bool> {
         let Some(bias) = self.attribute(xml, (EXTENSION, "bias")) else {
@@ -340,7 +340,7 @@ impl Reader<'_> {
         sound.then_some(formats)
     }
 
-    /// The one child that an element must have and may only have.
+    /// The only permitted, mandatory child of an element.
     fn only_child<'a, 'x>(&mut self, xml: Xml<'a, 'x>, element: &str) -> Option<Xml<'a, 'x>> {
         let mut found = None;
         for child in self.children(xml) {
@@ -358,7 +358,7 @@ impl Reader<'_> {
     }
 }
 
-/// `None` if something was there but could not be read.
+/// `None` if it was present but unreadable.
 fn transpose<T>(read: Option<Option<T>>) -> Option<Option<T>> {
     match read {
         None => Some(None),

@@ -1,20 +1,20 @@
-//! A look at a text before the XML parser gets it, so that a hostile one cannot keep it busy: the
-//! parser's work grows with the square of the attributes of a tag and of the nesting.
+//! Rejects excessive texts before XML parsing: the parser's work grows with the square of a tag's
+//! attributes and of the nesting.
 
-/// Larger texts are refused; the largest published definition has less than a tenth of it.
+/// Maximum size of a text; the largest published definition has less than a tenth of it.
 pub(crate) const LARGEST: u64 = 8 << 20;
 
-/// Elements within each other; published definitions need 15.
+/// Maximum nesting of elements; published definitions need 15.
 const DEEPEST: usize = 100;
 
-/// Attributes of one tag; the language knows at most seven.
+/// Maximum number of attributes of a tag; the language has at most seven.
 const MOST_ATTRIBUTES: usize = 50;
 
-/// Namespace declarations in a text: the parser compares those of an element with all that are in
-/// force. Published files have at most 20.
+/// Maximum number of namespace declarations in a text: the parser compares those of an element with
+/// all in scope. Published files have at most 20.
 const MOST_NAMESPACES: usize = 2_000;
 
-/// Says where a text exceeds what a definition can need, and what to do about it.
+/// The position of the first excess in a text, with the remedy.
 pub(super) fn excess(text: &str) -> Option<(usize, String)> {
     if text.len() as u64 > LARGEST {
         let message = format!("the text is larger than {} MiB: split it", LARGEST >> 20);

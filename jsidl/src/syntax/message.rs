@@ -8,8 +8,8 @@ use super::{Construct, Content, Declaration, DeclarationKind, EventDef, MessageD
 use crate::source::Spanned;
 
 impl Reader<'_> {
-    /// Reads one element of a type set, a message set or an event set. `None` if it is nothing
-    /// that can be declared there, which is reported.
+    /// Reads one element of a type set, a message set or an event set. `None` if it cannot be
+    /// declared there, which is reported.
     pub(super) fn declaration(
         &mut self,
         xml: Xml<'_, '_>,
@@ -195,7 +195,7 @@ impl Reader<'_> {
     }
 }
 
-/// What may be declared in a set.
+/// The permitted declarations of a set.
 pub(super) struct DeclarationPlace {
     pub(super) parent: &'static str,
     pub(super) admits: fn(Construct) -> bool,

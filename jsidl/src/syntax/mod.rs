@@ -1,7 +1,7 @@
-//! The syntax tree: what the XML says, with every place kept and no reference followed.
+//! Syntax tree: the content of the XML, with all positions, before references are resolved.
 //!
-//! [`read`] turns one text into declarations, which it adds to a [`Program`]. What it cannot read
-//! it reports and marks as faulty, so that everything around it is still looked at.
+//! [`read`] parses one text into declarations, which it adds to a [`Program`]. Unreadable parts are
+//! reported and marked as faulty, so that everything around them is still checked.
 
 mod behaviour;
 mod composite;
@@ -19,7 +19,7 @@ use crate::source::{Span, Spanned};
 pub(crate) use limits::LARGEST;
 pub(crate) use root::{Strictness, is_definition, read};
 
-/// Everything that was read, of all files.
+/// Declarations of all files.
 #[derive(Debug, Default)]
 pub(crate) struct Program {
     pub(crate) services: Vec<ServiceDef>,
@@ -46,13 +46,13 @@ pub(crate) struct ServiceDef {
     pub(crate) events: Vec<Declaration>,
     /// The state machines without errors.
     pub(crate) behaviour: Vec<StateMachine>,
-    /// Whether it can be identified and says what it refers to. If not, it is looked at for
-    /// further mistakes and then left out.
+    /// Whether its identity and references are readable. If not, it is checked for further mistakes
+    /// and then left out.
     pub(crate) sound: bool,
 }
 
-/// A local name for something that is identified by URN and version: `inherits_from`,
-/// `client_of`, `declared_type_set_ref`, `declared_const_set_ref`.
+/// A local alias of a set or service with URN and version: `inherits_from`, `client_of`,
+/// `declared_type_set_ref`, `declared_const_set_ref`.
 #[derive(Debug, Clone)]
 pub(crate) struct SetRef {
     pub(crate) span: Span,
@@ -68,8 +68,7 @@ pub(crate) struct TypeSet {
     pub(crate) id: Option<Id>,
     pub(crate) type_sets: Vec<SetRef>,
     pub(crate) const_sets: Vec<SetRef>,
-    /// The constant set that stands beside the type set in a service: an index into
-    /// [`Program::const_sets`].
+    /// The constant set beside the type set in a service: an index into [`Program::const_sets`].
     pub(crate) constants: Option<usize>,
     pub(crate) declarations: Vec<Declaration>,
 }
@@ -106,7 +105,7 @@ pub(crate) struct ConstDef {
     pub(crate) value: Expr,
 }
 
-/// A named thing in a type set, a message set or an event set.
+/// A named item of a type set, a message set or an event set.
 #[derive(Debug)]
 pub(crate) struct Declaration {
     pub(crate) span: Span,
@@ -126,11 +125,11 @@ pub(crate) enum DeclarationKind {
     Node(Node),
     /// `declared_message_def`, `declared_event_def`, `declared_header` …
     Reference(Target),
-    /// Reported already.
+    /// Already reported.
     Faulty,
 }
 
-/// What a `declared_type_ref` asks for.
+/// Target of a `declared_type_ref`.
 #[derive(Debug, Clone)]
 pub(crate) struct Target {
     pub(crate) construct: Construct,
@@ -138,7 +137,7 @@ pub(crate) struct Target {
 }
 
 impl DeclarationKind {
-    /// Which construct is declared; `None` if that could not be read.
+    /// The declared construct; `None` if it was unreadable.
     pub(crate) const fn construct(&self) -> Option<Construct> {
         match self {
             Self::Message(_) => Some(Construct::MessageDef),
@@ -162,7 +161,7 @@ pub(crate) struct MessageDef {
     pub(crate) footer: Section,
 }
 
-/// `event_def`: looked at for its mistakes only.
+/// `event_def`: only checked for mistakes.
 #[derive(Debug)]
 pub(crate) struct EventDef {
     pub(crate) sections: [Section; 3],
@@ -175,13 +174,13 @@ pub(crate) struct Section {
     pub(crate) content: Content,
 }
 
-/// What a section holds.
+/// Content of a section.
 #[derive(Debug)]
 pub(crate) enum Content {
     Empty,
     Node(Box<Node>),
     Reference(Target),
-    /// Reported already.
+    /// Already reported.
     Faulty,
 }
 
@@ -190,13 +189,13 @@ pub(crate) enum Content {
 pub(crate) struct Node {
     pub(crate) span: Span,
     pub(crate) name: String,
-    /// Absent in some older definitions, which means `false`; a reference without it takes over
-    /// what the target says.
+    /// Absent in some older definitions, which means `false`; a reference without it inherits the
+    /// target's value.
     pub(crate) optional: Option<bool>,
     pub(crate) interpretation: Option<String>,
     pub(crate) kind: Kind,
-    /// Whether nothing was reported while it was read. If not, it is looked at for further
-    /// mistakes and then left out.
+    /// Whether it was read without findings. If not, it is checked for further mistakes and then
+    /// left out.
     pub(crate) sound: bool,
 }
 
@@ -243,7 +242,7 @@ pub(crate) enum Kind {
         choices: Vec<ChoiceEnum>,
     },
     Reference(Target),
-    /// Reported already.
+    /// Already reported.
     Faulty,
 }
 
@@ -270,7 +269,7 @@ impl Kind {
     }
 }
 
-/// An expression and where it stands.
+/// An expression with its position.
 pub(crate) type Expr = Spanned<Expression>;
 
 /// `count_field` or `vtag_field`
@@ -367,7 +366,7 @@ pub(crate) struct ChoiceEnum {
     pub(crate) scalar: ScalarField,
 }
 
-/// The elements that declare something which a `declared_…` element may refer to.
+/// Elements that a `declared_…` element may refer to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Construct {
     Record,
@@ -433,7 +432,7 @@ impl Construct {
         }
     }
 
-    /// What an element declares, and whether it only refers to a declaration (`declared_…`).
+    /// The construct of an element, and whether it is a reference to a declaration (`declared_…`).
     pub(crate) fn of(element: &str) -> Option<(Self, bool)> {
         let bare = element.strip_prefix("declared_");
         let name = bare.unwrap_or(element);
@@ -441,7 +440,7 @@ impl Construct {
         Some((construct, bare.is_some()))
     }
 
-    /// Composites are made of other constructs.
+    /// Composites consist of other constructs.
     pub(crate) const fn is_composite(self) -> bool {
         matches!(
             self,

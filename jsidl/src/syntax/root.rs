@@ -10,12 +10,12 @@ use crate::diagnostic::Report;
 use crate::model::{Id, Version};
 use crate::source::{Source, Span};
 
-/// What to think of an XML file that has nothing to do with the language.
+/// Treatment of an XML file that is no JSIDL.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Strictness {
-    /// It was named by the user: an error.
+    /// Named by the user: an error.
     Named,
-    /// It was found in a directory: passed over with a warning.
+    /// Found in a directory: skipped with a warning.
     Found,
 }
 
@@ -32,7 +32,7 @@ pub(crate) fn read(
     }
 }
 
-/// Whether a text is XML and its root an element of the language; if not, the report says so.
+/// Whether a text is XML with a root element of the language; if not, it is reported.
 pub(crate) fn is_definition(source: &Source, report: &mut Report) -> bool {
     let Some(document) = parse(source, report) else {
         return false;
@@ -52,7 +52,7 @@ fn parse<'s>(source: &'s Source, report: &mut Report) -> Option<Document<'s>> {
         report.error(source.span(at), what);
         return None;
     }
-    // A node takes at least three octets of text, so the size limit bounds the nodes as well.
+    // A node takes at least three octets of text, so the size limit also bounds the nodes.
     let options = ParsingOptions {
         allow_dtd: false,
         ..ParsingOptions::default()
@@ -70,7 +70,7 @@ fn malformed(error: &roxmltree::Error) -> String {
             "a document type declaration is not needed in JSIDL and not read: remove it".into()
         }
         error => {
-            // The parser ends its sentence with the position, which the diagnostic has itself.
+            // The parser's message ends with the position, which the diagnostic has already.
             let pos = error.pos();
             let text = error.to_string();
             let text = text
@@ -97,7 +97,7 @@ fn malformed_at(source: &Source, error: &roxmltree::Error) -> Span {
     source.span(line + within)
 }
 
-/// What a file may declare.
+/// Permitted root elements.
 const ROOTS: [&str; 4] = [
     "service_def",
     "declared_type_set",
@@ -105,7 +105,7 @@ const ROOTS: [&str; 4] = [
     "service_set",
 ];
 
-/// Sets that one set may refer to; published ones refer to at most 10.
+/// Maximum number of sets that one set refers to; published ones refer to at most 10.
 const MOST_REFERENCES: usize = 200;
 
 const TYPE_SET: DeclarationPlace = DeclarationPlace {
@@ -246,7 +246,7 @@ impl Reader<'_> {
         parts
     }
 
-    /// Reads the sets inside a service; the type set sees the constants as its own.
+    /// Reads the sets inside a service; the type set uses the constants directly.
     fn inner_types(
         &mut self,
         xml: Xml<'_, '_>,
@@ -325,7 +325,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Adds a reference to another set, under an alias of its own.
+    /// Adds a reference to another set, under a unique alias.
     fn another(&mut self, xml: Xml<'_, '_>, references: &mut Vec<SetRef>) {
         let at = self.span(xml);
         if references.len() >= MOST_REFERENCES {
@@ -406,7 +406,7 @@ impl Reader<'_> {
     }
 }
 
-/// In place of an identity that could not be read.
+/// Placeholder of an unreadable identity.
 fn stand_in() -> Id {
     Id {
         urn: "(unreadable)".into(),

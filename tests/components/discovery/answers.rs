@@ -1,7 +1,7 @@
-//! What is answered to the queries that other stacks send, octet by octet.
+//! Answers to the discovery queries of other stacks, octet by octet.
 //!
 //! The judging tool's requests are those of the competitions (body after the code, as in AS5710);
-//! JAUS++'s are what its `jaus_challenge_2010` and test client send.
+//! JAUS++'s are those of its `jaus_challenge_2010` and test client.
 
 use std::time::Duration;
 

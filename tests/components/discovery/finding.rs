@@ -1,4 +1,4 @@
-//! Who finds whom, and when: components that come, change, fall silent and go.
+//! Discovery of components that start, change, fall silent and stop.
 
 use std::time::{Duration, Instant};
 

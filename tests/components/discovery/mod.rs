@@ -1,4 +1,4 @@
-//! Discovery between components in virtual time: who finds whom, when, and with how many packets.
+//! Discovery between components in virtual time: results, timing and packet counts.
 
 mod answers;
 mod finding;

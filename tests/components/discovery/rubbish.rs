@@ -1,4 +1,4 @@
-//! Whatever arrives, from whoever says so: a component stays up, modest and bounded.
+//! Arbitrary input from arbitrary senders: a component stays up, with bounded state and traffic.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! How much discovery says: never more than a packet a second per component in the long run.
+//! Discovery traffic: on average at most one packet per second and component.
 
 use std::time::Duration;
 

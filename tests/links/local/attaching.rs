@@ -1,4 +1,4 @@
-//! A component on the host's node is like one of the node's own process.
+//! A component on the host's node behaves like one in the node's own process.
 
 use std::task::{Context, Waker};
 

@@ -1,4 +1,4 @@
-//! Where a node may listen, and who may attach.
+//! Permitted listener addresses of a node, and permitted clients.
 
 use std::fs::{self, Permissions};
 use std::os::unix::fs::PermissionsExt;

@@ -1,4 +1,4 @@
-//! A directory for a socket, a node behind it, and waiting with a limit.
+//! A directory for a socket, a node behind it, and waits with a timeout.
 
 use std::fs::{DirBuilder, remove_dir_all};
 use std::os::unix::fs::DirBuilderExt;

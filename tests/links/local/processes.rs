@@ -1,4 +1,4 @@
-//! What happens to real processes: killed, stopped, started again.
+//! Component processes that are killed, stopped and restarted.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};

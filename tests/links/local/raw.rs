@@ -1,4 +1,4 @@
-//! Connections whose octets the test itself reads and writes.
+//! Raw connections, whose octets the test reads and writes itself.
 
 use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};

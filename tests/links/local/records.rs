@@ -1,4 +1,4 @@
-//! The protocol's octets: any record, in any pieces.
+//! Records of the local protocol: any content, in any segmentation.
 
 use std::net::{Ipv6Addr, SocketAddr, SocketAddrV6};
 

@@ -51,7 +51,7 @@ struct Flags {
     log_json: bool,
 }
 
-/// Where the debug view is to be.
+/// Address of the debug view.
 #[derive(Debug, Clone, Copy)]
 enum Debug {
     Off,
@@ -71,7 +71,7 @@ impl std::str::FromStr for Debug {
     }
 }
 
-/// `/dev/ttyUSB0` or `/dev/ttyUSB0:57600`.
+/// Parses `/dev/ttyUSB0` or `/dev/ttyUSB0:57600`.
 fn line(text: &str) -> Result<serial::Settings, String> {
     let (device, baud) = match text.rsplit_once(':') {
         Some((device, baud)) => {

@@ -1,4 +1,4 @@
-//! `jaus-local-pose-sensor`: where a vehicle is, reckoned from the travel of its wheels.
+//! `jaus-local-pose-sensor`: pose of a vehicle, by dead reckoning from wheel travel.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -51,10 +51,10 @@ impl Ready for Flags {
     }
 }
 
-/// Metres along X and Y at most: the range of Set Local Pose.
+/// Maximum of X and Y in metres: the range of Set Local Pose.
 const MOST: f64 = 100_000.0;
 
-/// A flag's pose: `10,-5,90`.
+/// Parses a pose: `10,-5,90`.
 fn pose(text: &str) -> Result<Pose, String> {
     let numbers: Vec<f64> = text
         .split(',')

@@ -1,4 +1,4 @@
-//! `jaus-planner`: plans missions over the map and has them driven.
+//! `jaus-planner`: plans missions over the map and executes them.
 
 use std::process::ExitCode;
 use std::time::Duration;

@@ -1,5 +1,5 @@
-//! `jaus-ra-gateway`: OpenJAUS 3.3 and other RA 3.x systems among JAUS components, and the other way
-//! round.
+//! `jaus-ra-gateway`: connects OpenJAUS 3.3 and other RA 3.x systems with JAUS components, in both
+//! directions.
 
 use std::net::Ipv4Addr;
 use std::process::ExitCode;
@@ -141,7 +141,7 @@ struct Ids {
     jaus_component: Vec<(JausId, RaId)>,
 }
 
-/// Two sides of an equals sign.
+/// Parses the two sides of an equals sign.
 fn pair<A: FromStr, B: FromStr>(text: &str) -> Result<(A, B), String>
 where
     A::Err: std::fmt::Display,
@@ -174,7 +174,7 @@ impl Ready for Flags {
     const SUBSYSTEM: &'static str = "RA gateway";
 
     fn for_node(&self) -> impl FnOnce(&mut Config) + 'static {
-        // RA systems answer to port 3794 alone, JAUS peers to whatever they hear us from.
+        // RA systems answer only to port 3794, JAUS peers to our source port.
         let shared = self.ra.ra_interface.is_none() && self.ra.ra_port == STANDARD_PORT;
         move |config: &mut Config| {
             if shared && config.port == STANDARD_PORT {
@@ -189,7 +189,7 @@ impl Ready for Flags {
             false => print_text,
         };
         let settings = self.settings();
-        // Mistaken ids are told before anything is opened.
+        // Report invalid ids before anything is opened.
         Gateway::check(&settings).map_err(Failure::of)?;
         Ok(RaGateway {
             settings,
@@ -218,7 +218,7 @@ impl Flags {
         let peers = self.ra.ra_peer.iter().copied();
         settings.ra.carrier.peers = peers.map(Into::into).collect();
         settings.ra.carrier.group_dialects = match self.ra.framing {
-            // In the framings that are heard; all RA systems tell regularly that they are there.
+            // In the framings of the peers; all RA systems send heartbeats.
             Framing::Auto => Vec::new(),
             Framing::Opc => vec![Dialect::Opc],
             Framing::Judp => vec![Dialect::As5669],
@@ -247,7 +247,7 @@ impl Ids {
 }
 
 fn print_text(report: &Report) {
-    // Nobody reading is no reason to stop.
+    // A closed output is no reason to stop.
     let _ = Output::new().part(&format!("\n{report}"));
 }
 

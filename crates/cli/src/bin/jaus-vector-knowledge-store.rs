@@ -1,4 +1,4 @@
-//! `jaus-vector-knowledge-store`: the objects and maps of a vehicle, kept through power cuts.
+//! `jaus-vector-knowledge-store`: stores a vehicle's objects and maps across power cuts.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -119,7 +119,7 @@ impl Map {
     }
 }
 
-/// In the directory that the service manager gives, or where users' programs keep their state.
+/// In the service manager's state directory, or in the user's.
 fn usual_file() -> PathBuf {
     let set = |name: &str| std::env::var_os(name).filter(|it| !it.is_empty());
     let given = set("STATE_DIRECTORY").map(PathBuf::from);

@@ -1,4 +1,4 @@
-//! `jaus-velocity-state-sensor`: how fast a vehicle moves, as its wheels tell.
+//! `jaus-velocity-state-sensor`: velocity of a vehicle, from wheel travel.
 
 use std::process::ExitCode;
 use std::time::Duration;

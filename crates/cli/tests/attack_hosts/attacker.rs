@@ -1,4 +1,4 @@
-//! A socket that sends in any id.
+//! A socket that sends with any source id.
 
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};

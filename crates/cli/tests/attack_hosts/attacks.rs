@@ -1,4 +1,4 @@
-//! What the attacker does. Each attack ends by itself and says how much it has sent and got.
+//! The attacks. Each one ends by itself and reports how much it has sent and received.
 
 use std::net::SocketAddr;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! What these tests need of the test bed beyond its four hosts and three cables.
+//! Additions of these tests to the test bed of four hosts and three cables.
 
 use std::process::Command;
 

@@ -1,4 +1,4 @@
-//! Clients that behave. They print what the tests wait for.
+//! Well-behaved clients. They print the lines that the tests wait for.
 
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! More than anybody wants to hear: rubbish, fragments, answers, reports.
+//! Floods: garbage, fragments, answers, reports.
 
 use crate::scene::{GAP, MEMORY, Scene, figures, on_scene, on_testbed};
 use crate::testbed::Host;

@@ -1,4 +1,4 @@
-//! Ids that are not the attacker's, and ids that nobody has.
+//! Forged source ids of other peers, and unassigned ids.
 
 use crate::bed::settings;
 use crate::scene::{GAP, figures, on_scene};

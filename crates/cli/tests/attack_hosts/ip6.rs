@@ -1,4 +1,4 @@
-//! The same attacks by IPv6, where one host has 2^64 addresses.
+//! The same attacks over IPv6, where one host has 2^64 addresses.
 
 use crate::bed::settings;
 use crate::scene::{GAP, Scene, figures, on_testbed};

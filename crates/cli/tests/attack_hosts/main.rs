@@ -1,10 +1,10 @@
-//! Attacks on `jaus vehicle`, on real hosts: the vehicle with its defaults in one network namespace,
-//! an attacker in another, and clients that behave in two more.
+//! Attacks on `jaus vehicle`, on real hosts: the vehicle with its defaults in one network
+//! namespace, an attacker in another, and well-behaved clients in two more.
 //!
-//! The rows of the table in docs/safety.md are printed:
+//! The tests print the rows of the table in docs/safety.md:
 //! `cargo test --test attack_hosts -- --nocapture | grep '^|'`
 //!
-//! Every attack is bounded in time and in packets. Making namespaces needs rights, see
+//! Every attack is bounded in time and in packets. Namespaces need rights, see
 //! `jaus_test_kit::hosts`.
 #![cfg(target_os = "linux")]
 #![allow(

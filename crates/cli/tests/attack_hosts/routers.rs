@@ -1,4 +1,4 @@
-//! Routers in a circle: what comes in goes on once over each cable, and then it is quiet.
+//! Routers in a loop: each message passes every cable once, and then the network is silent.
 
 use std::time::Duration;
 

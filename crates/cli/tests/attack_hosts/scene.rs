@@ -1,4 +1,4 @@
-//! The vehicle, a client that behaves, and what is seen of both.
+//! The vehicle, a well-behaved client, and observations of both.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

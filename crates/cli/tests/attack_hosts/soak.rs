@@ -1,4 +1,4 @@
-//! Attack after attack on the same vehicle, for an hour by hand:
+//! Soak test: consecutive attacks on one vehicle, for an hour by hand:
 //! `JAUS_SOAK_SECONDS=3600 cargo test --test attack_hosts -- --ignored --nocapture soak`
 
 use std::time::{Duration, Instant};

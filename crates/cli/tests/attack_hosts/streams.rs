@@ -1,4 +1,4 @@
-//! Connections that hold places, and a subscriber that reads no more.
+//! Idle connections that occupy slots, and a subscriber that stops reading.
 
 use crate::bed::settings;
 use crate::scene::{GAP, MEMORY, figures, on_scene};

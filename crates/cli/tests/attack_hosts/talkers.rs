@@ -1,5 +1,4 @@
-//! Two nodes that send each other acknowledged messages, small and large, and count what becomes of
-//! them.
+//! Two nodes that exchange acknowledged messages, small and large, and count their delivery.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};

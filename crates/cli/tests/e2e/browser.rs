@@ -1,6 +1,6 @@
-//! A headless Chromium, spoken to in its own protocol over a pipe: no driver program, no port, and
-//! it can live in a network namespace. What people do is done with real input: fingers on places,
-//! keys that go down and up.
+//! A headless Chromium, controlled by its own protocol over a pipe: it needs no driver program and
+//! no port, and runs in a network namespace. User actions are real input events: touches and key
+//! presses.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

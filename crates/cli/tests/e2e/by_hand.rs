@@ -1,4 +1,4 @@
-//! Driving by hand: the page and its station with the simulated vehicle of `jaus vehicle`, all on
+//! Manual driving: the page and its station with the simulated vehicle of `jaus vehicle`, all on
 //! this host.
 
 use std::io::{BufRead, BufReader};

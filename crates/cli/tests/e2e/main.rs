@@ -1,9 +1,9 @@
-//! The whole system through the operator's page: real programs as processes on four hosts with two
-//! networks, and a real browser that is used as people use it. Pictures of the page are kept in
+//! End-to-end tests through the operator's page: real programs as processes on four hosts with two
+//! networks, and a real browser with user input. Screenshots of the page are kept in
 //! `target/e2e-screenshots`.
 //!
-//! It needs Chromium and network namespaces. Where they lack, the tests say so loudly and pass, but
-//! fail if the environment says `CI`.
+//! They need Chromium and network namespaces. Without these, the tests report this prominently and
+//! pass, but fail if the environment variable `CI` is set.
 #![cfg(target_os = "linux")]
 #![allow(
     clippy::disallowed_methods,

@@ -1,4 +1,4 @@
-//! What operators do with the page.
+//! User actions on the page.
 
 use std::time::Duration;
 

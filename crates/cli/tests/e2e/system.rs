@@ -1,4 +1,4 @@
-//! The system as it is built into a vehicle: four hosts, two networks, and each part a process.
+//! The system as built into a vehicle: four hosts, two networks, and each part a process.
 //!
 //! ```text
 //!  board A ── vehicle's network ── communicator ── operator's network ── operator

@@ -1,9 +1,10 @@
-//! `jaus-ra-gateway` on a host of its own: an RA vehicle that is its own operator's on one host, the
+//! `jaus-ra-gateway` on a separate host: an RA vehicle that is also an operator on one host, the
 //! gateway with a JAUS vehicle and a JAUS operator on the other.
 //!
-//! Making hosts needs rights, see `jaus_test_kit::hosts`. By hand the same operator drives a running
-//! OpenJAUS: `JAUS_TEST_ROLE=operator gateway_hosts --exact a_process_that_plays_a_node --nocapture`
-//! beside a gateway.
+//! Hosts need rights, see `jaus_test_kit::hosts`. To drive a running OpenJAUS by hand with the same
+//! operator, run
+//! `JAUS_TEST_ROLE=operator gateway_hosts --exact a_process_that_plays_a_node --nocapture` beside a
+//! gateway.
 #![cfg(target_os = "linux")]
 #![allow(
     clippy::disallowed_methods,

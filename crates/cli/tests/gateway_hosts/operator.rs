@@ -1,4 +1,4 @@
-//! A JAUS operator who finds the RA vehicle 20, watches it, and drives it.
+//! A JAUS operator that discovers the RA vehicle 20, observes it, and drives it.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! An RA vehicle, 20, on a socket; it is an operator besides, who asks and drives the JAUS vehicle
-//! 101 if there is one.
+//! An RA vehicle, 20, on a socket; it is also an operator that queries and drives the JAUS vehicle
+//! 101, if present.
 
 use std::future::poll_fn;
 use std::time::{Duration, Instant};

@@ -1,9 +1,8 @@
-//! The interoperability suite: a subject and its peers, each on a host of its own, in the same
-//! scenarios for all of them. It knows nothing of either but what goes over the network and what
-//! their settings say; the result is a table in `target/interop`. `README.md` beside this file
-//! tells how to have it try another peer.
+//! Interoperability suite: a subject and its peers, each on a host of its own, in the same
+//! scenarios. It depends only on the network traffic and the parties' settings; the result is a
+//! table in `target/interop`. `README.md` beside this file explains how to add a peer.
 //!
-//! Making hosts needs rights, as in `jaus_test_kit::hosts`. Without them the suite prints `NOT TESTED`.
+//! Hosts need rights, see `jaus_test_kit::hosts`. Without them the suite prints `NOT TESTED`.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

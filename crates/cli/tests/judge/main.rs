@@ -1,4 +1,4 @@
-//! `jaus judge` against peers that are right, wrong, slow and silent.
+//! `jaus judge` against correct, faulty, slow and silent peers.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

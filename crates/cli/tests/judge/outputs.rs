@@ -1,4 +1,4 @@
-//! What a run of the judge leaves behind: report, JSON lines, JUnit XML, recording, exit status.
+//! Outputs of the judge: report, JSON lines, JUnit XML, recording, exit status.
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! A peer that answers what it is told to answer, right or wrong, and nothing else.
+//! A scripted peer with configurable answers, right or wrong.
 
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, UdpSocket};

@@ -1,4 +1,4 @@
-//! A component made of the library's own core services passes every step that they are in.
+//! A component of the library's own core services passes every applicable step.
 
 use std::sync::mpsc;
 

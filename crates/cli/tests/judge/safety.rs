@@ -1,5 +1,5 @@
-//! Part C against vehicles that ignore one of the rules: each fails in the step about that rule,
-//! also if its efforts expire, and passes the others.
+//! Part C against vehicles that violate one of the rules: each fails in the step about that rule,
+//! even if its efforts expire, and passes the others.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! Every fault of a peer is told with the right reason, in words.
+//! The judge reports every fault of a peer with the right reason.
 
 use std::time::Duration;
 

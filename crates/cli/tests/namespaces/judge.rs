@@ -1,4 +1,4 @@
-//! `jaus judge` on one host, and the reference vehicle on the other.
+//! `jaus judge` on one host, the reference vehicle on the other.
 
 use std::process::Command;
 

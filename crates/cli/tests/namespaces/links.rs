@@ -1,5 +1,5 @@
-//! What a node's links do on real networks: IPv6, networks without multicast, cables and addresses
-//! that come and go.
+//! Links on real networks: IPv6, networks without multicast, cables and addresses that appear and
+//! disappear.
 
 use std::time::{Duration, Instant};
 

@@ -1,8 +1,8 @@
 //! Nodes on two hosts: two network namespaces with a cable between them. The nodes are processes
-//! of their own (this test binary, started again inside a namespace) and meet by multicast.
+//! (this test binary, restarted inside a namespace) and discover each other by multicast.
 //!
-//! Making namespaces needs rights: root's, or a kernel that lets users have namespaces of their
-//! own. Where both lack, the tests say so loudly and pass.
+//! Namespaces need rights: root's, or a kernel that permits user namespaces. Without either, the
+//! tests report this prominently and pass.
 #![cfg(target_os = "linux")]
 #![allow(
     clippy::disallowed_methods,

@@ -1,4 +1,4 @@
-//! What the processes do that play nodes. They print what the tests wait for.
+//! Roles of the node processes. They print the lines that the tests wait for.
 
 use std::future::poll_fn;
 use std::net::SocketAddr;

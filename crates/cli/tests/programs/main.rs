@@ -1,4 +1,4 @@
-//! The programs started, watched and ended: components, whole systems, the package.
+//! Programs as processes: components, whole systems, the package.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

@@ -1,4 +1,4 @@
-//! What is shipped fits together: programs, settings, units, and the system for one machine.
+//! Consistency of the package: programs, settings, units, and the single-machine system.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};

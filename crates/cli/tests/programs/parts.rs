@@ -1,5 +1,5 @@
-//! The programs of parts as processes: what they log without a flag, what they report to systemd, and
-//! that their stop input works.
+//! Single-component programs as processes: their default log, their reports to systemd, and their
+//! stop input.
 
 use std::io::{BufRead, BufReader};
 use std::os::unix::net::UnixDatagram;

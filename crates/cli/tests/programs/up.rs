@@ -1,4 +1,4 @@
-//! `jaus up` with real processes: nodes of our own, and small shells that misbehave.
+//! `jaus up` with real processes: our own nodes, and misbehaving shell scripts.
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};

@@ -1,11 +1,11 @@
-//! Nothing moves without a living controller, on real hosts: `jaus vehicle` with its defaults in one
-//! network namespace, its controller in another, and an observer that polls pose, velocity and
-//! control ten times a second over a cable of its own.
+//! No motion without a living controller, on real hosts: `jaus vehicle` with its defaults in one
+//! network namespace, its controller in another, and an observer that queries pose, velocity and
+//! control ten times a second over its own cable.
 //!
-//! The rows of the table in docs/safety.md are printed:
+//! The tests print the rows of the table in docs/safety.md:
 //! `cargo test --test safety_hosts -- --nocapture | grep '^|'`
 //!
-//! Making namespaces needs rights, see `jaus_test_kit::hosts`.
+//! Namespaces need rights, see `jaus_test_kit::hosts`.
 #![cfg(target_os = "linux")]
 #![allow(
     clippy::disallowed_methods,

@@ -1,4 +1,4 @@
-//! Four hosts: the vehicle's, and three that have a cable to it each.
+//! Four hosts: the vehicle's, and three with a cable to it.
 
 use std::process::Command;
 use std::sync::atomic::{AtomicU32, Ordering};

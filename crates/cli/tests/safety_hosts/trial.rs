@@ -1,5 +1,5 @@
-//! One case: a vehicle is driven, something happens to its controller, and the observer sees how the
-//! vehicle comes to rest.
+//! One case: a vehicle is driven, a fault affects its controller, and the observer records how the
+//! vehicle stops.
 
 use std::fmt;
 use std::time::Duration;

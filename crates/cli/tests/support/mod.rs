@@ -1,4 +1,4 @@
-//! Running the real binary, and captures made to measure.
+//! Runs the real binary, and generates captures.
 
 #![allow(
     dead_code,

@@ -1,4 +1,4 @@
-//! `jaus decode` on captures: made to measure here, and recorded from other implementations.
+//! `jaus decode` on captures: generated here, and recorded from other implementations.
 
 use jaus_test_kit::evidence;
 

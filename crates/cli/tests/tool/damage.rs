@@ -1,4 +1,4 @@
-//! Captures with random damage: everything that can be read is, and nothing panics.
+//! Captures with random damage: everything readable is read, and nothing panics.
 
 use crate::support::{Message, RAW, ip_packet, pcap, pcapng};
 use jaus_view::{Capture, Dictionary, JAUS_PORT, Line, MessageLog, Network};

@@ -1,4 +1,4 @@
-//! `jaus doctor` on the loopback interface: what it finds, says and exits with.
+//! `jaus doctor` on the loopback interface: findings, output and exit status.
 
 use std::net::UdpSocket;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,4 +1,4 @@
-//! `jaus doctor --peer`, the real binary, with our own vehicle and with sockets that play a part.
+//! `jaus doctor --peer` as a process, with our own vehicle and with scripted sockets.
 
 use std::net::UdpSocket;
 use std::time::Duration;

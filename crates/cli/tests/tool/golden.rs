@@ -1,4 +1,4 @@
-//! `jaus decode --hex` and `jaus encode` undo each other, and say what is wrong with a line.
+//! `jaus decode --hex` and `jaus encode` invert each other, and report faulty lines.
 
 use crate::support::{run, vectors};
 use jaus_test_kit::evidence;

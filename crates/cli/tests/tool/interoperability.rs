@@ -1,5 +1,5 @@
-//! What docs/interoperability.md shows is so: settings can be read, commands have these flags, and
-//! every peer with a profile is there.
+//! Checks docs/interoperability.md: its settings parse, its commands have these flags, and it
+//! covers every peer with a profile.
 
 use crate::support::run;
 use jaus::peer::Peer;

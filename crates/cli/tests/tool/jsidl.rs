@@ -1,4 +1,4 @@
-//! `jaus jsidl check`, `diff` and `fmt`, as a user runs them on right and wrong files.
+//! `jaus jsidl check`, `diff` and `fmt` on correct and incorrect files.
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! `jaus jsidl explain`, `docs` and `schema` as a user runs them.
+//! `jaus jsidl explain`, `docs` and `schema`, run as processes.
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! `jaus jsidl lua` and `jaus jsidl rust`: what is written where, and what mistakes lead to.
+//! `jaus jsidl lua` and `jaus jsidl rust`: output files, and errors.
 
 use std::fs;
 use std::path::{Path, PathBuf};

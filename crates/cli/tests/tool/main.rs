@@ -1,4 +1,4 @@
-//! The tool `jaus` as its users run it.
+//! The tool `jaus`, run as a process.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

@@ -1,4 +1,4 @@
-//! `jaus monitor` and the statistics of `jaus node`, on the loopback interface.
+//! `jaus monitor` and the statistics of `jaus node`, over the loopback interface.
 
 use crate::support::{Running, own_group, run};
 

@@ -1,4 +1,4 @@
-//! `jaus demo`, `node`, `discover` and `query` over the loopback interface of this computer.
+//! `jaus demo`, `node`, `discover` and `query` over the loopback interface.
 
 use std::fs;
 

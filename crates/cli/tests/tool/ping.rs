@@ -1,4 +1,4 @@
-//! `jaus ping` over the loopback interface of this computer.
+//! `jaus ping` over the loopback interface.
 
 use crate::support::{Running, own_group, run};
 

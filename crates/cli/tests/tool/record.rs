@@ -1,4 +1,4 @@
-//! `jaus record` and `jaus replay` over the loopback interface of this computer.
+//! `jaus record` and `jaus replay` over the loopback interface.
 
 use std::fs;
 use std::net::UdpSocket;

@@ -1,4 +1,4 @@
-//! `jaus vehicle`, the real binary, over the loopback interface of this computer.
+//! `jaus vehicle` as a process, over the loopback interface.
 
 use crate::support::{Running, own_group, run};
 

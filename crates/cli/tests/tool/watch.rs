@@ -1,5 +1,5 @@
-//! Looking on: taps, the debug view with slow and hostile viewers, the communicator between two
-//! networks and its log. All on the loopback interface.
+//! Live observation: taps, the debug view with slow and hostile viewers, the communicator between
+//! two networks and its log. All on the loopback interface.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! What operators do: look, take control, drive, let go, stop; alone and two of them.
+//! Operator actions: view, take control, drive, release, stop; with one and with two operators.
 
 use jaus_ocu::Station;
 use serde_json::json;

@@ -1,5 +1,4 @@
-//! Pages that are not what they seem: each gets a stated answer, and those that are all right do
-//! not notice.
+//! Hostile pages: each gets a defined answer, and well-behaved pages are not affected.
 
 use futures_util::{SinkExt, StreamExt};
 use jaus_ocu::{Station, Token};

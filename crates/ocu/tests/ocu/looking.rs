@@ -1,4 +1,4 @@
-//! What pages see beside the vehicle: the map of its world.
+//! Pages show the map of the vehicle's world.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What pages see and may do when a part of the vehicle is missing, or the page itself falls silent.
+//! Pages with a part of the vehicle missing, and pages that fall silent.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};

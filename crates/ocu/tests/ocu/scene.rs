@@ -1,4 +1,4 @@
-//! A vehicle, the operator's station, and pages.
+//! Test scene: a vehicle, the operator's station, and pages.
 
 use std::future::Future;
 use std::net::{Ipv4Addr, SocketAddr};

@@ -1,8 +1,9 @@
-//! Where subsystems are and how they write, learned from what they send.
+//! Addresses and framings of subsystems, learned from their datagrams.
 //!
-//! A subsystem is believed at one address at a time. While it is heard there, the same number
-//! from elsewhere is somebody else's mistake, and is not listened to; only after a silence it may
-//! move. OpenJAUS follows whoever spoke last, and loses both when two have one number.
+//! A subsystem has one address at a time. While that address is active, messages with the same
+//! subsystem number from elsewhere are a misconfiguration and are dropped; the subsystem may move
+//! only after a silence. OpenJAUS follows the last sender, and loses both subsystems when two share
+//! a number.
 
 use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
@@ -12,7 +13,7 @@ use super::{Dialect, Settings};
 use crate::{Counter, Counters};
 use jaus::endpoint::Buckets;
 
-/// Where a subsystem is.
+/// Address of a subsystem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place {
     address: SocketAddr,
@@ -20,7 +21,7 @@ struct Place {
     heard: Instant,
 }
 
-/// The places of all subsystems that were heard.
+/// Addresses of all known subsystems.
 #[derive(Debug)]
 pub(super) struct Addresses {
     places: BTreeMap<u8, Place>,
@@ -35,10 +36,10 @@ impl Addresses {
         }
     }
 
-    /// A subsystem spoke from an address in a framing.
+    /// Learns the address and framing of a subsystem from a packet.
     ///
     /// # Errors
-    /// What the message is counted as, if it is not to be believed.
+    /// The counter of the drop, if the packet is not accepted.
     pub(super) fn learn(
         &mut self,
         now: Instant,
@@ -83,7 +84,7 @@ impl Addresses {
         Ok(())
     }
 
-    /// Forgets the one that was silent for longest, if it was silent for long enough.
+    /// Removes the longest silent subsystem, if it was silent long enough.
     fn make_room(&mut self, silent: impl Fn(&Place) -> bool) -> bool {
         let oldest = self.places.iter().min_by_key(|(_, place)| place.heard);
         let oldest = oldest.filter(|(_, place)| silent(place));
@@ -94,30 +95,30 @@ impl Addresses {
         true
     }
 
-    /// Where to send what is for a subsystem, and in which framing.
+    /// The address and framing of a subsystem.
     pub(super) fn of(&self, subsystem: u8) -> Option<(SocketAddr, Dialect)> {
         let place = self.places.get(&subsystem)?;
         Some((place.address, place.dialect))
     }
 
-    /// In which framing a host writes, if it has been heard.
+    /// The framing of a host, if it is known.
     pub(super) fn dialect_at(&self, host: IpAddr) -> Option<Dialect> {
         let mut places = self.places.values();
         let place = places.find(|place| place.address.ip() == host)?;
         Some(place.dialect)
     }
 
-    /// Whether somebody writes in that framing.
+    /// Whether a subsystem uses this framing.
     pub(super) fn speaks(&self, dialect: Dialect) -> bool {
         self.places.values().any(|place| place.dialect == dialect)
     }
 
-    /// How many places are known.
+    /// Number of known addresses.
     pub(super) fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// Forgets where a subsystem is.
+    /// Forgets the address of a subsystem.
     pub(super) fn forget(&mut self, subsystem: u8) {
         self.places.remove(&subsystem);
     }

@@ -1,16 +1,15 @@
-//! Datagrams to whole messages and back: framings, ids, addresses, large messages, bounds.
+//! RA datagram layer: framing, addressing, reassembly and limits.
 //!
-//! A [`Carrier`] judges what arrives before anybody else sees it: framing, size and version of the
-//! packet; whether its source is one component and its destination one of ours or a group of
-//! them; whether it comes from where its subsystem is. What passes teaches it the subsystem's
-//! address and framing, is acknowledged if that is wanted, and comes out as a [`Message`] as soon
-//! as it is whole. What does not pass is counted.
+//! A [`Carrier`] validates every packet before the node sees it: framing, size and version; whether
+//! the source is a single component and the destination one or several of ours; whether it comes
+//! from its subsystem's address. A valid packet updates the subsystem's address and framing, is
+//! acknowledged on request, and becomes a [`Message`] when all parts have arrived. Invalid packets
+//! are counted.
 //!
-//! Large messages are sent a few parts at a time, so that a peer's receive buffer holds them.
+//! Large messages are sent in bursts of a few parts, so that a peer's receive buffer can hold them.
 //!
-//! Everything is sent to the port of [`Settings::port`], as OpenJAUS expects. What is for everybody
-//! goes to the group, in the framings that somebody was heard to use and, more rarely then, in the
-//! others of [`Settings::group_dialects`].
+//! All datagrams go to the port of [`Settings::port`], as OpenJAUS expects. Multicasts use the
+//! framings that peers use and, less often then, the others of [`Settings::group_dialects`].
 
 mod addresses;
 mod pace;
@@ -40,24 +39,24 @@ use pace::Pace;
 use packet::Packet;
 use parts::{Key, Parts, Place};
 
-/// Datagrams to whole messages and back. See the [module](self).
+/// Converts between datagrams and complete messages. See the [module](self).
 #[derive(Debug)]
 pub struct Carrier {
     settings: Settings,
-    /// Who is here.
+    /// Local components.
     components: BTreeSet<RaId>,
     addresses: Addresses,
     messages: Option<Buckets<IpAddr>>,
     parts: Parts,
     transmits: VecDeque<Transmit>,
     pace: Pace,
-    /// How much each subsystem here has sent to everybody.
+    /// Number of multicasts of each local subsystem.
     group_sent: BTreeMap<u8, u32>,
     counters: Counters,
 }
 
 impl Carrier {
-    /// A carrier for nobody yet.
+    /// A carrier without local components.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         let buckets = |rate| Buckets::new(rate, settings.max_addresses);
@@ -74,13 +73,13 @@ impl Carrier {
         }
     }
 
-    /// Says which components of a subsystem are here now: those and no others of it.
+    /// Sets the components of a local subsystem, replacing earlier ones.
     pub fn set_components(&mut self, subsystem: u8, components: impl IntoIterator<Item = RaId>) {
         self.components.retain(|id| id.subsystem != subsystem);
         self.components.extend(components);
     }
 
-    /// The components here that a destination means.
+    /// The local components that a destination addresses.
     pub fn recipients(&self, destination: RaId) -> impl Iterator<Item = RaId> + '_ {
         let (first, last) = match destination.recipients() {
             Ok(Recipients::One) => (destination, destination),
@@ -91,13 +90,13 @@ impl Carrier {
         among.filter(move |&id| destination.includes(id))
     }
 
-    /// Whether a component of that subsystem is here.
+    /// Whether the subsystem has a local component.
     fn has_subsystem(&self, subsystem: u8) -> bool {
         let all = RaId::new(subsystem, 0, 0, 0)..=RaId::new(subsystem, 255, 255, 255);
         self.components.range(all).next().is_some()
     }
 
-    /// A datagram has come: gives the messages that are whole with it.
+    /// Processes a datagram; returns the completed messages.
     pub fn handle_datagram(
         &mut self,
         now: Instant,
@@ -126,7 +125,7 @@ impl Carrier {
         messages
     }
 
-    /// Judges a packet, and takes it in.
+    /// Validates and processes a packet.
     fn take(
         &mut self,
         now: Instant,
@@ -178,7 +177,7 @@ impl Carrier {
         }))
     }
 
-    /// Whether a header makes sense, and may come from there.
+    /// Validates a header and its origin.
     fn judge(&mut self, now: Instant, from: SocketAddr, header: &Header) -> Result<Place, Counter> {
         let address = from.ip().to_canonical();
         if self.settings.own_addresses.contains(&address) {
@@ -203,7 +202,7 @@ impl Carrier {
         Ok(place)
     }
 
-    /// Answers a packet that wants it: the same code and number, no data.
+    /// Sends an acknowledgement on request: the same code and number, no data.
     fn acknowledge(&mut self, (from, dialect): (SocketAddr, Dialect), header: &Header) {
         let answer = Header::new(&Fields {
             priority: header.priority(),
@@ -224,13 +223,13 @@ impl Carrier {
         }
     }
 
-    /// Time has passed.
+    /// Runs due timers.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.parts.expire(now, &mut self.counters);
         self.transmits.extend(self.pace.take_due(now));
     }
 
-    /// Says what time it is, after something was sent: what waits for its turn waits from now on.
+    /// Sets the time after a transmission: queued parts wait from now on.
     pub fn settle(&mut self, now: Instant) {
         self.pace.start(now);
     }
@@ -242,36 +241,36 @@ impl Carrier {
         parts.into_iter().chain(self.pace.poll_timeout()).min()
     }
 
-    /// Forgets where a subsystem is, because it is gone.
+    /// Forgets the address of a lost subsystem.
     pub fn forget(&mut self, subsystem: u8) {
         self.addresses.forget(subsystem);
     }
 
-    /// Where a subsystem was heard, with the port that is sent to.
+    /// The address of a subsystem, with the destination port.
     #[must_use]
     pub fn address(&self, subsystem: u8) -> Option<SocketAddr> {
         self.addresses.of(subsystem).map(|(address, _)| address)
     }
 
-    /// Of how many subsystems the address is known.
+    /// Number of subsystems with known address.
     #[must_use]
     pub fn known(&self) -> usize {
         self.addresses.len()
     }
 
-    /// How many octets are kept of unfinished large messages.
+    /// Octets stored for incomplete large messages.
     #[must_use]
     pub fn unfinished(&self) -> usize {
         self.parts.cost()
     }
 
-    /// What was seen, done and thrown away.
+    /// Counters of traffic and drops.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// Counts something.
+    /// Increments a counter.
     pub(super) fn count(&mut self, counter: Counter) {
         self.counters.add(counter);
     }

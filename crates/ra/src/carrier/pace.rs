@@ -1,24 +1,24 @@
-//! The parts of large messages, which are sent a few at a time: a peer's receive buffer holds no more
-//! (OpenJAUS leaves it as the system has it, which is some 25 full datagrams), and what is lost there
-//! takes the whole message along, for nobody asks for it again.
+//! Paces the parts of large messages: a peer's receive buffer holds only a few (OpenJAUS keeps the
+//! system default, some 25 full datagrams), and a lost part costs the whole message, as there is no
+//! retransmission.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use super::Transmit;
 
-/// Parts that wait for their turn.
+/// Queued parts.
 #[derive(Debug, Default)]
 pub(super) struct Pace {
     waiting: VecDeque<Transmit>,
-    /// When the next few may be sent, once that was settled.
+    /// Time of the next burst, once set.
     next: Option<Instant>,
 }
 
 impl Pace {
-    /// How many are sent at once.
+    /// Parts per burst.
     pub(super) const BURST: usize = 8;
-    /// Between two bursts; together 8 MB in a second.
+    /// Interval between bursts; together 8 MB per second.
     const PAUSE: Duration = Duration::from_millis(4);
 
     pub(super) fn len(&self) -> usize {
@@ -29,14 +29,14 @@ impl Pace {
         self.waiting.push_back(part);
     }
 
-    /// Settles when those that wait are sent, unless that is settled.
+    /// Schedules the next burst, unless it is scheduled.
     pub(super) fn start(&mut self, now: Instant) {
         if !self.waiting.is_empty() {
             self.next.get_or_insert(now + Self::PAUSE);
         }
     }
 
-    /// Those whose turn it is.
+    /// The parts of a due burst.
     pub(super) fn take_due(&mut self, now: Instant) -> Vec<Transmit> {
         if self.next.is_none_or(|next| next > now) {
             return Vec::new();

@@ -1,11 +1,10 @@
-//! One packet of the wire, a header and its data, in the framings that RA systems use.
+//! Encodes and decodes one packet, header and data, in the framings of RA systems.
 //!
-//! How strictly sizes are read follows what was recorded: every datagram of OpenJAUS and Junior
-//! ends where its message ends. So a "JAUS01.0" datagram of which the stated size and the octets
-//! that are there differ was damaged or invented, and is dropped either way. (OpenJAUS itself
-//! takes such a message and reads old octets of its buffer with it.) With AS5669 several messages
-//! may share a datagram; the length that stands in front of each is written by all and read by
-//! nobody, so the header's size counts.
+//! Size checks follow recorded traffic: every datagram of OpenJAUS and Junior ends where its
+//! message ends. A "JAUS01.0" datagram whose stated size differs from its length was damaged or
+//! forged, and is dropped. (OpenJAUS accepts such a message and reads stale octets of its buffer.)
+//! With AS5669, several messages may share a datagram; every sender writes the length in front of
+//! each message, but no receiver reads it, so the size in the header counts.
 
 use bytes::{Buf, BufMut, Bytes, BytesMut};
 
@@ -14,17 +13,17 @@ use crate::Counter;
 use jaus::wire::ra::{HEADER_LEN, Header, PREFIX};
 use jaus::wire::{as5669, judp};
 
-/// A header and the data that it announced.
+/// A header with its data.
 #[derive(Debug)]
 pub(super) struct Packet {
     pub(super) header: Header,
     pub(super) data: Bytes,
 }
 
-/// Which framing a datagram is written in.
+/// The framing of a datagram.
 ///
 /// # Errors
-/// What it is counted as, if it is none of ours.
+/// The counter of the drop, if the framing is unknown.
 pub(super) fn dialect(datagram: &[u8]) -> Result<Dialect, Counter> {
     match datagram.first() {
         Some(&judp::VERSION_AS5669) => Ok(Dialect::As5669),
@@ -34,7 +33,7 @@ pub(super) fn dialect(datagram: &[u8]) -> Result<Dialect, Counter> {
     }
 }
 
-/// The packets of a datagram that is written in that framing; behind the first that cannot be read there are no more.
+/// The packets of a datagram in this framing; ends at the first malformed one.
 pub(super) fn packets(
     dialect: Dialect,
     datagram: Bytes,
@@ -62,7 +61,7 @@ pub(super) fn packets(
     })
 }
 
-/// The message that is all there is.
+/// The single message of the datagram.
 fn only(octets: &Bytes) -> Result<(Packet, usize), Counter> {
     let (packet, end) = first(octets)?;
     if end < octets.len() {
@@ -71,7 +70,7 @@ fn only(octets: &Bytes) -> Result<(Packet, usize), Counter> {
     Ok((packet, end))
 }
 
-/// The message behind AS5669's four octets.
+/// The message after AS5669's four octets.
 fn next(octets: &Bytes) -> Result<(Packet, usize), Counter> {
     let Some(prefix) = octets.get(..as5669::PREFIX_LEN) else {
         return Err(Counter::TooShort);
@@ -83,7 +82,7 @@ fn next(octets: &Bytes) -> Result<(Packet, usize), Counter> {
     Ok((packet, as5669::PREFIX_LEN + end))
 }
 
-/// A header and its data at the beginning of some octets, and where they end.
+/// Decodes a header and its data at the start; returns their total length.
 fn first(octets: &Bytes) -> Result<(Packet, usize), Counter> {
     let header = Header::decode(octets).map_err(|_| Counter::TooShort)?;
     let end = HEADER_LEN + header.data_size();
@@ -94,7 +93,7 @@ fn first(octets: &Bytes) -> Result<(Packet, usize), Counter> {
     Ok((Packet { header, data }, end))
 }
 
-/// A datagram that holds one packet.
+/// Encodes one packet as a datagram.
 pub(super) fn datagram(dialect: Dialect, header: &Header, data: &[u8]) -> Bytes {
     let length = HEADER_LEN + data.len();
     let mut out = BytesMut::with_capacity(PREFIX.len() + length);

@@ -1,9 +1,10 @@
-//! Large messages: put together when received, cut when sent.
+//! Fragments large messages for transmission and reassembles them on reception.
 //!
-//! The parts of a message have the same source, destination and code; they are numbered from 0, and
-//! flagged first, normal (or sent again) and last. OpenJAUS numbers each large message from 0
-//! anew, so nothing else tells two messages of one code apart: a first part therefore always
-//! begins anew, and a part that says something else than an equal one before it ends both.
+//! The parts of a message have the same source, destination and code; they are numbered from 0 and
+//! flagged first, normal (or retransmitted) and last. OpenJAUS numbers each large message from 0
+//! again, so nothing else separates two messages of one code: a first part therefore always starts
+//! a new message, and a part that differs from an earlier one of the same number discards the
+//! message.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -14,26 +15,26 @@ use super::Settings;
 use crate::{Counter, Counters, RaId};
 use jaus::wire::ra::MAX_DATA;
 
-/// What a part costs beside its octets.
+/// Bookkeeping cost of a part, in octets.
 const PART_COST: usize = 64;
-/// What an unfinished message costs beside its parts.
+/// Bookkeeping cost of an incomplete message, in octets.
 const MESSAGE_COST: usize = 256;
 
-/// Where a part belongs in its message, as its data flag says.
+/// Position of a part in its message, from its data flag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
-    /// All of it.
+    /// The whole message.
     Single,
     /// The first part.
     First,
-    /// Some later part, perhaps sent again.
+    /// A later part, possibly retransmitted.
     Middle,
     /// The last part.
     Last,
 }
 
 impl Place {
-    /// What a data flag means.
+    /// Decodes a data flag.
     pub(super) const fn from_flag(flag: u8) -> Option<Self> {
         match flag {
             0 => Some(Self::Single),
@@ -44,7 +45,7 @@ impl Place {
         }
     }
 
-    /// The data flag that means it.
+    /// The corresponding data flag.
     pub(super) const fn flag(self) -> u8 {
         match self {
             Self::Single => 0,
@@ -55,7 +56,7 @@ impl Place {
     }
 }
 
-/// Cuts data: the parts with their places and numbers. What fits one packet stays whole.
+/// Splits data into parts with positions and numbers. Data that fits one packet stays whole.
 pub(super) fn cut(data: &[u8]) -> impl Iterator<Item = (Place, u16, &[u8])> {
     let last = data.len().div_ceil(MAX_DATA).saturating_sub(1);
     let whole = data.is_empty().then_some(data);
@@ -71,7 +72,7 @@ pub(super) fn cut(data: &[u8]) -> impl Iterator<Item = (Place, u16, &[u8])> {
     })
 }
 
-/// What the parts of a message have in common.
+/// Common key of a message's parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Key {
     pub(super) source: RaId,
@@ -79,15 +80,15 @@ pub(super) struct Key {
     pub(super) code: u16,
 }
 
-/// A message of which parts are still to come.
+/// An incomplete message.
 #[derive(Debug)]
 struct Unfinished {
-    /// By number, counted from the first's.
+    /// Parts by number, relative to the first.
     parts: BTreeMap<u16, Bytes>,
     first: u16,
     last: Option<u16>,
     octets: usize,
-    /// When the latest part came.
+    /// Arrival of the latest part.
     updated: Instant,
 }
 
@@ -102,10 +103,10 @@ impl Unfinished {
         }
     }
 
-    /// Takes a part in.
+    /// Adds a part.
     ///
     /// # Errors
-    /// A part that contradicts those before.
+    /// A part that contradicts earlier ones.
     fn add(&mut self, place: Place, number: u16, data: Bytes) -> Result<(), Counter> {
         let index = number.wrapping_sub(self.first);
         let last = match place {
@@ -147,7 +148,7 @@ impl Unfinished {
     }
 }
 
-/// The unfinished messages of one subsystem.
+/// The incomplete messages of one subsystem.
 #[derive(Debug, Default)]
 struct Sender {
     messages: BTreeMap<Key, Unfinished>,
@@ -172,7 +173,7 @@ impl Sender {
     }
 }
 
-/// The unfinished messages of all.
+/// The incomplete messages of all subsystems.
 #[derive(Debug)]
 pub(super) struct Parts {
     senders: BTreeMap<u8, Sender>,
@@ -181,12 +182,12 @@ pub(super) struct Parts {
     max_sender: usize,
     max: usize,
     timeout: Duration,
-    /// Nothing is to be forgotten before this time.
+    /// No message expires before this time.
     next: Option<Instant>,
 }
 
 impl Parts {
-    /// The most unfinished messages of one subsystem.
+    /// Maximum number of incomplete messages per subsystem.
     const MAX_MESSAGES: usize = 64;
 
     pub(super) fn new(settings: &Settings) -> Self {
@@ -201,15 +202,15 @@ impl Parts {
         }
     }
 
-    /// The octets that are kept, with what keeping them costs.
+    /// Stored octets, including bookkeeping.
     pub(super) fn cost(&self) -> usize {
         self.cost
     }
 
-    /// Takes a part, and gives the data if it is whole now.
+    /// Adds a part; returns the data if the message is complete.
     ///
     /// # Errors
-    /// What it is counted as, if it and what belongs to it is thrown away.
+    /// The counter of the drop, if the part and its message are discarded.
     pub(super) fn insert(
         &mut self,
         now: Instant,
@@ -260,8 +261,8 @@ impl Parts {
         sender.put(key, message);
     }
 
-    /// Forgets the oldest, of this subsystem or of the one that keeps most, until all is within its
-    /// bounds: who floods loses its own.
+    /// Enforces the limits: discards the oldest messages of this subsystem, then of the one that
+    /// uses most. A flooding sender thus loses its own messages.
     fn keep_within_bounds(&mut self, subsystem: u8, counters: &mut Counters) {
         while let Some(sender) = self.senders.get(&subsystem)
             && (sender.cost > self.max_sender || sender.messages.len() > Self::MAX_MESSAGES)
@@ -283,7 +284,7 @@ impl Parts {
         }
     }
 
-    /// Forgets what has not grown for too long.
+    /// Discards messages after the part timeout.
     pub(super) fn expire(&mut self, now: Instant, counters: &mut Counters) {
         if self.next.is_none_or(|next| next > now) {
             return;

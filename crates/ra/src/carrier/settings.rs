@@ -1,4 +1,4 @@
-//! The settings of a carrier: bounds and times, with defaults that suit a gateway on a small board.
+//! Settings of a carrier: limits and timing, with defaults that suit a gateway on a small board.
 
 use std::net::IpAddr;
 use std::time::Duration;
@@ -6,54 +6,53 @@ use std::time::Duration;
 use jaus::endpoint::Rate;
 use jaus::wire::judp;
 
-/// How a message is put into a datagram.
+/// Framing of messages in datagrams.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Dialect {
-    /// "JAUS01.0" in front of one message: what OpenJAUS calls OPC.
+    /// "JAUS01.0" before a single message, called OPC by OpenJAUS.
     #[default]
     Opc,
-    /// The first edition of AS5669: a version octet, then each message behind four octets.
+    /// The first edition of AS5669: a version octet, then each message after four octets.
     As5669,
 }
 
-/// The settings of a carrier. Every table and queue is bounded by one of them.
+/// Settings of a carrier. Every table and queue has a limit.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The UDP port to which everything is sent, whichever port the other side sends from: 3794.
-    /// OpenJAUS does the same.
+    /// The destination UDP port of all datagrams, whatever port the peer sends from: 3794. OpenJAUS
+    /// does the same.
     pub port: u16,
-    /// The framings of what goes to the group, and so to those who have not been heard yet. A framing
-    /// that somebody is heard to use is added by itself; where others are used, one that nobody
-    /// uses is left out nine times of ten. Answers go in the framing of what was heard last.
+    /// The framings of multicasts, and so towards unknown peers. Framings in use by peers are added
+    /// automatically; once others are in use, an unused one is sent only every tenth time. Unicasts
+    /// use the peer's last framing.
     pub group_dialects: Vec<Dialect>,
-    /// Hosts that multicast does not reach: what goes to the group goes to each of them, too. Who of
-    /// them has not been heard yet gets it in the framings of the group, or, if there are none, in
-    /// both in turn.
+    /// Hosts that multicast does not reach: each gets a copy of every multicast. A host that was
+    /// not heard yet gets it in the framings of the group or, if there are none, in both in turn.
     pub peers: Vec<IpAddr>,
-    /// The header versions that are accepted, of 0 (RA 2.x), 1 (3.0 and 3.1) and 2 (3.2 and 3.3).
+    /// The accepted header versions, of 0 (RA 2.x), 1 (3.0 and 3.1) and 2 (3.2 and 3.3).
     pub versions: Vec<u8>,
-    /// The most subsystems whose address is remembered; there are no more than 254.
+    /// Maximum number of subsystems with known address; there are no more than 254.
     pub max_subsystems: usize,
-    /// The longest data of one message, in octets, that is sent or received. Above 4080 it travels
-    /// in several parts.
+    /// Maximum data of one message, in octets, sent or received. Messages above 4080 octets are
+    /// split into parts.
     pub max_message: usize,
-    /// The most octets that are kept of unfinished messages of one subsystem.
+    /// Maximum octets stored for incomplete messages of one subsystem.
     pub max_parts_per_subsystem: usize,
-    /// The same for all.
+    /// Maximum octets stored for incomplete messages of all subsystems.
     pub max_parts: usize,
-    /// How long the next part of an unfinished message may take.
+    /// Timeout of the next part of an incomplete message.
     pub part_timeout: Duration,
-    /// Our own network addresses: what comes from them is our own multicast, come back.
+    /// Our own network addresses, to recognise our own multicasts.
     pub own_addresses: Vec<IpAddr>,
-    /// Messages from one address. By default not limited.
+    /// Rate limit of messages from one address. None by default.
     pub messages: Option<Rate>,
-    /// The most addresses whose rates are told apart.
+    /// Maximum number of addresses with their own rate limit.
     pub max_addresses: usize,
-    /// Subsystems from one address that were not heard before.
+    /// Rate limit of new subsystems from one address.
     pub new_subsystems: Rate,
-    /// How long a subsystem must have been silent before it is believed from another address.
+    /// Silence after which a subsystem is accepted from another address.
     pub address_patience: Duration,
-    /// The most datagrams that wait to be sent.
+    /// Maximum number of queued datagrams.
     pub queue_limit: usize,
 }
 

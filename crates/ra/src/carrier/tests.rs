@@ -1,4 +1,4 @@
-//! What comes out of datagrams, what does not, and what goes into them.
+//! Carrier: accepted and dropped datagrams, and transmission.
 
 use std::time::Duration;
 
@@ -58,7 +58,7 @@ fn packet(fields: Fields, data: &[u8]) -> Bytes {
     )
 }
 
-/// What a carrier counts of one datagram.
+/// Counters after one datagram.
 fn counted(datagram: &[u8]) -> Vec<Counter> {
     let mut carrier = carrier(Settings::default());
     let datagram = Bytes::copy_from_slice(datagram);
@@ -167,7 +167,7 @@ fn as5669_datagrams_hold_several_messages() {
     assert_eq!(carrier.counters().get(Counter::TooShort), 1);
 }
 
-/// The parts of a large message as a peer sends them.
+/// The parts of a large message from a peer.
 fn parts_of(data: &[u8], acknowledgement: Acknowledgement) -> Vec<Bytes> {
     let parts = parts::cut(data).map(|(place, sequence, part)| {
         packet(
@@ -208,7 +208,7 @@ fn large_messages_are_cut_as_openjaus_does_and_put_together_again() {
     }
 }
 
-/// What is sent, each time at once, until nothing is left.
+/// The datagrams of each burst, until none is left.
 fn bursts(carrier: &mut Carrier, mut now: Instant) -> Vec<Vec<Transmit>> {
     let mut bursts = Vec::new();
     carrier.settle(now);

@@ -1,4 +1,4 @@
-//! What is sent: to whom, in which framing, in how many parts.
+//! Transmission of messages: addresses, framings and parts.
 
 use std::net::SocketAddr;
 
@@ -11,34 +11,34 @@ use crate::{Counter, Message, RaId};
 use jaus::wire::Acknowledgement;
 use jaus::wire::ra::{Fields, Header};
 
-/// Where a datagram is to be sent.
+/// Destination of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum To {
-    /// The multicast group, which is 224.1.0.1 by default.
+    /// The multicast group, 224.1.0.1 by default.
     Group,
     /// One host.
     Address(SocketAddr),
 }
 
-/// A datagram to be sent.
+/// An outgoing datagram.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Transmit {
-    /// Where to.
+    /// Its destination.
     pub to: To,
     /// Its octets.
     pub datagram: Bytes,
 }
 
-/// Why a message was not sent.
+/// Reason why a message was not sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SendError {
-    /// Its source is no component that is announced.
+    /// The source is not one of our components.
     #[error("the source {0} is not announced: announce its subsystem with it first")]
     NotOurs(RaId),
-    /// Its source or destination is none.
+    /// The source or destination is invalid.
     #[error("{0}")]
     BadId(#[from] BadId),
-    /// Nothing was heard of the destination's subsystem, so that its address is not known.
+    /// The address of the destination's subsystem is unknown.
     #[error("subsystem {0} was not heard, so its address is not known: wait until it appears")]
     Unknown(u8),
     /// The data is above [`Settings::max_message`](super::Settings::max_message).
@@ -46,23 +46,23 @@ pub enum SendError {
         "{length} octets of data are above the limit of {limit}: send less, or raise the limit"
     )]
     TooLong {
-        /// Octets of its data.
+        /// Octets of data.
         length: usize,
-        /// Octets that are allowed.
+        /// Maximum number of octets.
         limit: usize,
     },
-    /// The priority is none.
+    /// The priority is invalid.
     #[error("{0} is no priority: use 0 to 15")]
     Priority(u8),
-    /// Too many datagrams wait to be sent.
+    /// The transmit queue is full.
     #[error("too many datagrams wait to be sent: poll them, or send less")]
     QueueFull,
 }
 
 impl Carrier {
-    /// Sends a message of a component that is here. A large one is numbered part by part from 0,
-    /// which OpenJAUS insists on, and its first parts are sent at once, the others when
-    /// [`settle`](Carrier::settle) has said what time it is. Another message keeps its number.
+    /// Sends a message of one of our components. The parts of a large message are numbered from 0,
+    /// which OpenJAUS requires; the first parts are sent at once, the others after
+    /// [`settle`](Carrier::settle) has set the time. A small message keeps its number.
     ///
     /// # Errors
     /// See [`SendError`]; nothing is sent then.
@@ -91,7 +91,7 @@ impl Carrier {
                 let datagram = packet::datagram(dialect, &header, data);
                 match place {
                     parts::Place::Single => self.push(to, datagram)?,
-                    // In their order, so behind those that wait already.
+                    // Queue behind parts that already wait, to keep the order.
                     _ if self.pace.len() > 0 || usize::from(number) >= Pace::BURST => {
                         self.pace.push(Transmit { to, datagram });
                     }
@@ -103,7 +103,7 @@ impl Carrier {
         Ok(())
     }
 
-    /// Where what is for a subsystem goes, and how.
+    /// The destinations and framings for a subsystem.
     fn ways(&mut self, from: u8, to: u8) -> Result<Vec<(To, Dialect)>, SendError> {
         if to == RaId::ALL {
             let sent = self.group_sent.entry(from).or_default();
@@ -118,10 +118,10 @@ impl Carrier {
         Ok(vec![(To::Address(address), dialect)])
     }
 
-    /// The framings of what a subsystem sends to everybody: those that are spoken, and those that are
-    /// configured. OpenJAUS reports each datagram of a framing that is not its own as an error; so
-    /// where others are spoken, one that nobody speaks is used each tenth time only. Who does speak
-    /// it is heard by then.
+    /// The framings for multicasts of a subsystem: all that peers use, plus the configured ones.
+    /// OpenJAUS logs an error for each datagram in a foreign framing, so once peers use other
+    /// framings, an unused one is sent only every tenth time. Any peer that uses it has been heard
+    /// by then.
     fn group_dialects(&self, turn: u32) -> impl Iterator<Item = Dialect> + '_ {
         const RARELY: u32 = 10;
         let is_turn = turn.is_multiple_of(RARELY);
@@ -133,8 +133,8 @@ impl Carrier {
         })
     }
 
-    /// The same for the hosts that multicast does not reach: each in its own framing; who was not
-    /// heard yet waits for the first word, and gets it in one of those that it may understand.
+    /// Destinations of multicasts for hosts beyond multicast: each host in its own framing; a host
+    /// that was not heard yet gets one of the possible framings in turn.
     fn to_peers(&self, turn: u32) -> impl Iterator<Item = (To, Dialect)> + '_ {
         let configured = self.settings.group_dialects.as_slice();
         let candidates = match configured {
@@ -149,7 +149,7 @@ impl Carrier {
         })
     }
 
-    /// Puts a datagram behind those that wait.
+    /// Queues a datagram.
     pub(super) fn push(&mut self, to: To, datagram: Bytes) -> Result<(), SendError> {
         if self.transmits.len() >= self.settings.queue_limit {
             self.counters.add(Counter::TransmitQueueFull);
@@ -159,7 +159,7 @@ impl Carrier {
         Ok(())
     }
 
-    /// The next datagram to be sent.
+    /// The next outgoing datagram.
     pub fn poll_transmit(&mut self) -> Option<Transmit> {
         let transmit = self.transmits.pop_front()?;
         self.counters.add(Counter::DatagramsSent);
@@ -167,7 +167,7 @@ impl Carrier {
     }
 }
 
-/// The header of a part of a message.
+/// The header of a message part.
 fn header(message: &Message, place: parts::Place, number: u16, data_size: usize) -> Header {
     let sequence = match place {
         parts::Place::Single => message.sequence,

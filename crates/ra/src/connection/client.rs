@@ -1,4 +1,4 @@
-//! Connections of ours to reports of others.
+//! Our service connections to reports of remote providers.
 
 use std::time::Instant;
 
@@ -11,23 +11,23 @@ use crate::messages::ra33::{
 use crate::{Counter, Message, RaId};
 use jaus::codec::DecodeError;
 
-/// A connection of ours to a report of somebody.
+/// Our service connection to a remote report.
 #[derive(Debug)]
 pub(super) struct Wanted {
     pub(super) request: Request,
-    /// Its number at the provider, once it is confirmed.
+    /// Instance number at the provider, once confirmed.
     pub(super) instance: Option<u8>,
-    /// In hertz, as confirmed.
+    /// Confirmed rate, in hertz.
     rate: f64,
     suspended: bool,
-    /// How often it was asked for in vain.
+    /// Unsuccessful attempts.
     tries: u32,
-    /// When to ask again, or to take the provider for silent.
+    /// When to repeat the request, or to consider the provider silent.
     pub(super) next: Instant,
 }
 
 impl Connections {
-    /// Wants a report; it is asked for until it is confirmed or refused.
+    /// Requests a report; repeats the request until it is confirmed or refused.
     ///
     /// # Errors
     /// See [`CannotConnect`].
@@ -59,7 +59,7 @@ impl Connections {
         Ok(id)
     }
 
-    /// The connection that a report belongs to.
+    /// The connection of a report.
     pub(super) fn by_report(
         &self,
         provider: RaId,
@@ -73,7 +73,7 @@ impl Connections {
         known.map(|(&id, _)| id)
     }
 
-    /// A provider answers. What we do not want it is told to end.
+    /// Handles a confirmation. Terminates connections that we did not request.
     pub(super) fn handle_confirm(
         &mut self,
         now: Instant,
@@ -110,8 +110,8 @@ impl Connections {
         Ok(())
     }
 
-    /// A report of a connection has come. Who sends what nobody wants is told to end it, once a
-    /// second, under the number that is the first.
+    /// Handles a report of a connection. The sender of an unknown report is sent a termination with
+    /// the first instance number, at most once per second.
     pub(super) fn handle_report(&mut self, now: Instant, message: &Message) {
         let (provider, client, code) = (message.source, message.destination, message.code);
         if let Some(id) = self.by_report(provider, client, code) {
@@ -125,8 +125,8 @@ impl Connections {
         }
     }
 
-    /// The provider has been heard: how long it may be silent begins anew. Three reports may be
-    /// lost.
+    /// Restarts the silence timeout after a message of the provider. It tolerates three lost
+    /// reports.
     fn hear(&mut self, now: Instant, id: ConnectionId) {
         let silence = self.settings.silence;
         if let Some(wanted) = self.wanted.get_mut(&id)
@@ -136,7 +136,7 @@ impl Connections {
         }
     }
 
-    /// Asks for what is not confirmed, and again for what is silent.
+    /// Repeats unconfirmed requests, and restarts silent connections.
     pub(super) fn watch(&mut self, now: Instant) {
         let mut silent = Vec::new();
         let mut asked = Vec::new();
@@ -178,7 +178,7 @@ impl Connections {
         self.transmit(Message::with_body(request.client, request.provider, &body));
     }
 
-    /// Has a provider pause, or go on.
+    /// Suspends or activates a connection at the provider.
     pub fn set_active(&mut self, now: Instant, id: ConnectionId, active: bool) {
         let Some(wanted) = self.wanted.get_mut(&id) else {
             return;

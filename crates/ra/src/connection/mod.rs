@@ -1,20 +1,20 @@
-//! Service connections: the Reference Architecture's way to be told something regularly.
+//! Service connections: periodic reports of the Reference Architecture.
 //!
-//! A client creates a connection (0008h) to a report of a provider at a rate; the provider
-//! confirms it (0009h) under an instance number and sends the report at that rate from then on,
-//! marked as of a service connection and numbered from 0. The client may suspend (000Bh),
-//! activate (000Ah) and terminate it (000Ch).
+//! A client creates a connection (0008h) to a report of a provider at a rate; the provider confirms
+//! it (0009h) with an instance number and then sends the report at that rate, marked as service
+//! connection data and numbered from 0. The client may suspend (000Bh), activate (000Ah) and
+//! terminate it (000Ch).
 //!
-//! [`Connections`] plays both parts for all components of a node, without knowing what reports
-//! mean. What it sends goes through [`RaNode::send`](super::node::RaNode::send); what the node gives
-//! out goes through [`Connections::handle_message`] first.
+//! [`Connections`] implements provider and client for all components of a node, independent of the
+//! content of reports. It sends through [`RaNode::send`](super::node::RaNode::send); every message
+//! from the node goes through [`Connections::handle_message`] first.
 //!
-//! * As a provider the owner is told what is [wanted](Event::Wanted), accepts or refuses it, and
-//!   says [what the report is now](Connections::set_report); the latest is sent at the rate, again
-//!   and again, because clients take silence for a loss.
-//! * As a client it asks again until there is an answer, watches for silence, and creates the
-//!   connection anew then. Reports do not name their connection, so that there can be one for each
-//!   report between the same two.
+//! * As a provider, the owner gets [requests](Event::Wanted), accepts or refuses them, and
+//!   [sets the report](Connections::set_report); the latest report is repeated at the rate, because
+//!   clients treat silence as a loss.
+//! * As a client, it repeats requests until they are answered, and recreates a connection after a
+//!   silence. Reports do not identify their connection, so there can be only one per report between
+//!   two components.
 
 mod client;
 mod provider;
@@ -38,76 +38,76 @@ use jaus::codec::{self, Message as _};
 use jaus::endpoint::{Buckets, Rate};
 use provider::Provided;
 
-/// The service connections of a node, in both parts. See the [module](self).
+/// Provider and client side of a node's service connections. See the [module](self).
 #[derive(Debug)]
 pub struct Connections {
     settings: Settings,
     provided: BTreeMap<ConnectionId, Provided>,
     wanted: BTreeMap<ConnectionId, Wanted>,
     created: u64,
-    /// For telling senders of unwanted reports to stop.
+    /// Rate limit of terminations of unknown reports.
     terminations: Buckets<(RaId, u16)>,
     transmits: VecDeque<Message>,
     events: VecDeque<Event>,
     counters: Counters,
 }
 
-/// Names a connection; never given twice.
+/// Identifies a connection; never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ConnectionId(u64);
 
-/// What somebody wants to be told, and how often.
+/// Parameters of a connection: the report and its rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
-    /// Who reports.
+    /// Sender of the report.
     pub provider: RaId,
-    /// Who is reported to.
+    /// Receiver of the report.
     pub client: RaId,
     /// The code of the report.
     pub code: u16,
-    /// Which of its optional fields.
+    /// Presence vector of the requested fields.
     pub presence: u32,
-    /// How often, in hertz: above 0, up to 1092.
+    /// Rate in hertz: above 0, up to 1092.
     pub rate: f64,
 }
 
-/// What the owner of connections is to know.
+/// Notification for the owner of the connections.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// Somebody wants a report of ours, or wants it at another rate: to be
-    /// [accepted](Connections::accept) or [refused](Connections::refuse).
+    /// A client requests a report of ours, or another rate: [accept](Connections::accept) or
+    /// [refuse](Connections::refuse) it.
     Wanted(ConnectionId, Request),
-    /// Our report is not wanted any more, or the provider of one of others has ended it.
+    /// The client has ended the connection to our report, or the provider has ended ours.
     Ended(ConnectionId),
     /// A provider has accepted at this rate, in hertz.
     Established(ConnectionId, f64),
     /// A provider has refused; the connection is forgotten.
     Refused(ConnectionId, ResponseCode),
-    /// A report has come.
+    /// A report has arrived.
     Report(ConnectionId, Message),
-    /// A provider has been silent for too long. The connection is being created anew.
+    /// A provider is silent. The connection is being recreated.
     Silent(ConnectionId),
 }
 
-/// Why no connection was created.
+/// Reason why no connection was created.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CannotConnect {
-    /// There is one between the same two for the same report already.
+    /// A connection between the same two for the same report exists.
     #[error("there is a connection for this report between these two already: end it first")]
     Exists(ConnectionId),
-    /// The rate is none.
+    /// The rate is invalid.
     #[error("the rate is out of range: use more than 0 and at most 1092 hertz")]
     Rate,
-    /// There are too many.
+    /// Too many connections.
     #[error("there are {0} connections already: end one, or raise the limit")]
     Full(usize),
 }
 
 impl Connections {
-    /// The highest rate that a message can state, in hertz.
+    /// The highest rate that the messages can encode, in hertz.
     pub const MAX_RATE: f64 = 1092.0;
 
-    /// No connections yet.
+    /// Creates an empty set of connections.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         Self {
@@ -122,7 +122,7 @@ impl Connections {
         }
     }
 
-    /// Takes in what is about service connections; says whether the message was.
+    /// Processes messages about service connections; returns whether the message was one.
     pub fn handle_message(&mut self, now: Instant, message: &Message) -> bool {
         let understood = match message.code {
             CreateServiceConnection::CODE => self.handle_create(now, message),
@@ -143,7 +143,7 @@ impl Connections {
         true
     }
 
-    /// Time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached.
+    /// Runs due timers. Call it when [`poll_timeout`](Self::poll_timeout) is reached.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.report_due(now);
         self.watch(now);
@@ -157,17 +157,17 @@ impl Connections {
         provided.chain(wanted).min()
     }
 
-    /// The next message to be sent.
+    /// The next outgoing message.
     pub fn poll_transmit(&mut self) -> Option<Message> {
         self.transmits.pop_front()
     }
 
-    /// The next thing to know.
+    /// The next event.
     pub fn poll_event(&mut self) -> Option<Event> {
         self.events.pop_front()
     }
 
-    /// Ends a connection, and tells the other side.
+    /// Ends a connection and notifies the other side.
     pub fn end(&mut self, id: ConnectionId) {
         if let Some(provided) = self.provided.remove(&id) {
             let (from, to) = (provided.request.provider, provided.request.client);
@@ -181,7 +181,7 @@ impl Connections {
         }
     }
 
-    /// Forgets the connections with components that are gone: `is_there` says who is not.
+    /// Removes the connections with components for which `is_there` is false.
     pub fn forget(&mut self, is_there: impl Fn(RaId) -> bool) {
         let clients = self.provided.iter();
         let clients = clients.filter(|(_, provided)| !is_there(provided.request.client));
@@ -196,13 +196,13 @@ impl Connections {
         }
     }
 
-    /// What was seen and thrown away.
+    /// Counters of events and drops.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// How many connections there are, as a provider and as a client.
+    /// Number of connections, as provider and as client.
     #[must_use]
     pub fn len(&self) -> (usize, usize) {
         (self.provided.len(), self.wanted.len())
@@ -230,7 +230,7 @@ impl Connections {
         self.transmits.push_back(message);
     }
 
-    /// Puts an event behind what waits for the owner. Reports leave half of the room to the others.
+    /// Queues an event for the owner. Reports may use only half of the queue.
     fn tell(&mut self, event: Event) {
         let limit = self.settings.queue_limit;
         let room = match event {
@@ -245,7 +245,7 @@ impl Connections {
     }
 }
 
-/// The time between two reports at a rate in hertz.
+/// The period of a rate in hertz.
 fn period(rate: f64) -> Duration {
     Duration::from_secs_f64(1.0 / rate.clamp(0.01, Connections::MAX_RATE))
 }

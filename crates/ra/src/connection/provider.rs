@@ -1,4 +1,4 @@
-//! Connections of others to reports of ours.
+//! Service connections of remote clients to our reports.
 
 use std::time::{Duration, Instant};
 
@@ -13,13 +13,13 @@ use crate::messages::ra33::{
 use crate::{Counter, Message};
 use jaus::codec::DecodeError;
 
-/// A connection of somebody to a report of ours.
+/// A service connection of a remote client to a report of ours.
 #[derive(Debug)]
 pub(super) struct Provided {
     pub(super) request: Request,
     pub(super) instance: u8,
     priority: u8,
-    /// The time between two reports, once it is accepted.
+    /// The period between reports, once accepted.
     period: Option<Duration>,
     active: bool,
     report: Option<Bytes>,
@@ -28,19 +28,19 @@ pub(super) struct Provided {
 }
 
 impl Provided {
-    /// When a report is to be sent.
+    /// When the next report is due.
     pub(super) fn due(&self) -> Option<Instant> {
         let sends = self.active && self.report.is_some() && self.period.is_some();
         sends.then_some(self.next)
     }
 
-    /// The report that is due, if it is.
+    /// Takes the report if it is due.
     fn take_report(&mut self, now: Instant) -> Option<Message> {
         if self.due()? > now {
             return None;
         }
         let period = self.period?;
-        // On the beat, unless it was missed altogether.
+        // Keeps the phase, unless a whole period was missed.
         self.next = (self.next + period).max(now + period / 2);
         let sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);
@@ -59,9 +59,9 @@ impl Provided {
 }
 
 impl Connections {
-    /// Somebody wants a report. For the same fields it is the same connection as before, perhaps at
-    /// another rate; other fields make another one, with the lowest instance that is free, as in
-    /// OpenJAUS.
+    /// Handles Create Service Connection. A request for the same fields updates the existing
+    /// connection, possibly at another rate; other fields create a new connection with the lowest
+    /// free instance number, as in OpenJAUS.
     pub(super) fn handle_create(
         &mut self,
         now: Instant,
@@ -136,8 +136,8 @@ impl Connections {
         (0..=u8::MAX).find(|instance| !taken.contains(instance))
     }
 
-    /// Confirms what was wanted, at the rate that was wanted or the highest that there is.
-    /// Gives the rate, in hertz; `None` if it is not wanted any more.
+    /// Accepts a request at the requested rate, limited to the maximum. Returns the rate in hertz;
+    /// `None` if the request no longer exists.
     pub fn accept(&mut self, now: Instant, id: ConnectionId) -> Option<f64> {
         let max_rate = self.settings.max_rate;
         let provided = self.provided.get_mut(&id)?;
@@ -151,7 +151,7 @@ impl Connections {
         Some(rate)
     }
 
-    /// Refuses what was wanted, and forgets it.
+    /// Refuses and removes a request.
     pub fn refuse(&mut self, id: ConnectionId, why: ResponseCode) {
         if let Some(provided) = self.provided.remove(&id) {
             self.confirm(&provided.request, 0, 0.0, why);
@@ -173,9 +173,8 @@ impl Connections {
         self.transmit(Message::with_body(request.provider, request.client, &body));
     }
 
-    /// Says what the report is now: its data with the fields of [`Request::presence`]. It is sent
-    /// at once, if the last was sent long enough ago, and then again and again until it is
-    /// replaced.
+    /// Sets the report: data with the fields of [`Request::presence`]. It is sent at once if the
+    /// period has passed, and then repeated every period until it is replaced.
     pub fn set_report(&mut self, now: Instant, id: ConnectionId, data: Bytes) {
         let Some(provided) = self.provided.get_mut(&id) else {
             return;
@@ -187,14 +186,14 @@ impl Connections {
         self.report_due(now);
     }
 
-    /// Says that the report is not known any more: nothing is sent until it is.
+    /// Clears the report; nothing is sent until it is set again.
     pub fn clear_report(&mut self, id: ConnectionId) {
         if let Some(provided) = self.provided.get_mut(&id) {
             provided.report = None;
         }
     }
 
-    /// Sends the reports that are due.
+    /// Sends all due reports.
     pub(super) fn report_due(&mut self, now: Instant) {
         let provided = self.provided.values_mut();
         let due: Vec<_> = provided
@@ -243,7 +242,7 @@ impl Connections {
         Ok(())
     }
 
-    /// Either side may end a connection.
+    /// Handles a termination, which either side may send.
     pub(super) fn handle_terminate(&mut self, message: &Message) -> Result<(), DecodeError> {
         let body: TerminateServiceConnection = message.body()?;
         let provided = self.meant(message, body.command_code, body.instance_id);

@@ -1,25 +1,25 @@
-//! The settings of service connections.
+//! Settings of service connections.
 
 use std::time::Duration;
 
 /// The settings of [`Connections`](super::Connections).
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The most connections of others to our reports.
+    /// Maximum number of remote connections to our reports.
     pub max_provided: usize,
-    /// The most connections of ours to the reports of others.
+    /// Maximum number of our connections to remote reports.
     pub max_wanted: usize,
-    /// The highest rate of our reports, in hertz; who wants more is confirmed this one.
+    /// Maximum rate of our reports, in hertz; higher requests are confirmed at this rate.
     pub max_rate: f64,
-    /// How long to wait for a confirmation before a connection is asked for again.
+    /// Timeout of a confirmation before the request is repeated.
     pub patience: Duration,
-    /// How often it is asked for at this pace; afterwards each [`retry`](Self::retry).
+    /// Number of requests at this interval; later ones follow every [`retry`](Self::retry).
     pub tries: u32,
-    /// How often it is asked for then.
+    /// Interval of later requests.
     pub retry: Duration,
-    /// How long a provider may be silent at least, whatever the rate.
+    /// Minimum silence timeout of a provider, whatever the rate.
     pub silence: Duration,
-    /// The most messages that wait to be sent, and the most reports that wait for the owner.
+    /// Maximum number of queued messages, and of reports queued for the owner.
     pub queue_limit: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Connections between two machines, and what strangers do to them.
+//! Connections between two nodes, and with unexpected peers.
 
 use bytes::Bytes;
 
@@ -27,13 +27,13 @@ fn wish(rate: f64) -> Request {
     }
 }
 
-/// A provider and a client with a network between them that can be cut.
+/// A provider and a client with an interruptible network.
 struct World {
     now: Instant,
     provider: Connections,
     client: Connections,
     cut: bool,
-    /// What each of them was told.
+    /// Events of each of them.
     told: (Vec<Event>, Vec<Event>),
 }
 

@@ -1,30 +1,30 @@
-//! From field to field: what the conversions of all families are put together from.
+//! Field conversions shared by all message families.
 
 use std::marker::PhantomData;
 
 use super::{Context, Refusal};
 use jaus::codec::{OutOfRange, Scaled};
 
-/// A field that can be said as a field of the other side. `How` tells the implementations apart: it
+/// A field that converts to a field of the other side. `How` distinguishes the implementations; it
 /// is always inferred.
 pub(super) trait Carry<To, How> {
     /// The same value in the other field's type.
     fn carry(self) -> Result<To, Refusal>;
 }
 
-/// By the value in engineering units, to the nearest step of the other scale.
+/// By the value in engineering units, rounded to the nearest step of the other scale.
 pub(super) struct ByScale;
 /// Unchanged.
 pub(super) struct Unchanged;
-/// By the same bits.
+/// Same bits.
 pub(super) struct ByBits;
-/// By what is there, if anything is.
+/// By the value, if present.
 pub(super) struct Optional<How>(PhantomData<How>);
 
 impl<Here: Scaled, There: Scaled> Carry<There, ByScale> for Here {
     fn carry(self) -> Result<There, Refusal> {
         let value = self.to_real();
-        // Where both ranges end alike, rounding must not put the last value outside of the other.
+        // If both ranges end at the same value, rounding must not exceed the other range.
         let nearest = value.clamp(There::SCALE.lower(), There::SCALE.upper());
         let slack = Here::SCALE.step().max(There::SCALE.step()) / 2.0;
         match (value - nearest).abs() < slack {
@@ -52,14 +52,14 @@ impl<Here: Carry<There, How>, There, How> Carry<Option<There>, Optional<How>> fo
     }
 }
 
-/// A message or record that can be said as one of the other side.
+/// A message or record that converts to one of the other side.
 pub(super) trait Counterpart<To>: Sized {
-    /// The same in the words of the other side.
+    /// Converts to the other side's type.
     fn counterpart(self, context: Context<'_>) -> Result<To, Refusal>;
 }
 
-/// Both ways between two types that have the same fields, which the compiler checks: each is carried
-/// over. Behind a semicolon, fields that have another name on our side.
+/// Implements both directions between two types with the same fields, as the compiler checks. After
+/// a semicolon: fields with another name on our side.
 macro_rules! same_fields {
     ($($ra:path, $jaus:path {
         $($field:ident),* $(,)? $(; $($theirs:ident = $ours:ident),* $(,)?)?
@@ -87,7 +87,7 @@ macro_rules! same_fields {
 
 pub(super) use same_fields;
 
-/// Both ways between two types of the same bits, such as time stamps.
+/// Implements both directions between two types with the same bits, such as time stamps.
 macro_rules! same_bits {
     ($($ra:path, $jaus:path;)*) => {$(
         $crate::convert::carry::same_bits!(@one $ra => $jaus);
@@ -104,8 +104,8 @@ macro_rules! same_bits {
 
 pub(super) use same_bits;
 
-/// Both ways between two queries for reports whose presence vectors agree in their lowest bits: bits
-/// above them ask for nothing and are left out.
+/// Implements both directions between two queries whose presence vectors agree in their lowest
+/// bits; higher bits request nothing and are left out.
 macro_rules! same_presence {
     ($($ra:path, $jaus:path: $fields:literal fields;)*) => {$(
         $crate::convert::carry::same_presence!(@one $ra => $jaus, $fields);
@@ -127,7 +127,7 @@ macro_rules! same_presence {
 
 pub(super) use same_presence;
 
-/// Refuses a field that is set and has no place on the other side.
+/// Refuses a field that is set but does not exist on the other side.
 pub(super) fn refuse<T: Copy>(field: Option<T>, name: &'static str) -> Result<(), Refusal> {
     match field {
         None => Ok(()),
@@ -135,7 +135,7 @@ pub(super) fn refuse<T: Copy>(field: Option<T>, name: &'static str) -> Result<()
     }
 }
 
-/// A field that the other side must have.
+/// Requires a field that is mandatory on the other side.
 pub(super) fn require<T>(field: Option<T>, name: &'static str) -> Result<T, Refusal> {
     field.ok_or(Refusal::Missing { field: name })
 }

@@ -1,11 +1,11 @@
-//! Control and authority, 000Dh to 0010h and what asks for them.
+//! Control and authority, 000Dh to 0010h and their queries and reports.
 //!
-//! Authority codes are octets on both sides, a greater one outranks a smaller one, and are carried
-//! as they are. The answers to a request correspond one to one: *not supported* is our *not
-//! available*, *not accepted* our *insufficient authority*. Reject Component Control says nothing
-//! but that the receiver has no control: OpenJAUS sends it to who asked in vain and to who lost
-//! control. Ours says why; from there it becomes *control released*, to there the reason is left
-//! out.
+//! Authority codes are octets on both sides; a greater one outranks a smaller one, and they convert
+//! unchanged. The answers to a request correspond one to one: *not supported* is our *not
+//! available*, *not accepted* our *insufficient authority*. Reject Component Control only says that
+//! the receiver has no control: OpenJAUS sends it after a denied request and after a loss of
+//! control. Ours gives a reason; converted from RA it is *control released*, to RA the reason is
+//! lost.
 
 use super::carry::{Counterpart, same_fields};
 use super::pair::Pair;
@@ -81,7 +81,7 @@ impl Counterpart<ra33::RejectComponentControl> for core::RejectControl {
     }
 }
 
-/// Says that nobody is in control: an id of nothing but zeros, on both sides.
+/// No controller: an id of zeros, on both sides.
 impl Counterpart<core::ReportControl> for ra33::ReportComponentControl {
     fn counterpart(self, context: Context<'_>) -> Result<core::ReportControl, Refusal> {
         let id = RaId {

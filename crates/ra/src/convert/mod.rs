@@ -1,10 +1,9 @@
-//! Messages of the Reference Architecture in the words of ours and the other way round, pair by
-//! pair.
+//! Converts messages between the Reference Architecture and ours, pair by pair.
 //!
-//! [`to_jaus`] and [`to_ra`] convert one message, or refuse it with a [`Refusal`] that names the field.
-//! Values are taken in engineering units and put to the nearest step of the other scale; a value
-//! out of the other's range is refused, not clamped. Nothing is kept between two messages. A bit of a
-//! presence vector that no field owns is forgiven to RA systems, which set them all.
+//! [`to_jaus`] and [`to_ra`] convert one message, or refuse it with a [`Refusal`] that names the
+//! field. Values convert in engineering units to the nearest step of the other scale; a value out
+//! of the other's range is refused, not clamped. Conversion is stateless. Undefined bits of a
+//! presence vector are ignored in RA messages, as RA systems set them all.
 //!
 //! ```
 //! use jaus::codec::Message;
@@ -19,7 +18,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | RA | name | ours | name | what is lost, and what is refused |
+//! | RA | name | ours | name | lost and refused content |
 //! |---|---|---|---|---|
 //! | 0001h 2001h 4001h | Set, Query, Report Component Authority | same | Set, Query, Report Authority | |
 //! | 0002h to 0005h | Shutdown, Standby, Resume, Reset | same | same | |
@@ -51,12 +50,12 @@
 //! | 2404h 4404h | Query, Report Velocity State | same | same | refused: more than 65.534 m/s or 32.767 rad/s |
 //! | 0A20h to 4A24h | the twelve of the Vector Knowledge Store | same | same | nothing: they are ours octet by octet |
 //!
-//! Lists of waypoints and path segments are more than one message after the other: [`Places`] converts the
-//! places alone, for whoever keeps the list and gives the numbers, as the gateway does.
+//! Lists of waypoints and path segments are more than one message each: [`Places`] converts only
+//! the places, for a caller that keeps the list and assigns the numbers, such as the gateway.
 //!
-//! What is not in the table has no counterpart: discrete devices, platform specifications, cameras,
-//! manipulators, payloads, missions; and what is no matter of conversion: discovery, service
-//! connections and events, which belong to the node and the connections.
+//! Messages outside the table have no counterpart: discrete devices, platform specifications,
+//! cameras, manipulators, payloads, missions. Discovery, service connections and events are not
+//! converted but handled by the node and the connections.
 
 mod carry;
 mod context;
@@ -82,7 +81,7 @@ pub use self::pair::Pair;
 pub use self::places::{Element, Places, speed_to_jaus, speed_to_ra};
 pub use self::refusal::{Reason, Refusal};
 
-/// The families.
+/// Message families.
 const FAMILIES: &[&[Pair]] = &[
     status::PAIRS,
     control::PAIRS,
@@ -95,28 +94,28 @@ const FAMILIES: &[&[Pair]] = &[
     world::PAIRS,
 ];
 
-/// All pairs that are converted, in the order of the families.
+/// All converted pairs, in the order of the families.
 pub fn pairs() -> impl Iterator<Item = &'static Pair> {
     FAMILIES.iter().copied().flatten()
 }
 
-/// Our payload, which begins with its code, for a message of the Reference Architecture.
+/// Converts an RA message to our payload, which begins with its code.
 ///
 /// # Errors
-/// What has no counterpart, and why.
+/// The reason why it has no counterpart.
 pub fn to_jaus(code: u16, data: &[u8]) -> Result<Bytes, Refusal> {
     to_jaus_with(Context::default(), code, data)
 }
 
-/// Code and data of a message of the Reference Architecture for a payload of ours.
+/// Converts our payload to code and data of an RA message.
 ///
 /// # Errors
-/// What has no counterpart, and why.
+/// The reason why it has no counterpart.
 pub fn to_ra(payload: &Bytes) -> Result<(u16, Bytes), Refusal> {
     to_ra_with(Context::default(), payload)
 }
 
-/// Like [`to_jaus`], with what is known of the component.
+/// Like [`to_jaus`], with context about the component.
 ///
 /// # Errors
 /// As there.
@@ -126,7 +125,7 @@ pub fn to_jaus_with(context: Context<'_>, code: u16, data: &[u8]) -> Result<Byte
         .to_jaus(data, context)
 }
 
-/// Like [`to_ra`], with what is known of the component.
+/// Like [`to_ra`], with context about the component.
 ///
 /// # Errors
 /// As there.
@@ -138,7 +137,7 @@ pub fn to_ra_with(context: Context<'_>, payload: &Bytes) -> Result<(u16, Bytes),
     Ok((pair.ra, pair.to_ra(payload, context)?))
 }
 
-/// Of the pairs with a code the one that is meant; the only one is in any case.
+/// Selects the pair for a code; a single candidate always matches.
 fn meant(context: Context<'_>, has_code: impl Fn(&Pair) -> bool) -> Option<&'static Pair> {
     let candidates = || pairs().filter(|pair| has_code(pair));
     let mut first_two = candidates();

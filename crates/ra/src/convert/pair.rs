@@ -1,4 +1,4 @@
-//! A pair of messages, and how the octets of one become those of the other.
+//! A message pair and the conversion of its payloads.
 
 use bytes::{BufMut, Bytes, BytesMut};
 
@@ -8,10 +8,10 @@ use crate::ids::RaComponent;
 use crate::messages::forgiving;
 use jaus::codec::Message;
 
-/// Octets of the message code in front of what a message says.
+/// Octets of the message code before the content.
 const CODE_LEN: usize = 2;
 
-/// A message of the Reference Architecture and its counterpart among ours.
+/// An RA message and its counterpart among ours.
 #[derive(Clone, Debug)]
 pub struct Pair {
     /// The code of the RA message.
@@ -29,19 +29,19 @@ pub struct Pair {
 
 type Convert = fn(&Bytes, Context<'_>) -> Result<Bytes, Refusal>;
 
-/// Where a code has several counterparts, what decides.
+/// Selects between several counterparts of a code.
 #[derive(Clone, Copy, Debug)]
 enum When {
-    /// Nothing has to.
+    /// Unconditional.
     Always,
-    /// The type of the RA component is one of these.
+    /// For RA components of these types.
     Part(&'static [RaComponent]),
-    /// Our service has this minor version, where 1 stands for later ones and for what is not known.
+    /// For this minor version of our service; 1 also stands for later and unknown versions.
     Minor(u8),
 }
 
 impl Pair {
-    /// The pair of two types that are each other's counterpart.
+    /// A pair of two types that convert into each other.
     pub(super) const fn of<Ra, Jaus>() -> Self
     where
         Ra: Message + Counterpart<Jaus>,
@@ -60,7 +60,7 @@ impl Pair {
         }
     }
 
-    /// The pair of two types that are laid out alike, code included, and mean the same.
+    /// A pair of types with identical layout, code and meaning.
     pub(super) const fn same_octets<Ra: Message, Jaus: Message>() -> Self {
         Self {
             ra: Ra::CODE,
@@ -75,19 +75,19 @@ impl Pair {
         }
     }
 
-    /// The same pair, for components of these types alone.
+    /// Restricts the pair to components of these types.
     pub(super) const fn for_parts(mut self, parts: &'static [RaComponent]) -> Self {
         self.when = When::Part(parts);
         self
     }
 
-    /// The same pair, for services of this minor version alone.
+    /// Restricts the pair to services of this minor version.
     pub(super) const fn for_minor(mut self, minor: u8) -> Self {
         self.when = When::Minor(minor);
         self
     }
 
-    /// Whether it is the one that is meant, of several with one code.
+    /// Whether the pair applies in this context.
     pub(super) fn is_meant(&self, context: Context<'_>) -> bool {
         match self.when {
             When::Always => true,
@@ -96,7 +96,7 @@ impl Pair {
         }
     }
 
-    /// Our payload for the data of the RA message.
+    /// Converts the data of the RA message to our payload.
     pub(super) fn to_jaus(&self, data: &[u8], context: Context<'_>) -> Result<Bytes, Refusal> {
         let mut payload = BytesMut::with_capacity(CODE_LEN + data.len());
         payload.put_u16_le(self.ra);
@@ -104,7 +104,7 @@ impl Pair {
         (self.to_jaus)(&payload.freeze(), context)
     }
 
-    /// The data of the RA message for our payload.
+    /// Converts our payload to the data of the RA message.
     pub(super) fn to_ra(&self, payload: &Bytes, context: Context<'_>) -> Result<Bytes, Refusal> {
         Ok((self.to_ra)(payload, context)?.slice(CODE_LEN..))
     }
@@ -118,7 +118,7 @@ where
     Ok(message.counterpart(context)?.encode()?)
 }
 
-/// The octets, if the other definition reads them too.
+/// The octets, if the other definition decodes them too.
 fn read_by_both<M>(
     payload: Bytes,
     decode: fn(&Bytes) -> Result<M, jaus::codec::DecodeError>,

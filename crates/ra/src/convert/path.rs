@@ -1,17 +1,16 @@
-//! Path segments: 040Fh 0410h, 240Eh to 2410h, 440Eh to 4410h, and the speed to drive along them.
+//! Path segments: 040Fh 0410h, 240Eh to 2410h, 440Eh to 4410h, and their travel speed.
 //!
-//! Both sides draw the same curve, towards a control point P1 to an end P2 with a weight. A path
-//! segment driver of the Reference Architecture is sent its segments by number and sets out when it
-//! is given a speed of travel. Ours has a list: a segment comes as an element that follows the one
-//! before it, and the list is executed at a speed. So the segment with the number n is the element
-//! n + 1, which follows the element n, and for these drivers Set Travel Speed is Execute List: from
-//! the first element on at a speed above zero, whether or not the vehicle is under way, and without
-//! an element, which only changes the speed, at zero. Our list takes no second first element: another
-//! path is set after a Reset. (Who knows what was set before says it otherwise: the gateway keeps the
-//! list, and has [`Places`](super::Places) convert its places alone.)
+//! Both sides use the same curve, with a control point P1, an end P2 and a weight. An RA path
+//! segment driver gets numbered segments and starts when it gets a travel speed. Ours has a list: a
+//! segment is an element that follows its predecessor, and the list is executed at a speed. So
+//! segment n is element n + 1, which follows element n, and for these drivers Set Travel Speed is
+//! Execute List: above zero from the first element, whether or not the vehicle is moving; at zero
+//! without an element, which only changes the speed. Our list accepts no second first element:
+//! another path is set after a Reset. (A caller that knows the earlier segments can do better: the
+//! gateway keeps the list and converts only the places with [`Places`](super::Places).)
 //!
-//! The segment that ours reports is the one that is driven along; it is asked for and reported under
-//! the number 0. A limit of the path is refused in a command and left out in a report.
+//! Our report is about the current segment; it is queried and reported under the number 0. A limit
+//! of the path is refused in a command and left out in a report.
 
 use bytes::{Bytes, BytesMut};
 
@@ -83,13 +82,13 @@ impl Counterpart<ra33::SetTravelSpeed> for mobility::ExecuteList {
     }
 }
 
-/// The element that stands for the first one in Execute List.
+/// Execute List's id for the first element.
 const FROM_THE_FIRST: u16 = 0;
 
-/// The neighbour that an element at an end of the list has.
+/// Neighbour id at the ends of the list.
 const NONE: u16 = 0;
 
-/// A segment as our list holds it: the message that would set it.
+/// Converts a segment to a list element, as a message that sets it.
 fn element(number: u16, code: u16, report: &Bytes) -> Result<core::SetElement, Refusal> {
     let uid = number.checked_add(1).ok_or(Refusal::UnknownValue {
         field: "PathSegmentNumber",
@@ -106,7 +105,7 @@ fn element(number: u16, code: u16, report: &Bytes) -> Result<core::SetElement, R
     })
 }
 
-/// The number and the report in the only element, which must follow the one before it.
+/// The number and report of the only element, which must follow its predecessor.
 fn segment<Report: Message>(set: &core::SetElement, code: u16) -> Result<(u16, Report), Refusal> {
     let inexpressible = |field| Err(Refusal::Inexpressible { field });
     let [element] = set.element_list.as_slice() else {
@@ -128,8 +127,7 @@ fn segment<Report: Message>(set: &core::SetElement, code: u16) -> Result<(u16, R
     Ok((element.previous_uid, report))
 }
 
-/// The same octets with another code: setting and reporting a segment are laid out alike, and only
-/// the report has a definition.
+/// Replaces the code: set and report of a segment share a layout, and only the report is defined.
 fn recode(message: &Bytes, code: u16) -> Bytes {
     let mut recoded = BytesMut::from(message.as_ref());
     if let Some(place) = recoded.first_chunk_mut() {
@@ -138,7 +136,7 @@ fn recode(message: &Bytes, code: u16) -> Bytes {
     recoded.freeze()
 }
 
-/// Segments: how they are set and reported.
+/// Implements set and report of segments.
 macro_rules! segments {
     ($(
         $set:path, $query:path, $report:path = $our_query:path, $our_report:path, $code:literal
@@ -208,7 +206,7 @@ macro_rules! segments {
     )*};
 }
 
-/// The heights of P1 and P2, which both sides may leave out.
+/// The heights of P1 and P2, optional on both sides.
 const HEIGHTS: u8 = 0b11;
 
 segments! {

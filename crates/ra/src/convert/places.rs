@@ -1,7 +1,7 @@
-//! Places by number and as elements of a list: what a client sets at a waypoint or path segment driver
-//! of the Reference Architecture is, among ours, an element that holds a message.
+//! Converts numbered places of RA waypoint and path segment drivers to list elements of ours: each
+//! element holds a message.
 //!
-//! The number is no matter of the place: who keeps the list gives it.
+//! The number is not part of the place: the keeper of the list assigns it.
 
 use bytes::{Bytes, BytesMut};
 
@@ -13,26 +13,26 @@ use jaus::messages::core::SetElement;
 use jaus::messages::core::set_element::{ElementDataFormat, ElementRec};
 use jaus::messages::mobility;
 
-/// The kind of places that a driver of the Reference Architecture goes to, and its messages.
+/// Kind of places that an RA driver moves to, with its message codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Places {
-    /// The type of the driver.
+    /// Type of the driver.
     pub part: RaComponent,
-    /// The code of the message that sets a place; its report is laid out alike.
+    /// Code of the message that sets a place; its report has the same layout.
     pub set: u16,
     /// The code of the query for a place.
     pub query: u16,
-    /// Whether a place is the end of a given way: a path segment.
+    /// Whether a place is the end of a given path: a path segment.
     pub is_path: bool,
 }
 
-/// The data of an element: a message of ours in its format.
+/// Data of an element: a message of ours in its format.
 pub type Element = FormattedBlob<ElementDataFormat>;
 
-/// What a report's code is above that of the message that sets the same.
+/// Offset of a report's code from the code of its set message.
 const REPORT: u16 = 0x4000;
 
-/// Where the number stands, behind the presence vector.
+/// Position of the number, after the presence vector.
 const NUMBER: std::ops::Range<usize> = 1..3;
 
 const ALL: [Places; 4] = [
@@ -63,22 +63,22 @@ const ALL: [Places; 4] = [
 ];
 
 impl Places {
-    /// Those of a component of this type, if it goes to places.
+    /// The places of a component type, if it moves to places.
     #[must_use]
     pub fn of(part: RaComponent) -> Option<Self> {
         ALL.into_iter().find(|places| places.part == part)
     }
 
-    /// The code of the report of a place.
+    /// Code of a place report.
     #[must_use]
     pub const fn report(self) -> u16 {
         self.set + REPORT
     }
 
-    /// The data of the RA message that sets, or reports, an element as the place with a number.
+    /// The RA data that sets or reports an element as the place with this number.
     ///
     /// # Errors
-    /// An element of another kind, and what cannot be said of it.
+    /// An element of another kind, or content that does not convert.
     pub fn to_ra(self, element: &Element, number: u16) -> Result<Bytes, Refusal> {
         let code = element.data.first_chunk().copied().map(u16::from_le_bytes);
         let is_known = element.format == ElementDataFormat::JAUS_MESSAGE && code == Some(self.set);
@@ -95,10 +95,10 @@ impl Places {
         Ok(with_number(&data, number))
     }
 
-    /// The number and the element that the data of an RA message sets or reports.
+    /// The number and element of RA data that sets or reports a place.
     ///
     /// # Errors
-    /// Data that is too short, and what cannot be said of the place.
+    /// Data that is too short, or content that does not convert.
     pub fn to_jaus(self, data: &Bytes) -> Result<(u16, Element), Refusal> {
         let number = self.number(data).ok_or(Refusal::Missing {
             field: "the number",
@@ -116,15 +116,15 @@ impl Places {
         Ok((number, element.element_data))
     }
 
-    /// The number in the data of a message that sets or reports a place.
+    /// The number in RA data that sets or reports a place.
     #[must_use]
     pub fn number(self, data: &[u8]) -> Option<u16> {
         let octets = data.get(NUMBER)?;
         Some(u16::from_le_bytes([octets[0], octets[1]]))
     }
 
-    /// Whether the data of two messages that set or report a place say the same one: drivers that
-    /// compute with it may tell it with another last digit.
+    /// Whether two RA messages set or report the same place: drivers that compute with it may
+    /// report it with a different last digit.
     #[must_use]
     pub fn are_near(self, one: &[u8], other: &[u8]) -> bool {
         const SLACK: u32 = 2;
@@ -142,18 +142,18 @@ impl Places {
         near(0) && near(1)
     }
 
-    /// The data of the query for the place with a number.
+    /// Data of the query for the place with this number.
     #[must_use]
     pub fn query_for(self, number: u16) -> Bytes {
         let mut data = BytesMut::from(number.to_le_bytes().as_slice());
         if self.is_path {
-            // Without heights.
+            // No heights.
             data.extend_from_slice(&[0]);
         }
         data.freeze()
     }
 
-    /// The number that a query asks for.
+    /// The number that a query requests.
     #[must_use]
     pub fn queried(self, data: &[u8]) -> Option<u16> {
         data.first_chunk().copied().map(u16::from_le_bytes)
@@ -167,7 +167,7 @@ impl Places {
     }
 }
 
-/// The message that sets an element as the only one, which stands for the place with the number 0.
+/// Sets an element as the only one, which stands for the place with number 0.
 fn first(element_data: Element) -> SetElement {
     SetElement {
         element_list: vec![ElementRec {
@@ -188,20 +188,20 @@ fn with_number(data: &Bytes, number: u16) -> Bytes {
     numbered.freeze()
 }
 
-/// The data of Set Travel Speed for a list that is executed at a speed.
+/// Data of Set Travel Speed for a list executed at a speed.
 ///
 /// # Errors
-/// A speed that the other side cannot hold.
+/// A speed out of the other side's range.
 pub fn speed_to_ra(execute: &mobility::ExecuteList) -> Result<Bytes, Refusal> {
     let mut set = ra33::SetTravelSpeed::default();
     set.set_speed_m_per_s(execute.speed_m_per_s())?;
     Ok(set.encode()?.slice(2..))
 }
 
-/// The execution of a list, without an element to begin with, for the data of Set Travel Speed.
+/// Converts Set Travel Speed to Execute List without a starting element.
 ///
 /// # Errors
-/// Data that is none, or a speed that the other side cannot hold.
+/// Malformed data, or a speed out of the other side's range.
 pub fn speed_to_jaus(data: &Bytes) -> Result<mobility::ExecuteList, Refusal> {
     let mut payload = BytesMut::from(ra33::SetTravelSpeed::CODE.to_le_bytes().as_slice());
     payload.extend_from_slice(data);

@@ -1,11 +1,9 @@
-//! Where a vehicle is and how fast, 2402h to 2404h and 4402h to 4404h: global pose, local pose,
-//! velocity state.
+//! Pose and velocity, 2402h to 2404h and 4402h to 4404h: global pose, local pose, velocity state.
 //!
 //! Presence vectors agree bit by bit, and so do frames and signs: latitude and longitude in WGS 84,
-//! angles about the axes forward, right and down, yaw clockwise from north or from the local X axis.
-//! What differs are ranges. A local Z that is below -10 km or above 35 km, a speed above
-//! 65.534 m/s or a rate of more than 32.767 rad/s cannot be said in the Reference Architecture, and
-//! the message is refused.
+//! angles about the axes forward, right and down, yaw clockwise from north or from the local X
+//! axis. The ranges differ. The Reference Architecture cannot represent a local Z below -10 km or
+//! above 35 km, a speed above 65.534 m/s or a rate above 32.767 rad/s; such a message is refused.
 
 use super::carry::{same_bits, same_fields, same_presence};
 use super::pair::Pair;

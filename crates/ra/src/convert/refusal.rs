@@ -1,54 +1,54 @@
-//! Why a message was not converted.
+//! Reasons why a message was not converted.
 
 use std::fmt;
 
 use jaus::codec::{DecodeError, EncodeError, OutOfRange};
 
-/// What could not be said in the words of the other side. A message is converted whole or refused;
-/// no value is bent to fit.
+/// A message that has no equivalent on the other side. A message converts completely or is refused;
+/// no value is adjusted to fit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Refusal {
     /// The other side has no such message.
     #[error("message {0:04X}h has no counterpart on the other side")]
     NoCounterpart(u16),
-    /// A payload that is too short for a code.
+    /// The payload is too short for a code.
     #[error("the payload has no message code")]
     NoCode,
-    /// The octets are not the message that the code promises.
+    /// The octets do not decode as the message of this code.
     #[error(transparent)]
     Malformed(#[from] DecodeError),
-    /// A number that the field of the other side cannot hold.
+    /// A number out of range of the other side's field.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// A field that is set and that the other side does not have, where leaving it out would change
-    /// what is meant.
+    /// A field that is set but does not exist on the other side, where leaving it out would change
+    /// the meaning.
     #[error("{field} cannot be said on the other side")]
     Inexpressible {
-        /// The field's name in the definition that it comes from.
+        /// The field's name in the source definition.
         field: &'static str,
     },
-    /// A field that is not set and that the other side must have.
+    /// A field that is not set but mandatory on the other side.
     #[error("{field} is missing, which the other side must have")]
     Missing {
-        /// The field's name in the definition that it would go to.
+        /// The field's name in the target definition.
         field: &'static str,
     },
-    /// A value of an enumeration that the other side does not know.
+    /// An enumerated value unknown on the other side.
     #[error("{field} {value} has no counterpart on the other side")]
     UnknownValue {
-        /// The field's name in the definition that it comes from.
+        /// The field's name in the source definition.
         field: &'static str,
         /// The value.
         value: u32,
     },
-    /// An id of a component that is not seen on the other side.
+    /// A component id without mapping on the other side.
     #[error("{field} names a component that is not seen on the other side")]
     UnknownId {
-        /// The field's name in the definition that it comes from.
+        /// The field's name in the source definition.
         field: &'static str,
     },
-    /// More elements or octets than the message of the other side can hold.
+    /// More elements or octets than the other side's message can hold.
     #[error(transparent)]
     TooLong(#[from] EncodeError),
 }
@@ -76,7 +76,7 @@ pub enum Reason {
 }
 
 impl Reason {
-    /// All of them, in the order of their discriminants.
+    /// All reasons, in the order of their discriminants.
     pub const ALL: [Self; 8] = [
         Self::NoCounterpart,
         Self::Malformed,
@@ -88,7 +88,7 @@ impl Reason {
         Self::TooLong,
     ];
 
-    /// The name in counters.
+    /// Name in counters.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -111,7 +111,7 @@ impl fmt::Display for Reason {
 }
 
 impl Refusal {
-    /// Its kind.
+    /// The kind of refusal.
     #[must_use]
     pub const fn reason(&self) -> Reason {
         match self {

@@ -1,8 +1,7 @@
-//! States, emergencies and time: what every component can be told and asked.
+//! States, emergencies and time, common to all components.
 //!
-//! The codes of the states are the same on both sides. The secondary status code of the Reference
-//! Architecture is left out: each component gives it a meaning of its own, and ours has no field for
-//! it but a reserved one.
+//! State codes are the same on both sides. The RA secondary status code is left out: its meaning
+//! depends on the component, and ours has only a reserved field for it.
 
 use super::carry::{Counterpart, same_bits, same_fields, same_presence};
 use super::pair::Pair;
@@ -43,7 +42,7 @@ same_bits! {
     ra33::set_time::DateStamp, core::set_time::DateStamp;
 }
 
-/// The only emergency that both sides know: stop.
+/// The only emergency code known on both sides: stop.
 const STOP: u16 = 1;
 
 macro_rules! emergency {

@@ -1,12 +1,12 @@
-//! Global and local vectors, 0407h 2407h 4407h and 0408h 2408h 4408h: a speed and a heading to keep.
+//! Global and local vectors, 0407h 2407h 4407h and 0408h 2408h 4408h: speed and heading setpoints.
 //!
 //! The global vector of our version 1.1 has the fields and bits of the Reference Architecture; in
-//! 1.0 the speed is always there and has no bit. The local vector of the Reference Architecture is a
-//! speed and a heading, no less and no more: one of ours that sets a height or an attitude is refused
-//! as a command, and in a report those fields are left out, for nobody asked for them.
+//! 1.0 the speed is mandatory and has no bit. The RA local vector is exactly a speed and a heading:
+//! one of ours that sets a height or an attitude is refused as a command; in a report those fields
+//! are left out.
 //!
-//! Speeds go to 10 000 m/s there and to 327.67 m/s here. In steps of 0.15 m/s there: a small speed
-//! may become zero, and none becomes more than half a step faster.
+//! Speeds reach 10 000 m/s there and 327.67 m/s here. Steps there are 0.15 m/s: a small speed may
+//! become zero, and no speed increases by more than half a step.
 
 use super::carry::{ByScale, Carry, Counterpart, Optional, refuse, require, same_fields};
 use super::pair::Pair;
@@ -71,7 +71,7 @@ global_of_1_0! {
 
 /// Speed, altitude, heading, roll, pitch: the bits of the Reference Architecture and of 1.1.
 const GLOBAL: u8 = 0b1_1111;
-/// The speed among them, which 1.0 has no bit for.
+/// The speed bit, which 1.0 does not have.
 const SPEED: u8 = 0b1;
 
 impl Counterpart<mobility::QueryGlobalVector> for ra33::QueryGlobalVector {
@@ -95,7 +95,7 @@ impl Counterpart<ra33::QueryGlobalVector> for mobility::QueryGlobalVector {
     }
 }
 
-/// The speed of a local vector, which version 1.0 may leave out.
+/// The speed of a local vector, optional in version 1.0.
 trait Speed<There, How>: Sized {
     fn from_ra(speed: There) -> Result<Self, Refusal>;
     fn into_ra(self) -> Result<There, Refusal>;
@@ -121,7 +121,7 @@ impl<There: Scaled, Here: Scaled> Speed<There, Optional<ByScale>> for Option<Her
     }
 }
 
-/// Local vectors. In a command, what cannot be said is refused; in a report it is left out.
+/// Local vectors. Fields without counterpart are refused in a command and left out in a report.
 macro_rules! local {
     ($($ra:path, $jaus:path, $is_command:expr;)*) => {$(
         impl Counterpart<$jaus> for $ra {

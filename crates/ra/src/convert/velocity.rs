@@ -1,8 +1,8 @@
-//! Set Velocity State, 0404h: ours is Set Velocity Command, 0415h, that sets the current command.
+//! Set Velocity State, 0404h: our Set Velocity Command, 0415h, that sets the current command.
 //!
-//! Our other kinds of commands (limits, defaults) have no counterpart. The deviations and the time
-//! stamp, which the Reference Architecture shares with the report, say nothing about a command and
-//! are left out.
+//! Our other kinds of commands (limits, defaults) have no counterpart. RA uses the record of the
+//! report, so the command has deviations and a time stamp; they mean nothing there and are left
+//! out.
 
 use super::carry::{Carry, Counterpart};
 use super::pair::Pair;

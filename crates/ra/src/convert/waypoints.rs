@@ -1,12 +1,12 @@
-//! Waypoints and the speed of travel: 040Ah 040Ch 040Dh, 240Ah to 240Dh, 440Ah to 440Dh.
+//! Waypoints and travel speed: 040Ah 040Ch 040Dh, 240Ah to 240Dh, 440Ah to 440Dh.
 //!
-//! A waypoint driver of the Reference Architecture keeps a list, in which each waypoint has a number;
-//! ours drives to one waypoint. So the one with the number 0, as peers count, corresponds to ours,
-//! and others are refused: to take each for a new goal would skip those before it.
+//! An RA waypoint driver keeps a list of numbered waypoints; ours drives to one waypoint. Number 0,
+//! the first one of RA peers, corresponds to ours, and others are refused: as a new goal each of
+//! them would skip its predecessors.
 //!
-//! Ours may say how near is near enough and how far off the path is too far. A commanded limit of
-//! the path is refused, for the vehicle would not keep it; the tolerance of the waypoint is left out,
-//! for the driver has one of its own. In reports both are left out.
+//! Ours may specify a tolerance of the waypoint and a limit of the path deviation. A commanded
+//! limit of the path is refused, as the vehicle would not keep it; the tolerance of the waypoint is
+//! left out, as the driver has its own. In reports both are left out.
 
 use super::carry::{Carry, Counterpart, same_fields};
 use super::pair::Pair;
@@ -32,10 +32,10 @@ same_fields! {
     ra33::ReportTravelSpeed, mobility::ReportTravelSpeed { speed }
 }
 
-/// The number of the only element that a driver without a list has.
+/// Number of the only element of a driver without a list.
 pub(super) const ONLY: u16 = 0;
 
-/// Refuses all numbers but that of the only element.
+/// Refuses every number except that of the only element.
 pub(super) fn only(number: u16, field: &'static str) -> Result<(), Refusal> {
     match number {
         ONLY => Ok(()),
@@ -46,7 +46,7 @@ pub(super) fn only(number: u16, field: &'static str) -> Result<(), Refusal> {
     }
 }
 
-/// Refuses a limit of the path, unless it is 0, which sets none.
+/// Refuses a limit of the path, unless it is 0, which means none.
 pub(super) fn unlimited(metres: Option<f64>) -> Result<(), Refusal> {
     match metres {
         Some(metres) if metres != 0.0 => Err(Refusal::Inexpressible {
@@ -56,8 +56,8 @@ pub(super) fn unlimited(metres: Option<f64>) -> Result<(), Refusal> {
     }
 }
 
-/// Waypoints. In a command, what cannot be said is refused; in a report it is left out, and whichever
-/// number it has, it is the one being driven to.
+/// Waypoints. Fields without counterpart are refused in a command and left out in a report; a
+/// reported waypoint of any number is the current goal.
 macro_rules! waypoints {
     ($($ra:path, $jaus:path { $($theirs:ident = $ours:ident),* }, $is_command:expr;)*) => {$(
         impl Counterpart<$jaus> for $ra {
@@ -106,7 +106,7 @@ waypoints! {
     ra33::ReportLocalWaypoint, mobility::ReportLocalWaypoint { x = x, y = y, z = z }, false;
 }
 
-/// Height, roll, pitch, yaw: the fields that both sides have and that need not be there.
+/// Height, roll, pitch, yaw: optional fields of both sides.
 const COMMON: u8 = 0b1111;
 
 macro_rules! queries {

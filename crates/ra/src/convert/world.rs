@@ -1,6 +1,6 @@
-//! The vector knowledge store, 0A20h to 4A24h. Our service took the messages over octet by octet: what
-//! both definitions read is passed on as it is. (At the ends of their ranges places differ by half
-//! a step, 5 mm at most: we divide a range by 2^32 - 1, they by 2^32 - 2.)
+//! Vector knowledge store, 0A20h to 4A24h. Our service adopted the messages octet by octet: what
+//! both definitions decode is passed on unchanged. (At the ends of their ranges positions differ by
+//! half a step, 5 mm at most: we divide a range by 2^32 - 1, RA by 2^32 - 2.)
 
 use super::pair::Pair;
 use crate::messages::ra33;

@@ -1,4 +1,4 @@
-//! Messages across, and what is counted of those that cannot be said on the other side.
+//! Converts messages in the gateway and counts the ones without an equivalent.
 
 use std::sync::{Arc, PoisonError, RwLock};
 use std::time::Instant;
@@ -9,7 +9,7 @@ use super::counters::{Counter, Tally};
 use crate::convert::{Context, Refusal, to_jaus_with, to_ra_with};
 use crate::ids::{IdTable, RaComponent};
 
-/// Who is who, and who is there, for messages that name components. The clones are one table.
+/// Ids and known components, for messages that name components. Clones share one table.
 #[derive(Debug, Clone)]
 pub(super) struct Ids(Arc<RwLock<IdTable>>);
 
@@ -18,13 +18,13 @@ impl Ids {
         Self(Arc::new(RwLock::new(table)))
     }
 
-    /// Somebody has come or gone.
+    /// Replaces the table after a component has come or gone.
     pub(super) fn set(&self, table: IdTable) {
         *self.0.write().unwrap_or_else(PoisonError::into_inner) = table;
     }
 }
 
-/// The words that a component of each side have in common.
+/// Conversion context of a proxied component: ids, component type and service version.
 #[derive(Debug, Clone)]
 pub(super) struct Words {
     ids: Ids,
@@ -33,8 +33,8 @@ pub(super) struct Words {
 }
 
 impl Words {
-    /// Those of an RA component of this type, or of one of ours in its part, and of a service of
-    /// ours in this minor version.
+    /// The context of an RA component of this type, or of a JAUS component shown as this type with
+    /// a service of this minor version.
     pub(super) const fn new(ids: Ids, part: u8, minor: u8) -> Self {
         Self {
             ids,
@@ -43,13 +43,13 @@ impl Words {
         }
     }
 
-    /// Our payload for the data of an RA message.
+    /// Converts the data of an RA message to a JAUS payload.
     pub(super) fn to_jaus(&self, code: u16, data: &[u8]) -> Result<Bytes, Refusal> {
         let ids = self.ids.0.read().unwrap_or_else(PoisonError::into_inner);
         to_jaus_with(self.context(&ids), code, data)
     }
 
-    /// The code and the data of the RA message for our payload.
+    /// Converts a JAUS payload to code and data of an RA message.
     pub(super) fn to_ra(&self, payload: &Bytes) -> Result<(u16, Bytes), Refusal> {
         let ids = self.ids.0.read().unwrap_or_else(PoisonError::into_inner);
         to_ra_with(self.context(&ids), payload)
@@ -64,7 +64,7 @@ impl Words {
     }
 }
 
-/// Counts a message with this code that was refused.
+/// Counts a refused message with this code.
 pub(super) fn refuse(now: Instant, tally: &mut Tally, code: u16, refusal: &Refusal) {
     let counter = match refusal {
         Refusal::NoCounterpart(_) => Counter::NoCounterpart,

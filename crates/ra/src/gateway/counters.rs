@@ -1,5 +1,4 @@
-//! What a gateway has carried across and what it has refused: a number for each, and a word in the
-//! log for each kind of refusal.
+//! Counters of a gateway, and the log of refusals by kind.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,61 +7,61 @@ use std::time::{Duration, Instant};
 use jaus::counters;
 
 counters! {
-    /// The numbers of a gateway. They only grow.
+    /// Counters of a gateway. They only grow.
     pub struct Counters;
 
-    /// Queries of JAUS clients that were asked of RA components.
+    /// Queries of JAUS clients, sent to RA components.
     QueriesToRa = "queries to RA",
-    /// Commands of JAUS clients that were given to RA components.
+    /// Commands of JAUS clients, sent to RA components.
     CommandsToRa = "commands to RA",
-    /// Reports of RA components that were told to JAUS clients, or kept for them.
+    /// Reports of RA components, sent to JAUS clients or cached for them.
     ReportsFromRa = "reports from RA",
-    /// Queries of RA components that were asked of JAUS components.
+    /// Queries of RA components, sent to JAUS components.
     QueriesFromRa = "queries from RA",
-    /// Commands of RA components that were given to JAUS components.
+    /// Commands of RA components, sent to JAUS components.
     CommandsFromRa = "commands from RA",
-    /// Reports of JAUS components that were told to RA components.
+    /// Reports of JAUS components, sent to RA components.
     ReportsToRa = "reports to RA",
-    /// RA components of which a JAUS client was given control.
+    /// Grants of control over an RA component to a JAUS client.
     ControlOfRa = "control of RA components given",
-    /// JAUS components of which an RA component was given control.
+    /// Grants of control over a JAUS component to an RA component.
     ControlFromRa = "control of JAUS components given",
-    /// Refused: a message that has no counterpart on the other side.
+    /// Refused: no counterpart on the other side.
     NoCounterpart = "refused: no counterpart on the other side",
-    /// Refused: a value that the other side cannot carry, or a body that cannot be read.
+    /// Refused: a value that the other side cannot represent, or a malformed body.
     NotConverted = "refused: cannot be said on the other side",
     /// Refused: a command of a client that is not in control.
     NotInControl = "refused: sender not in control",
-    /// Refused: a command for an RA component in an emergency.
+    /// Refused: a command for an RA component in the emergency state.
     InEmergency = "refused: in an emergency",
     /// Refused: a driving command for an RA component that its client has sent to Standby.
     InStandby = "refused: in standby",
-    /// Refused: a query that is waiting for its answer already.
+    /// Refused: a duplicate of a query that is still pending.
     Repeated = "refused: question repeated while it waits",
-    /// Refused: more than may wait for an answer.
+    /// Refused: too many pending queries.
     TooManyWaiting = "refused: too many questions wait",
-    /// Refused: more service connections than there is room for.
+    /// Refused: too many service connections.
     TooManyConnections = "refused: too many service connections",
-    /// Refused: a change or an execution of a list that the other side's driver cannot follow.
+    /// Refused: a change or an execution of a list that the other side's driver does not support.
     NotListed = "refused: not possible with the other side's list",
-    /// Given without confirmation: places for an RA driver that does not tell them.
+    /// Sent without confirmation: places for an RA driver that does not report them.
     Unconfirmed = "places given without confirmation",
-    /// Not answered: whoever was asked said nothing in time.
+    /// Not answered: the queried component timed out.
     Unanswered = "not answered in time",
-    /// Dropped: a report that nobody waits for.
+    /// Dropped: an unsolicited report.
     Unasked = "dropped: report that nobody waits for",
-    /// Not shown: an id that has no counterpart.
+    /// Not shown: an id without counterpart.
     Unmapped = "not shown: id without counterpart",
     /// Not shown: a subsystem whose number is taken on the other side.
     Collision = "not shown: number taken on the other side",
-    /// Not shown: more components than there is room for.
+    /// Not shown: too many components.
     TooManyComponents = "not shown: too many components",
-    /// Not sent: the network of RA systems did not take it.
+    /// Not sent: the RA node rejected the message.
     NotSent = "not sent to RA",
 }
 
-/// Counts, and says in the log what is refused: once for each kind and message code, and again
-/// after a while.
+/// Counts refusals and logs them: the first of each kind and message code, and again after
+/// [`SILENCE`](Self::SILENCE).
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     counters: Counters,
@@ -70,9 +69,9 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Between two words on the same.
+    /// Minimum interval between log entries of one kind.
     const SILENCE: Duration = Duration::from_secs(60);
-    /// The most kinds that are remembered; more are only counted.
+    /// Maximum number of kinds that are logged; further kinds are only counted.
     const MOST_KINDS: usize = 512;
 
     pub(super) const fn counters(&self) -> &Counters {
@@ -83,7 +82,7 @@ impl Tally {
         self.counters.add(counter);
     }
 
-    /// Counts what was refused of a message with this code, and says so now and then.
+    /// Counts a refused message with this code and logs it at intervals.
     pub(super) fn refuse(
         &mut self,
         now: Instant,

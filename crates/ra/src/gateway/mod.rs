@@ -1,21 +1,21 @@
-//! The gateway between systems of the Reference Architecture 3.x and those of the SAE standards: each
-//! sees the components of the other as its own.
+//! Gateway between systems of the Reference Architecture 3.x and the SAE standards: each side sees
+//! the components of the other as its own.
 //!
-//! | here | what it does |
+//! | part | purpose |
 //! |---|---|
-//! | [`Gateway`] | both halves without I/O and without a clock: fed with datagrams, messages and time |
-//! | `proxy` | an RA component as a JAUS component: services that answer from what it reports |
-//! | `course` | lists of places across: elements here, numbers there |
-//! | `picture` | a JAUS subsystem as an RA subsystem: each component once for each of its services |
-//! | [`RaGateway`] | the running thing: sockets, node, timers |
+//! | [`Gateway`] | both halves without I/O and clock: driven by datagrams, messages and time |
+//! | `proxy` | an RA component as a JAUS component: services that answer from its reports |
+//! | `course` | lists of places: elements on the JAUS side, numbers on the RA side |
+//! | `picture` | a JAUS subsystem as an RA subsystem: each component once per service |
+//! | [`RaGateway`] | the running gateway: sockets, node, timers |
 //!
-//! Between the two stand the id table ([`ra::ids`](crate::ids)) and the conversion of messages
-//! ([`ra::convert`](crate::convert)). What cannot be said on the other side is refused, counted,
-//! and told in the log once for each kind.
+//! The id table ([`ra::ids`](crate::ids)) and the message conversion
+//! ([`ra::convert`](crate::convert)) connect the two. A message without equivalent on the other
+//! side is refused, counted, and logged once per kind.
 //!
-//! Towards RA systems all JAUS clients are one, the gateway's commander (component type 32):
-//! it asks, connects and takes control in their place, and each RA component's counterpart decides
-//! among them. Towards JAUS each RA component speaks for itself.
+//! Towards RA systems, all JAUS clients appear as one, the gateway's commander (component type 32):
+//! it queries, connects and takes control on their behalf, and the proxy of each RA component
+//! arbitrates between the clients. Towards JAUS, each RA component acts under its own id.
 
 mod convert;
 mod counters;
@@ -56,69 +56,68 @@ use jaus::service::{
 /// Both halves of a gateway, without I/O and without a clock. See the [module](self).
 pub struct Gateway {
     settings: Settings,
-    /// Who is who, and whose numbers are taken.
+    /// Id mapping and the subsystem numbers in use.
     ids: IdTable,
-    /// The same for the conversion of messages.
+    /// The same table, shared with the message conversion.
     known: Ids,
     ra: RaNode,
-    /// The gateway's own component, which looks around among JAUS components.
+    /// The gateway's own component, which discovers JAUS components.
     own_stack: Stack,
-    /// The same component as RA systems see it.
+    /// The RA id of that component.
     own: RaId,
     proxies: BTreeMap<JausId, Proxy>,
-    /// How each listed RA component presents itself.
+    /// Profile of each listed RA component.
     listed: BTreeMap<JausId, Profile>,
-    /// JAUS subsystems that have changed, and when RA systems are told.
+    /// Changed JAUS subsystems and the time of their announcement to RA systems.
     changed: BTreeMap<u16, Instant>,
-    /// JAUS components by the ids by which RA systems see them.
+    /// JAUS components by their RA ids.
     routes: BTreeMap<RaId, Target>,
-    /// Ids that RA components had until lately: whoever looks around may still list them.
+    /// Former ids of RA components: stale discovery data may still list them.
     former: BTreeMap<JausId, Instant>,
-    /// The numbers of the subsystems that are shown to RA systems, by ours.
+    /// RA numbers of the shown subsystems, by JAUS number.
     shown: BTreeMap<u16, u8>,
     actions: VecDeque<Action>,
     tally: Tally,
 }
 
-/// What the owner of a gateway must do among JAUS components.
+/// Action on the JAUS node that a gateway requests.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Action {
     /// Attach a component with this id to the node.
     Attach(JausId),
-    /// Send a message in the name of an attached component.
+    /// Send a message from an attached component.
     Send(Outgoing),
     /// Detach the component with this id.
     Detach(JausId),
 }
 
-/// Why a gateway cannot be.
+/// Reason why a gateway cannot be created.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CannotBe {
-    /// The id table is mistaken.
+    /// The id table is invalid.
     #[error(transparent)]
     Ids(#[from] InvalidIds),
-    /// The gateway itself has no id among RA systems.
+    /// The gateway itself has no RA id.
     #[error("the gateway's own id {id} has none among RA systems: {why}")]
     Unmapped {
-        /// Its id among JAUS components.
+        /// Its JAUS id.
         id: JausId,
-        /// Why.
+        /// The reason.
         why: Unmapped,
     },
 }
 
 impl Gateway {
-    /// Guests, which speak but are not listed by their subsystem, are forgotten when nothing has
-    /// come from them for so long.
+    /// Timeout of guests: components that send messages but are not listed by their subsystem.
     const GUEST: Duration = Duration::from_secs(30);
-    /// For so long after it has gone the id of an RA component is not taken for a JAUS component's.
+    /// How long the id of a vanished RA component is not accepted as a JAUS component's.
     const FORMER: Duration = Duration::from_secs(120);
 
-    /// A gateway that has this id among JAUS components.
+    /// A gateway with this JAUS id.
     ///
     /// # Errors
-    /// What is wrong with the settings.
+    /// Invalid settings.
     pub fn new(id: JausId, settings: Settings) -> Result<Self, CannotBe> {
         let ids = IdTable::new(&settings.ids)?;
         let own = ids.ra_id(id, RaComponent::SUBSYSTEM_COMMANDER);
@@ -148,28 +147,28 @@ impl Gateway {
         })
     }
 
-    /// Whether the settings make a gateway.
+    /// Validates the settings.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// Invalid settings.
     pub fn check(settings: &Settings) -> Result<(), CannotBe> {
         IdTable::new(&settings.ids)?;
         Ok(())
     }
 
-    /// The gateway's own id among JAUS components.
+    /// The gateway's own JAUS id.
     #[must_use]
     pub const fn id(&self) -> JausId {
         self.own_stack.id()
     }
 
-    /// The gateway's own id among RA systems.
+    /// The gateway's own RA id.
     #[must_use]
     pub const fn ra_id(&self) -> RaId {
         self.own
     }
 
-    /// Begins to live.
+    /// Starts the gateway.
     pub fn start(&mut self, now: Instant) {
         self.actions.push_back(Action::Attach(self.own_stack.id()));
         let own = self.own_stack.id().subsystem();
@@ -181,13 +180,13 @@ impl Gateway {
         self.settle(now);
     }
 
-    /// A datagram of an RA system has come.
+    /// Processes a datagram of an RA system.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: Bytes) {
         self.ra.handle_datagram(now, from, datagram);
         self.settle(now);
     }
 
-    /// A message for one of the gateway's JAUS components has come.
+    /// Processes a message for one of the gateway's JAUS components.
     pub fn handle_message(&mut self, now: Instant, message: &Received) {
         if message.to == self.own_stack.id() {
             self.own_stack.handle_message(now, message);
@@ -199,7 +198,7 @@ impl Gateway {
         self.settle(now);
     }
 
-    /// The time of [`poll_timeout`](Self::poll_timeout) has come; earlier does no harm.
+    /// Runs due timers; calls before [`poll_timeout`](Self::poll_timeout) do no harm.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.ra.handle_timeout(now);
         if self.own_stack.poll_timeout().is_some_and(|due| due <= now) {
@@ -215,8 +214,8 @@ impl Gateway {
         self.settle(now);
     }
 
-    /// Stops and releases what is controlled on either side, and gives control to no client any more.
-    /// Releases that are not confirmed are repeated while the gateway still gets its time.
+    /// Stops and releases everything under control on either side, and grants no further control.
+    /// Unconfirmed releases are repeated as long as the gateway keeps running.
     pub fn release_all(&mut self, now: Instant) {
         let all: Vec<JausId> = self.proxies.keys().copied().collect();
         for id in all {
@@ -224,13 +223,13 @@ impl Gateway {
         }
     }
 
-    /// Whether everything is released that was controlled on either side.
+    /// Whether everything that was under control on either side is released.
     #[must_use]
     pub fn is_released(&self) -> bool {
         self.proxies.values().all(Proxy::is_released)
     }
 
-    /// Releases what is still controlled, and ends all else that runs with others.
+    /// Releases what is still under control, and ends all connections and subscriptions.
     pub fn take_leave(&mut self, now: Instant) {
         self.release_all(now);
         for (_, shown) in std::mem::take(&mut self.shown) {
@@ -240,12 +239,12 @@ impl Gateway {
         self.collect_desk(now);
     }
 
-    /// The next datagram for RA systems.
+    /// The next datagram to RA systems.
     pub fn poll_transmit(&mut self) -> Option<Transmit> {
         self.ra.poll_transmit()
     }
 
-    /// The next thing to do among JAUS components.
+    /// The next action on the JAUS node.
     pub fn poll_action(&mut self) -> Option<Action> {
         self.actions.pop_front()
     }
@@ -262,19 +261,19 @@ impl Gateway {
         own.into_iter().flatten().chain(proxies).min()
     }
 
-    /// What has been carried across and refused.
+    /// Counters of converted and refused messages.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         self.tally.counters()
     }
 
-    /// How things stand, for people.
+    /// State of the gateway, for display.
     #[must_use]
     pub fn report(&self) -> Report {
         Report::of(self)
     }
 
-    /// Looks after all that has happened.
+    /// Processes everything that is pending.
     fn settle(&mut self, now: Instant) {
         self.collect_desk(now);
         while let Some(event) = self.ra.poll_event() {
@@ -309,7 +308,7 @@ impl Gateway {
         }
     }
 
-    /// Somebody among JAUS components came, changed or went.
+    /// Handles the arrival, change or departure of a JAUS component.
     fn handle_change(&mut self, now: Instant, change: Change) {
         let subsystem = match change {
             Change::SubsystemFound(_) | Change::SubsystemLost(_) => return,
@@ -325,7 +324,7 @@ impl Gateway {
         }
     }
 
-    /// Tells RA systems of the JAUS subsystems that have changed.
+    /// Announces changed JAUS subsystems to RA systems.
     fn show_changes(&mut self, now: Instant) {
         let due: Vec<u16> = self
             .changed
@@ -384,7 +383,7 @@ impl Gateway {
         }
     }
 
-    /// Notes that a subsystem is there, unless that would be a second one of its number.
+    /// Claims a subsystem number; fails if the number is already in use.
     fn claim(&mut self, home: Side, number: u16) -> Result<(), Collision> {
         self.ids.claim(home, number)?;
         self.known.set(self.ids.clone());

@@ -1,13 +1,12 @@
-//! Which reports of the Reference Architecture are states of their component, that can be kept and
-//! told to several clients; and how one that was asked for as a whole is cut down to the fields that
-//! a client wants.
+//! RA reports that describe a component's state: the proxy caches them for several clients, and
+//! cuts a full report down to the fields that a client requested.
 
 use bytes::{BufMut, Bytes, BytesMut};
 
-/// Reports answer queries whose code is less by this, on both sides.
+/// A report code is higher than its query code by this much, on both sides.
 const STEP: u16 = 0x2000;
 
-/// The code of the report that answers the query with this code; `None` if that is no query's.
+/// The code of the report for a query code; `None` if the code is no query.
 pub(super) const fn report_of(query: u16) -> Option<u16> {
     match query {
         0x2000..=0x3FFF => Some(query + STEP),
@@ -15,7 +14,7 @@ pub(super) const fn report_of(query: u16) -> Option<u16> {
     }
 }
 
-/// The code of the query that the report with this code answers; `None` if that is no report's.
+/// The code of the query for a report code; `None` if the code is no report.
 pub(super) const fn query_of(report: u16) -> Option<u16> {
     match report {
         0x4000..=0x5FFF => Some(report - STEP),
@@ -23,16 +22,16 @@ pub(super) const fn query_of(report: u16) -> Option<u16> {
     }
 }
 
-/// A report that tells a state.
+/// A report of a state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct State {
-    /// Its code.
+    /// The code of the report.
     pub(super) report: u16,
     /// Octets of the presence vector, in query and report; 0 where there is none.
     presence: usize,
-    /// The fields that are asked for: those that peers send without being asked for more.
+    /// The fields to query: those that peers send by default.
     all: u32,
-    /// Octets of the optional fields, the one of bit 0 first.
+    /// Octets of the optional fields, bit 0 first.
     fields: &'static [usize],
 }
 
@@ -56,33 +55,33 @@ const STATES: &[State] = &[
     State { report: 0x440A, presence: 0, all: 0, fields: &[] },
 ];
 
-/// The state that the report with this code tells, if it tells one.
+/// The state behind a report code, if there is one.
 pub(super) fn state(report: u16) -> Option<State> {
     STATES.iter().find(|it| it.report == report).copied()
 }
 
 impl State {
-    /// The code of the query for it.
+    /// The code of its query.
     pub(super) const fn query(self) -> u16 {
         self.report - STEP
     }
 
-    /// The body of the query for all of it.
+    /// The body of a query for all fields.
     pub(super) fn query_for_all(self) -> Bytes {
         self.query_for(self.all)
     }
 
-    /// The body of the query for these fields.
+    /// The body of a query for these fields.
     pub(super) fn query_for(self, presence: u32) -> Bytes {
         Bytes::copy_from_slice(&presence.to_le_bytes()[..self.presence])
     }
 
-    /// All of it, as a presence vector.
+    /// The presence vector of all fields.
     pub(super) const fn all(self) -> u32 {
         self.all
     }
 
-    /// What the body of a query asks for; `None` if it is too short.
+    /// The fields that a query body requests; `None` if it is too short.
     pub(super) fn wanted(self, query: &[u8]) -> Option<u32> {
         let octets = query.get(..self.presence)?;
         let mut presence = [0; 4];
@@ -90,8 +89,8 @@ impl State {
         Some(u32::from_le_bytes(presence))
     }
 
-    /// A report with those of its fields alone that are wanted. What does not have the size that
-    /// its presence vector tells is left as it is, to be refused where it is read.
+    /// Cuts a report down to the `wanted` fields. A report whose size contradicts its presence
+    /// vector is returned unchanged; decoding refuses it later.
     pub(super) fn narrow(self, report: &Bytes, wanted: u32) -> Bytes {
         let Some(told) = self.wanted(report).filter(|_| !self.fields.is_empty()) else {
             return report.clone();

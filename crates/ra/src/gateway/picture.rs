@@ -1,5 +1,4 @@
-//! A JAUS subsystem as RA systems are to see it: each of its components once for each component type
-//! whose service it offers.
+//! Builds the RA view of a JAUS subsystem: each component once per component type of its services.
 
 use std::collections::BTreeMap;
 
@@ -11,20 +10,20 @@ use crate::node;
 use jaus::address::JausId;
 use jaus::service::{Component, Directory, Kind};
 
-/// What RA systems see of a JAUS subsystem, and who is behind it.
+/// RA view of a JAUS subsystem, with the JAUS component behind each RA id.
 #[derive(Debug, Default)]
 pub(super) struct Picture {
     pub(super) subsystem: node::Subsystem,
     pub(super) routes: BTreeMap<RaId, Target>,
-    /// What cannot be shown, and why.
+    /// Components that cannot be shown, with the reason.
     pub(super) unmapped: Vec<(JausId, Unmapped)>,
 }
 
-/// The longest name that RA systems can be told, in octets.
+/// Maximum length of a name in RA reports, in octets.
 const LONGEST_NAME: usize = 79;
 
-/// Draws a subsystem. `us` is the gateway itself, which is shown as a commander; `is_front` tells
-/// the components that are RA systems' own.
+/// Builds the view of a subsystem. `us` is the gateway itself, which is shown as a commander;
+/// `is_front` identifies the proxies of RA components.
 pub(super) fn draw(
     directory: &Directory,
     ids: &IdTable,
@@ -105,7 +104,7 @@ impl Picture {
     }
 }
 
-/// A component of several parts is told apart by them.
+/// The name of a component; with several component types, the type is part of it.
 fn name(component: &Component, part: RaComponent, several: bool) -> String {
     let told = component.identification.as_ref().map(|it| it.name.as_str());
     match told.filter(|name| !name.is_empty()) {

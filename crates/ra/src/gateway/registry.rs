@@ -1,4 +1,4 @@
-//! The RA components that JAUS sees: who comes and goes, and what becomes of their messages.
+//! Proxy registry: opens and closes the proxies of RA components and routes their messages.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -15,11 +15,11 @@ use jaus::messages::core::QueryIdentification;
 use jaus::service::{Event, Kind, Profile, code_of};
 use jaus::wire::Broadcast;
 
-/// The most JAUS components that one RA message is given to.
+/// Maximum number of JAUS components that one RA message is delivered to.
 const MOST_RECIPIENTS: usize = 64;
 
 impl Gateway {
-    /// An RA subsystem is there, or another than before.
+    /// Updates the proxies for a new or changed RA subsystem.
     pub(super) fn list(&mut self, now: Instant, subsystem: &node::Subsystem) {
         let number = subsystem.id;
         if let Err(collision) = self.claim(Side::Ra, number.into()) {
@@ -53,7 +53,7 @@ impl Gateway {
         }
     }
 
-    /// A listed component gets a proxy, or another one if it calls itself otherwise now.
+    /// Opens a proxy for a listed component, or a new one if its profile has changed.
     fn admit(&mut self, now: Instant, id: JausId, ra: RaId, profile: Profile) {
         if let Some(before) = self.listed.get(&id) {
             if *before == profile {
@@ -62,7 +62,7 @@ impl Gateway {
             self.dismiss(now, id);
         } else if let Some(guest) = self.proxies.get_mut(&id) {
             if guest.ra_client.is_busy() {
-                // It keeps its nameless proxy rather than lose what is under way.
+                // It keeps its unnamed proxy, as a new one would lose pending requests.
                 guest.kept_until = None;
                 self.listed.insert(id, profile);
                 return;
@@ -74,7 +74,7 @@ impl Gateway {
         }
     }
 
-    /// Attaches the counterpart of an RA component; says whether there was room.
+    /// Opens the proxy of an RA component; returns whether there was room.
     fn open(&mut self, now: Instant, id: JausId, ra: RaId, profile: Profile) -> bool {
         let full = self.proxies.len() >= self.settings.max_components;
         if full || id == self.own_stack.id() {
@@ -100,8 +100,9 @@ impl Gateway {
         true
     }
 
-    /// Asks everybody for a name, so that all hear where the counterpart lives: its own discovery
-    /// speaks within its subsystem alone, and who knew it before may still write to where it was.
+    /// Broadcasts a query so that every node learns the proxy's address: the proxy's own discovery
+    /// stays within its subsystem, and clients that knew it before may still send to its old
+    /// address.
     fn call_everybody(&mut self, source: JausId) {
         let query = QueryIdentification {
             query_type: 2.into(),
@@ -113,7 +114,7 @@ impl Gateway {
         }
     }
 
-    /// An RA subsystem is gone.
+    /// Closes the proxies of a lost RA subsystem.
     pub(super) fn lose(&mut self, now: Instant, subsystem: u8) {
         let of_it = |(_, proxy): &(&JausId, &Proxy)| proxy.ra().subsystem == subsystem;
         let gone: Vec<JausId> = self
@@ -136,7 +137,7 @@ impl Gateway {
         self.actions.push_back(Action::Detach(id));
     }
 
-    /// Guests that have nothing more to say leave.
+    /// Closes the proxies of expired, idle guests.
     pub(super) fn dismiss_guests(&mut self, now: Instant) {
         let mut gone = Vec::new();
         for (&id, proxy) in &mut self.proxies {
@@ -153,7 +154,7 @@ impl Gateway {
         }
     }
 
-    /// A JAUS component is gone.
+    /// Removes a lost JAUS component from all proxies.
     pub(super) fn forget_client(&mut self, now: Instant, client: JausId) {
         let all: Vec<JausId> = self.proxies.keys().copied().collect();
         for id in all {
@@ -161,7 +162,7 @@ impl Gateway {
         }
     }
 
-    /// Does something with a proxy, and carries out what it wants after that.
+    /// Runs `act` on a proxy, then processes its events and outgoing messages.
     pub(super) fn with_front(
         &mut self,
         now: Instant,
@@ -190,7 +191,7 @@ impl Gateway {
         self.proxies.insert(id, proxy);
     }
 
-    /// A JAUS component says something to an RA component that is no answer to a query.
+    /// Handles a JAUS message to an RA component that is no answer to a query.
     fn handle_unasked(&mut self, now: Instant, proxy: &mut Proxy, message: &Received) {
         if proxy.handle_entered(now, message, &mut self.tally) {
             return;
@@ -211,7 +212,7 @@ impl Gateway {
         }
     }
 
-    /// A message of an RA component that the node among RA systems does not answer itself.
+    /// Handles a message of an RA component that the RA node does not answer itself.
     pub(super) fn handle_ra_message(&mut self, now: Instant, message: &Message) {
         if message.destination == self.own {
             return self.handle_for_us(now, message);
@@ -258,7 +259,8 @@ impl Gateway {
         });
     }
 
-    /// The proxy of an RA component that wants something; kept for a while if nobody has listed it.
+    /// The proxy of a requesting RA component; opened as a temporary guest if the component is not
+    /// listed.
     fn client(&mut self, now: Instant, source: RaId) -> Option<JausId> {
         let id = match self.ids.jaus_id(source) {
             Ok(id) => id,
@@ -292,7 +294,7 @@ impl Gateway {
     }
 }
 
-/// How an RA component presents itself among JAUS components.
+/// The JAUS profile of an RA component.
 fn profile(subsystem: &node::Subsystem, ra: RaId, component: &node::Component) -> Profile {
     let or = |name: &str, otherwise: String| match name.is_empty() {
         true => otherwise,
@@ -308,7 +310,7 @@ fn profile(subsystem: &node::Subsystem, ra: RaId, component: &node::Component) -
     }
 }
 
-/// What an RA subsystem is, told by what is in it: RA systems do not say.
+/// Infers the kind of an RA subsystem from its components: RA systems do not report it.
 fn kind(subsystem: &node::Subsystem) -> Kind {
     let has = |wanted: fn(u8) -> bool| subsystem.components().any(|(id, _)| wanted(id.component));
     let drives = |part| RaComponent(part).is_driver();

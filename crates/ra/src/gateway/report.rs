@@ -1,43 +1,42 @@
-//! How a gateway stands, for people and (feature `serde`) for programs.
+//! State report of a gateway, for display and (feature `serde`) for programs.
 
 use std::fmt;
 
 use super::{Counter, Gateway};
 use jaus::address::JausId;
 
-/// Who is seen by whom, and what was counted.
+/// Mapped components and counters of a gateway.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Report {
-    /// RA components that JAUS sees: their id among RA systems, theirs among ours, and whether we
-    /// control them.
+    /// RA components visible to JAUS: RA id, JAUS id, and whether the gateway controls them.
     pub ra_components: Vec<RaComponentReport>,
-    /// JAUS components that RA systems see: their ids there and among ours.
+    /// JAUS components visible to RA systems: RA id and JAUS id.
     pub jaus_components: Vec<JausComponentReport>,
-    /// What was carried across and refused, where it is not zero.
+    /// Nonzero counters of the gateway.
     pub gateway: Vec<(String, u64)>,
-    /// What happened among RA systems, where it is not zero.
+    /// Nonzero counters of the RA node.
     pub ra: Vec<(String, u64)>,
 }
 
-/// An RA component that JAUS sees.
+/// An RA component visible to JAUS.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct RaComponentReport {
-    /// Its id.
+    /// Its RA id.
     pub ra: String,
-    /// Its id among JAUS components.
+    /// Its JAUS id.
     pub jaus: JausId,
     /// Its name.
     pub name: String,
-    /// Whether it is controlled by a JAUS client.
+    /// Whether a JAUS client controls it.
     pub controlled: bool,
 }
 
-/// A JAUS component that RA systems see.
+/// A JAUS component visible to RA systems.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct JausComponentReport {
-    /// Its id.
+    /// Its JAUS id.
     pub jaus: JausId,
-    /// Its id among RA systems.
+    /// Its RA id.
     pub ra: String,
 }
 
@@ -73,7 +72,7 @@ impl Report {
         }
     }
 
-    /// All of it in one line.
+    /// The report in one line.
     #[must_use]
     pub fn line(&self) -> String {
         let (ra, jaus) = (self.ra_components.len(), self.jaus_components.len());

@@ -1,5 +1,5 @@
-//! What a component type of the Reference Architecture is among services: which services it offers
-//! to JAUS clients, and which messages a service brings to RA systems.
+//! Maps RA component types to services: the services shown to JAUS clients, and the messages shown
+//! to RA systems.
 
 use super::pairs;
 use crate::convert::Places;
@@ -9,22 +9,22 @@ use jaus::codec::ServiceId;
 use jaus::messages::mobility;
 use jaus_vehicle::messages::ground;
 
-/// A component type and the service that is its counterpart.
+/// A component type and its counterpart service.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Role {
     /// The type.
     pub(super) part: RaComponent,
-    /// The service in the version that RA components are shown with.
+    /// The service, in the version that RA components offer.
     pub(super) service: ServiceId,
-    /// The service that works a list of places off, where that is another one.
+    /// The service that executes a list of places, if it is a separate one.
     pub(super) list: Option<ServiceId>,
-    /// The commands and queries that it understands.
+    /// Commands and queries that it receives.
     inputs: &'static [u16],
-    /// The reports that it gives.
+    /// Reports that it sends.
     outputs: &'static [u16],
 }
 
-/// The first version of a service: later ones add messages that RA systems have nothing for.
+/// The first version of a service: later ones add messages without RA counterpart.
 const fn first(service: ServiceId) -> ServiceId {
     ServiceId {
         minor: 0,
@@ -47,7 +47,7 @@ const fn role(
     }
 }
 
-/// The same with a service that works a list off.
+/// The same role with a list service.
 const fn with_list(role: Role, list: ServiceId) -> Role {
     Role {
         list: Some(first(list)),
@@ -77,43 +77,43 @@ const ROLES: &[Role] = &[
         &[0x0A20, 0x0A21, 0x0A24, 0x0A25, 0x2A21, 0x2A22, 0x2A23], &[0x4A20, 0x4A21, 0x4A22, 0x4A23, 0x4A24]),
 ];
 
-/// What each component understands, whatever its type: authority and control, the states, service
-/// connections, events.
+/// Messages that every component receives, whatever its type: authority and control, states,
+/// service connections, events.
 const CORE_INPUTS: &[u16] = &[
     0x0002, 0x0003, 0x0004, 0x0005, 0x0006, 0x0007, 0x0008, 0x0009, 0x000A, 0x000B, 0x000C, 0x000D,
     0x000E, 0x000F, 0x0010, 0x01F0, 0x01F1, 0x01F2, 0x2002, 0x21F0, 0x2202, 0x2B00, 0x2B03,
 ];
-/// What each component sends.
+/// Messages that every component sends.
 const CORE_OUTPUTS: &[u16] = &[
     0x0008, 0x0009, 0x000A, 0x000B, 0x000C, 0x000D, 0x000E, 0x000F, 0x0010, 0x01F3, 0x01F4, 0x4002,
     0x41F0, 0x41F1, 0x4202, 0x4B00, 0x4B03,
 ];
 
-/// What the component type is among services, if it is any.
+/// The role of a component type, if it has a service.
 pub(super) fn of_part(part: RaComponent) -> Option<&'static Role> {
     ROLES.iter().find(|role| role.part == part)
 }
 
-/// What a service is among component types, if it is any.
+/// The role of a service, if it has a component type.
 pub(super) fn of_service(urn: &str) -> Option<&'static Role> {
     let is_it = |role: &&Role| role.service.urn == urn || role.works_off(urn);
     ROLES.iter().find(is_it)
 }
 
-/// The type to which a report with this code belongs.
+/// The component types that send a report with this code.
 pub(super) fn reporting(report: u16) -> impl Iterator<Item = RaComponent> {
     let tells = move |role: &&Role| role.outputs.contains(&report);
     ROLES.iter().filter(tells).map(|role| role.part)
 }
 
 impl Role {
-    /// Whether a service that this one stands for works a list of places off.
+    /// Whether this service executes a list of places for the role.
     pub(super) fn works_off(&self, urn: &str) -> bool {
         let is_path = Places::of(self.part).is_some_and(|places| places.is_path);
         self.list.is_some_and(|list| list.urn == urn) || (is_path && self.service.urn == urn)
     }
 
-    /// What RA systems are told of it.
+    /// The RA services of a component in this role.
     pub(super) fn services(&self) -> Vec<node::Service> {
         let own = node::Service {
             kind: u16::from(self.part.0),
@@ -124,7 +124,7 @@ impl Role {
     }
 }
 
-/// What RA systems are told of a component that has nothing but the core.
+/// The RA service of a component with core messages only.
 pub(super) fn core_service() -> node::Service {
     node::Service {
         kind: 0,

@@ -1,5 +1,5 @@
-//! The running gateway: the RA network's socket, the JAUS node with the counterparts of the RA
-//! components attached, and one task that gives the [`Gateway`] its time.
+//! Runs the gateway: the socket of the RA network, the JAUS node with the attached proxies, and one
+//! task that drives the [`Gateway`].
 #![expect(
     clippy::disallowed_methods,
     reason = "here the gateway gets its time, and waits for it"
@@ -25,27 +25,27 @@ use jaus::node::{Node, Port, Resident};
 use jaus::wire::Priority;
 use jaus_vehicle::parts::{Part, PartError, Slot};
 
-/// The gateway between RA systems and JAUS, as a program runs it.
+/// Configuration of a running gateway between RA systems and JAUS.
 #[derive(Debug, Clone)]
 pub struct RaGateway {
-    /// What is carried across, and how.
+    /// Gateway settings.
     pub settings: Settings,
-    /// The interface of the RA network, by name or address; without it the JAUS node's first one.
+    /// Interface of the RA network, by name or address; the first one of the JAUS node by default.
     pub interface: Option<String>,
-    /// The multicast group by which RA systems find each other.
+    /// Multicast group of the RA systems.
     pub group: Group,
-    /// How many routers multicast may pass.
+    /// Multicast TTL.
     pub ttl: u8,
-    /// Our UDP port among RA systems, which answer to 3794 whatever it is.
+    /// Our UDP port on the RA network; RA systems send to 3794 regardless.
     pub port: u16,
-    /// How often the report is given; at the end, if this is zero. Without it there is none.
+    /// Interval of reports; zero for a single one at the end, `None` for no reports.
     pub reports: Option<Duration>,
-    /// What a report goes to.
+    /// Receiver of the reports.
     pub reporter: fn(&Report),
 }
 
 impl RaGateway {
-    /// The multicast group of RA systems: 224.1.0.1.
+    /// Default multicast group of RA systems: 224.1.0.1.
     #[must_use]
     pub fn group() -> Group {
         const GROUP: &str = "224.1.0.1:3794";
@@ -130,17 +130,17 @@ impl RaGateway {
     }
 }
 
-/// The first interface of the node with an IPv4 address, which RA systems need.
+/// The first interface of the node with an IPv4 address, as RA needs one.
 fn first_interface(node: &Node) -> Option<Interface> {
     let mut interfaces = node.links().into_iter().map(|link| link.interface);
     interfaces.find(|it| it.address.is_ipv4())
 }
 
-/// A gateway that leaves in order when it is dropped.
+/// Shuts the gateway down in order when it is dropped.
 struct Leaver(Option<Running>);
 
 impl Drop for Leaver {
-    /// Also when the program ends: the node waits for its residents.
+    /// Runs at program exit, too: the node waits for its residents.
     fn drop(&mut self) {
         let runtime = tokio::runtime::Handle::try_current();
         if let (Some(running), Ok(runtime)) = (self.0.take(), runtime) {
@@ -149,21 +149,21 @@ impl Drop for Leaver {
     }
 }
 
-/// A gateway with what it needs to run.
+/// A gateway with its sockets and timers.
 struct Running {
     gateway: Gateway,
     link: UdpLink,
     slab: Slab,
-    /// Makes a stopping node wait until everything is released.
+    /// Makes a stopping node wait until control is released.
     _resident: Resident,
-    /// The doors of the gateway's own component and of all counterparts.
+    /// Ports of the gateway's own component and of all proxies.
     ports: BTreeMap<JausId, Port>,
     node: Node,
     reports: Option<Duration>,
     reporter: fn(&Report),
 }
 
-/// What has come.
+/// A received datagram or message.
 enum Arrival {
     Datagram(SocketAddr, Bytes),
     Message(Received),
@@ -191,10 +191,11 @@ impl Running {
         }
     }
 
-    /// How long a gateway that ends tries to release what it controls.
+    /// Maximum time for the release of control at shutdown.
     const LEAVE: Duration = Duration::from_millis(900);
 
-    /// Stops and releases what is controlled on either side, until that is confirmed or for a moment.
+    /// Stops and releases everything under control, until confirmed or [`LEAVE`](Self::LEAVE) has
+    /// passed.
     async fn leave(mut self) {
         if self.reports.is_some() {
             (self.reporter)(&self.gateway.report());
@@ -223,9 +224,9 @@ impl Running {
         self.carry_out();
     }
 
-    /// The next datagram or message; sends what waits for the network meanwhile.
+    /// Waits for the next datagram or message; sends queued datagrams meanwhile.
     fn poll_arrival(&mut self, cx: &mut std::task::Context<'_>) -> Poll<Arrival> {
-        // Whether all has been sent is nobody's question here.
+        // The next poll sends what is left.
         let _ = self.link.poll_flush(cx);
         if let Poll::Ready((from, datagram)) = self.link.poll_recv(cx, &mut self.slab) {
             return Poll::Ready(Arrival::Datagram(from, datagram));

@@ -1,4 +1,4 @@
-//! What is chosen about a gateway.
+//! Settings of a gateway.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -8,39 +8,39 @@ use crate::{ids, node};
 /// The settings of a [`Gateway`](super::Gateway).
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// What the gateway's subsystem is called, on both sides.
+    /// Name of the gateway's subsystem, on both sides.
     pub name: String,
-    /// Who is who across the two networks.
+    /// Id mapping between the two networks.
     pub ids: ids::Settings,
-    /// Which JAUS subsystems RA systems see.
+    /// JAUS subsystems visible to RA systems.
     pub show: Show,
-    /// How long a client waits for an answer from the other side.
+    /// Timeout of a client's query to the other side.
     pub patience: Duration,
-    /// The most authority that is claimed of RA components, whatever a JAUS client has.
+    /// Maximum authority claimed of RA components, whatever authority a JAUS client has.
     pub authority: u8,
-    /// Control of an RA component ends this long after the client's last Request Control, with a
-    /// quarter's grace: whole seconds to 255, zero for never.
+    /// Timeout of control over an RA component after the client's last Request Control, plus a
+    /// quarter as grace: whole seconds up to 255, zero for no timeout.
     pub timeout: Duration,
-    /// The most RA components that JAUS sees.
+    /// Maximum number of RA components visible to JAUS.
     pub max_components: usize,
-    /// How long changes of a JAUS subsystem are gathered before RA systems are told.
+    /// How long changes of a JAUS subsystem are collected before RA systems are notified.
     pub gather: Duration,
-    /// How we are present among RA systems.
+    /// Settings of the RA node.
     pub ra: node::Settings,
 }
 
-/// Which JAUS subsystems RA systems see.
+/// Selection of the JAUS subsystems visible to RA systems.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Show {
-    /// All that have a number there.
+    /// All subsystems with an RA number.
     #[default]
     All,
-    /// These alone.
+    /// Only these.
     Only(BTreeSet<u16>),
 }
 
 impl Show {
-    /// Whether a subsystem is among them.
+    /// Whether the selection includes a subsystem.
     #[must_use]
     pub fn includes(&self, subsystem: u16) -> bool {
         match self {

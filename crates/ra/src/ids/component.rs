@@ -1,5 +1,4 @@
-//! Component types of the Reference Architecture: there the number of a component names what it
-//! does.
+//! Component types of the Reference Architecture: the component number is the type.
 
 use std::fmt;
 
@@ -7,13 +6,13 @@ use std::fmt;
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct RaComponent(pub u8);
 
-/// The constants, and the names that people read.
+/// Defines the constants and display names.
 macro_rules! components {
     ($($(#[$doc:meta])* $name:ident = $number:literal, $text:literal;)*) => {
         impl RaComponent {
             $($(#[$doc])* pub const $name: Self = Self($number);)*
 
-            /// What the type is called, if it is one of those of RA 3.3 that we know.
+            /// Name of the type, if it is one of the RA 3.3 types listed here.
             #[must_use]
             pub const fn name(self) -> Option<&'static str> {
                 match self.0 {
@@ -26,15 +25,15 @@ macro_rules! components {
 }
 
 components! {
-    /// Speaks for a node.
+    /// Represents a node.
     NODE_MANAGER = 1, "Node Manager";
-    /// An operator's or planner's client of a whole subsystem.
+    /// Client of an operator or planner for a whole subsystem.
     SUBSYSTEM_COMMANDER = 32, "Subsystem Commander";
     /// Drives by effort.
     PRIMITIVE_DRIVER = 33, "Primitive Driver";
     /// Drives by heading and speed on the globe.
     GLOBAL_VECTOR_DRIVER = 34, "Global Vector Driver";
-    /// Speaks for a subsystem.
+    /// Represents a subsystem.
     COMMUNICATOR = 35, "Communicator";
     /// Position and attitude on the globe.
     GLOBAL_POSE_SENSOR = 38, "Global Pose Sensor";
@@ -44,7 +43,7 @@ components! {
     LOCAL_POSE_SENSOR = 41, "Local Pose Sensor";
     /// Velocities.
     VELOCITY_STATE_SENSOR = 42, "Velocity State Sensor";
-    /// Stands between drivers and avoids harm.
+    /// Filters driver commands to avoid harm.
     REFLEXIVE_DRIVER = 43, "Reflexive Driver";
     /// Drives by heading and speed in a local frame.
     LOCAL_VECTOR_DRIVER = 44, "Local Vector Driver";
@@ -56,7 +55,7 @@ components! {
     GLOBAL_PATH_SEGMENT_DRIVER = 47, "Global Path Segment Driver";
     /// Drives along paths in a local frame.
     LOCAL_PATH_SEGMENT_DRIVER = 48, "Local Path Segment Driver";
-    /// Keeps objects of the world.
+    /// Stores objects of the world.
     VECTOR_KNOWLEDGE_STORE = 61, "Vector Knowledge Store";
 }
 
@@ -67,7 +66,7 @@ impl RaComponent {
         matches!(self.0, 33 | 34 | 43..=48)
     }
 
-    /// Whether it stands for its node or subsystem rather than for a service: node manager and
+    /// Whether it represents its node or subsystem rather than a service: node manager and
     /// communicator.
     #[must_use]
     pub const fn is_infrastructure(self) -> bool {

@@ -1,4 +1,4 @@
-//! What can be wrong with ids: in the settings, when one is looked up, when two sides meet.
+//! Errors of the id mapping: invalid settings, unmapped ids, collisions.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -11,12 +11,12 @@ use jaus::address::JausId;
 pub enum Side {
     /// Systems of the Reference Architecture.
     Ra,
-    /// Systems of the SAE standards, as we are.
+    /// Systems of the SAE standards, such as ours.
     Jaus,
 }
 
 impl Side {
-    /// The side across.
+    /// The opposite side.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {
@@ -25,7 +25,7 @@ impl Side {
         }
     }
 
-    /// The numbers that a subsystem can have.
+    /// The valid subsystem numbers.
     pub(super) const fn subsystems(self) -> RangeInclusive<u16> {
         match self {
             Self::Ra => 1..=254,
@@ -64,19 +64,19 @@ impl fmt::Display for Side {
     }
 }
 
-/// Settings that make no table.
+/// Invalid id settings.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InvalidIds {
-    /// A number that no subsystem can have.
+    /// An invalid subsystem number.
     #[error(
         "{side} subsystem {number} in {} cannot be: choose from {} to {}",
         home.entries(), side.subsystems().start(), side.subsystems().end()
     )]
     Subsystem {
-        /// Whose entry it is.
+        /// Side of the entry.
         home: Side,
-        /// Whose number it is.
+        /// Side of the number.
         side: Side,
         /// The number.
         number: u16,
@@ -84,50 +84,50 @@ pub enum InvalidIds {
     /// Two entries for one subsystem, or with one number.
     #[error("{side} subsystem {number} is twice in {}: leave one entry out, or give it another number", home.entries())]
     SubsystemTwice {
-        /// Whose entries they are.
+        /// Side of the entries.
         home: Side,
-        /// Whose number it is.
+        /// Side of the number.
         side: Side,
         /// The number.
         number: u16,
     },
-    /// An offset that leaves no subsystem with a number.
+    /// An offset that leaves no subsystem with a valid number.
     #[error(
         "{} {offset} gives no {home} subsystem a number from {} to {}: choose a smaller one, or leave it out",
         home.offset(), home.other().subsystems().start(), home.other().subsystems().end()
     )]
     Offset {
-        /// Whose offset it is.
+        /// Side of the offset.
         home: Side,
         /// The offset.
         offset: i32,
     },
-    /// An id with 0 or with a number that stands for all.
+    /// An id with 0 or with a wildcard number.
     #[error("{ra} = {jaus} in {} cannot be: an entry names one component, with no field that is 0 or stands for all", home.components())]
     NotUnicast {
-        /// Whose entry it is.
+        /// Side of the entry.
         home: Side,
         /// The RA id of the entry.
         ra: RaId,
         /// The JAUS id of the entry.
         jaus: JausId,
     },
-    /// An entry for a component that leads out of its node.
+    /// An entry that moves a component to another node.
     #[error(
         "{ra} = {jaus} in {} cannot be, for a component stays in its node: {expected}",
         home.components()
     )]
     LeavesNode {
-        /// Whose entry it is.
+        /// Side of the entry.
         home: Side,
         /// The RA id of the entry.
         ra: RaId,
         /// The JAUS id of the entry.
         jaus: JausId,
-        /// What to do.
+        /// The remedy.
         expected: String,
     },
-    /// An entry for the node manager or the communicator, which stand for the node itself.
+    /// An entry for the node manager or the communicator, which represent the node itself.
     #[error(
         "{0} in jaus_components cannot be: components 1 (node manager) and 35 (communicator) stand for \
          the node itself; name the type of a service, such as 33"
@@ -136,7 +136,7 @@ pub enum InvalidIds {
     /// Two entries for one component.
     #[error("{ra} = {jaus} in {} names an id that another entry has: leave one out", home.components())]
     ComponentTwice {
-        /// Whose entry it is.
+        /// Side of the entry.
         home: Side,
         /// The RA id of the later entry.
         ra: RaId,
@@ -145,45 +145,45 @@ pub enum InvalidIds {
     },
 }
 
-/// Why an id has no counterpart on the other side.
+/// Reason why an id has no counterpart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unmapped {
-    /// A field is 0 or stands for all.
+    /// A field is 0 or a wildcard.
     #[error("the id does not name one component")]
     NotUnicast,
-    /// The subsystem's number is out of what the other side has.
+    /// The other side has no such subsystem number.
     #[error("{side} subsystem {number} has no number on the other side: give it one in {} (or choose another {})", side.entries(), side.offset())]
     Subsystem {
-        /// Whose subsystem.
+        /// Side of the subsystem.
         side: Side,
         /// Its number.
         number: u16,
     },
-    /// Another subsystem has got the number by an entry.
+    /// An entry assigns the number to another subsystem.
     #[error("{side} subsystem {number} would get the number that {} gives to {by}: add an entry for it", side.entries())]
     SubsystemTaken {
-        /// Whose subsystem.
+        /// Side of the subsystem.
         side: Side,
         /// Its number.
         number: u16,
         /// The subsystem of the entry.
         by: u16,
     },
-    /// A component or instance for which there is no rule.
+    /// A component or instance outside the default rule.
     #[error(
         "RA component {0} is out of what the rule covers (components 1 to 63, instances 1 to 3): give it a number in ra_components, best 64, 128 or 192 to 254"
     )]
     Component(RaId),
-    /// Another component has got the number by an entry.
+    /// An entry assigns the number to another component.
     #[error("another component of the node got that number in {}: add an entry for this one", .0.components())]
     ComponentTaken(Side),
-    /// The node manager and the communicator stand for the node itself.
+    /// The node manager and the communicator represent the node itself.
     #[error("components 1 and 35 stand for the node itself")]
     Reserved,
 }
 
-/// Two subsystems that would have the same number on one side.
+/// Two subsystems with the same number on one side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{home} subsystem {number} cannot be shown: there is a {} subsystem {shown_as} already; choose a {} that keeps \
@@ -191,7 +191,7 @@ pub enum Unmapped {
     home.other(), home.offset(), home.entries()
 )]
 pub struct Collision {
-    /// The side of the subsystem that cannot be shown on the other.
+    /// Side of the subsystem that cannot be shown on the other.
     pub home: Side,
     /// Its number there.
     pub number: u16,

@@ -1,17 +1,16 @@
-//! Who is who across the two networks: [`IdTable`].
+//! Id mapping between RA systems and JAUS: [`IdTable`].
 //!
 //! An RA id has four octets (subsystem, node, component type, instance), ours has a 16-bit
-//! subsystem, node and component. Without any settings
+//! subsystem, node and component. By default
 //!
-//! * RA component `s.n.c.i` is seen by ours as `s.n.(c + 64·(i-1))`, for types 1 to 63 and instances
-//!   1 to 3: the second primitive driver `20.1.33.2` is `20.1.97`. Others need an entry.
-//! * our component `s.n.c` is seen by RA systems once for each type `T` whose services it offers, as
-//!   `s.n.T.c`: the instance is our component number. Subsystems above 254 need an offset or an
-//!   entry.
+//! * RA component `s.n.c.i` has the JAUS id `s.n.(c + 64·(i-1))`, for types 1 to 63 and instances 1
+//!   to 3: the second primitive driver `20.1.33.2` is `20.1.97`. Others need an entry.
+//! * our component `s.n.c` has one RA id for each type `T` whose services it offers, `s.n.T.c`: the
+//!   instance is our component number. Subsystems above 254 need an offset or an entry.
 //!
-//! Offsets and entries come from [`Settings`]. An id's counterpart follows from the settings alone:
-//! it is the same in every run, and whoever appears first. What depends on who is there is only
-//! whether two subsystems meet in one number; [`IdTable::claim`] tells.
+//! Offsets and entries come from [`Settings`]. The mapping depends on the settings alone, not on
+//! the order in which components appear. Only collisions of subsystem numbers depend on the systems
+//! present; [`IdTable::claim`] detects them.
 
 mod component;
 mod error;

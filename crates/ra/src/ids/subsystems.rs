@@ -1,16 +1,16 @@
-//! Subsystem numbers in one direction: an offset, and entries for those that it does not suit.
+//! Subsystem numbers in one direction: an offset, and entries for exceptions.
 
 use super::error::{InvalidIds, Side, Unmapped};
 
-/// By which numbers the subsystems of one side are seen on the other.
+/// Numbers of one side's subsystems on the other side.
 ///
-/// No two get the same number: a number that an entry gives is not given by the offset, so the one
-/// to whom the offset would give it has none.
+/// Numbers are unique: a number assigned by an entry is not assigned by the offset, so the
+/// subsystem that the offset would map to it has none.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Subsystems {
     home: Side,
     offset: i32,
-    /// Number at home, number abroad.
+    /// Number on the own side, number on the other side.
     entries: Vec<(u16, u16)>,
 }
 
@@ -50,7 +50,7 @@ impl Subsystems {
         }
     }
 
-    /// The number by which the other side sees it.
+    /// The number on the other side.
     pub(super) fn abroad(&self, number: u16) -> Result<u16, Unmapped> {
         let side = self.home;
         if !side.subsystems().contains(&number) {
@@ -68,14 +68,14 @@ impl Subsystems {
         }
     }
 
-    /// The subsystem that the other side sees by this number.
+    /// The subsystem with this number on the other side.
     pub(super) fn home(&self, number: u16) -> Option<u16> {
         let entry = self.entries.iter().find(|(_, to)| *to == number);
         let candidate = match entry {
             Some(&(from, _)) => from,
             None => u16::try_from(i32::from(number).checked_sub(self.offset)?).ok()?,
         };
-        // Whoever has an entry is seen by its number alone.
+        // A subsystem with an entry has that number only.
         (self.abroad(candidate) == Ok(number)).then_some(candidate)
     }
 

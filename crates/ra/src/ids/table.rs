@@ -1,4 +1,4 @@
-//! The table itself: rules, entries, and the check that no two subsystems meet in one number.
+//! The id table: default rules, entries, and the check for collisions of subsystem numbers.
 
 use std::collections::BTreeSet;
 
@@ -7,14 +7,14 @@ use super::subsystems::Subsystems;
 use super::{ComponentEntry, RaComponent, RaId, Settings, SubsystemEntry};
 use jaus::address::JausId;
 
-/// Types that the rule covers, 1 to this.
+/// Highest type of the default rule.
 const MOST_TYPES: u8 = 63;
-/// Instances that the rule covers, 1 to this.
+/// Highest instance of the default rule.
 const MOST_INSTANCES: u8 = 3;
 /// JAUS component numbers for each instance.
 const STRIDE: u8 = 64;
 
-/// The ids by which the components of each side are seen on the other.
+/// Maps the ids of each side to the other.
 ///
 /// ```
 /// use jaus::address::JausId;
@@ -38,15 +38,15 @@ pub struct IdTable {
     jaus: Subsystems,
     ra_components: Vec<ComponentEntry>,
     jaus_components: Vec<ComponentEntry>,
-    /// Subsystems that are at home on a side; at most as many as there are numbers.
+    /// Subsystems present on each side; bounded by the valid numbers.
     present: BTreeSet<(Side, u16)>,
 }
 
 impl IdTable {
-    /// The table of these settings.
+    /// Builds the table from settings.
     ///
     /// # Errors
-    /// The first entry or offset that cannot be, and what would do.
+    /// The first invalid entry or offset, with a remedy.
     pub fn new(settings: &Settings) -> Result<Self, InvalidIds> {
         let from_ra = |entry: &SubsystemEntry| (u16::from(entry.ra), entry.jaus);
         let from_jaus = |entry: &SubsystemEntry| (entry.jaus, u16::from(entry.ra));
@@ -64,19 +64,19 @@ impl IdTable {
         Ok(table)
     }
 
-    /// By which id ours see the component of an RA system.
+    /// JAUS id of an RA component.
     #[must_use]
     pub fn jaus_of(&self, id: RaId) -> Option<JausId> {
         self.jaus_id(id).ok()
     }
 
-    /// By which id RA systems see one of our components in its part as a component of this type.
+    /// RA id of one of our components, shown as this component type.
     #[must_use]
     pub fn ra_of(&self, id: JausId, part: RaComponent) -> Option<RaId> {
         self.ra_id(id, part).ok()
     }
 
-    /// Like [`jaus_of`](Self::jaus_of), with the reason if there is none.
+    /// Like [`jaus_of`](Self::jaus_of), with the reason for `None`.
     ///
     /// # Errors
     /// Why the component cannot be shown, and the setting that would change it.
@@ -100,7 +100,7 @@ impl IdTable {
         }
     }
 
-    /// Like [`ra_of`](Self::ra_of), with the reason if there is none.
+    /// Like [`ra_of`](Self::ra_of), with the reason for `None`.
     ///
     /// # Errors
     /// Why the component cannot be shown, and the setting that would change it.
@@ -111,7 +111,7 @@ impl IdTable {
         if part.is_infrastructure() {
             return Err(Unmapped::Reserved);
         }
-        // The numbers of the other side fit into an octet.
+        // RA subsystem numbers fit an octet.
         let subsystem = self.jaus.abroad(id.subsystem())? as u8;
         let mut entries = self.jaus_components.iter();
         let its = |entry: &&ComponentEntry| entry.jaus == id && entry.ra.component == part.0;
@@ -133,7 +133,7 @@ impl IdTable {
         }
     }
 
-    /// The component of an RA system that ours see by this id.
+    /// RA component with this JAUS id.
     #[must_use]
     pub fn ra_behind(&self, id: JausId) -> Option<RaId> {
         let entry = self.ra_components.iter().find(|entry| entry.jaus == id);
@@ -149,7 +149,7 @@ impl IdTable {
         (self.jaus_of(candidate)? == id).then_some(candidate)
     }
 
-    /// Our component that RA systems see by this id, in its part as a component of that type.
+    /// Our component with this RA id, shown as that component type.
     #[must_use]
     pub fn jaus_behind(&self, id: RaId) -> Option<JausId> {
         let entry = self.jaus_components.iter().find(|entry| entry.ra == id);
@@ -163,8 +163,8 @@ impl IdTable {
         (self.ra_of(candidate, RaComponent(id.component))? == id).then_some(candidate)
     }
 
-    /// By which id ours know a component with this RA id, whichever side it is on; `None` if its
-    /// subsystem was not [claimed](Self::claim), for the same number may mean one of either side.
+    /// JAUS id of the component with this RA id, on either side; `None` if its subsystem was not
+    /// [claimed](Self::claim), as the same number may exist on both sides.
     #[must_use]
     pub fn known_to_jaus(&self, id: RaId) -> Option<JausId> {
         if self.is_home(Side::Ra, id.subsystem.into()) {
@@ -174,9 +174,9 @@ impl IdTable {
             .filter(|ours| self.is_home(Side::Jaus, ours.subsystem()))
     }
 
-    /// By which id RA systems know a component with this JAUS id, whichever side it is on; `None` as
-    /// in [`known_to_jaus`](Self::known_to_jaus). One of ours is named as a subsystem commander, for
-    /// who is named is a client.
+    /// RA id of the component with this JAUS id, on either side; `None` as in
+    /// [`known_to_jaus`](Self::known_to_jaus). Our components are mapped as subsystem commanders,
+    /// as messages name clients.
     #[must_use]
     pub fn known_to_ra(&self, id: JausId) -> Option<RaId> {
         if self.is_home(Side::Jaus, id.subsystem()) {
@@ -190,28 +190,27 @@ impl IdTable {
         self.present.contains(&(side, subsystem))
     }
 
-    /// By which number a subsystem of `home` is seen on the other side.
+    /// Number of a `home` subsystem on the other side.
     ///
     /// # Errors
-    /// Why it has none.
+    /// The reason why it has none.
     pub fn subsystem(&self, home: Side, number: u16) -> Result<u16, Unmapped> {
         self.numbers(home).abroad(number)
     }
 
-    /// The subsystem of `home` that the other side sees by this number.
+    /// The `home` subsystem that has this number on the other side.
     #[must_use]
     pub fn subsystem_behind(&self, home: Side, number: u16) -> Option<u16> {
         self.numbers(home).home(number)
     }
 
-    /// Notes that a subsystem is at home on a side, and gives the number by which the other side
-    /// sees it; `None` if it has none. To be asked before it is shown; a subsystem that was not
-    /// noted is still found by the other functions.
+    /// Claims a subsystem number for a side and returns the number on the other side; `None` if it
+    /// has none. Call it before the subsystem is shown; the other functions work without a claim.
     ///
     /// # Errors
-    /// [`Collision`] if a subsystem of that number is at home on the other side, or if the subsystem
-    /// has the number by which one from the other side is seen already. Who was there first stays;
-    /// the later one is not noted.
+    /// [`Collision`] if a subsystem with that number exists on the other side, or if a subsystem of
+    /// the other side is already shown under its number. The first claim stays valid; the later one
+    /// is not recorded.
     pub fn claim(&mut self, home: Side, number: u16) -> Result<Option<u16>, Collision> {
         let abroad = home.other();
         let shown = self.numbers(home).abroad(number).ok();
@@ -239,7 +238,7 @@ impl IdTable {
         Ok(shown)
     }
 
-    /// Forgets that a subsystem is at home on a side: it is gone.
+    /// Removes the claim of a lost subsystem.
     pub fn release(&mut self, home: Side, number: u16) {
         self.present.remove(&(home, number));
     }
@@ -251,7 +250,7 @@ impl IdTable {
         }
     }
 
-    /// Entries for components name one component each, and stay in its node.
+    /// Checks that component entries name a single component and stay in its node.
     fn check_components(&self, home: Side) -> Result<(), InvalidIds> {
         let entries = match home {
             Side::Ra => &self.ra_components,

@@ -79,7 +79,7 @@ fn an_entry_overrides_the_rule_and_takes_the_number_from_whom_the_rule_would_giv
     assert_eq!(ids.jaus_of(ra("21.1.33.1")), None);
     let taken = ids.jaus_id(ra("21.1.33.1")).unwrap_err().to_string();
     assert!(taken.contains("gives to 20"), "{taken}");
-    // Only the part that the entry names has another instance.
+    // Only the component type of the entry has another instance.
     assert_eq!(ids.ra_of(jaus("101.1.200"), DRIVER), Some(ra("101.1.33.1")));
     assert_eq!(ids.ra_of(jaus("101.1.1"), DRIVER), None);
     let pose = RaComponent::GLOBAL_POSE_SENSOR;
@@ -161,7 +161,7 @@ fn two_subsystems_that_meet_in_a_number_are_told_apart_or_refused() {
         collision.contains("jaus_offset") && collision.contains("jaus_subsystems"),
         "{collision}"
     );
-    // Who was there first is shown as before.
+    // The first claim stays valid.
     assert_eq!(ids.claim(Side::Ra, 20), Ok(Some(20)));
     assert_eq!(ids.claim(Side::Jaus, 1001), Ok(None));
     ids.release(Side::Ra, 20);
@@ -211,7 +211,7 @@ fn settings_are_read_from_text_and_unknown_keys_are_refused() {
     assert!(wrong.unwrap_err().to_string().contains("is not an RA id"));
 }
 
-/// Settings from a small range of numbers, so that they meet; those that make no table are left out.
+/// Settings from a small range of numbers, so that they collide; invalid settings are left out.
 fn tables() -> impl Strategy<Value = (Settings, IdTable)> {
     let subsystem = || (1..8_u8, 1..8_u16).prop_map(|(ra, jaus)| SubsystemEntry { ra, jaus });
     let component = || {
@@ -255,7 +255,7 @@ fn tables() -> impl Strategy<Value = (Settings, IdTable)> {
                     settings.ra_subsystems.clear();
                     settings.jaus_subsystems.clear();
                 }
-                // Entries one by one, so that some are kept.
+                // Entries one by one, so that some are valid.
                 for entry in ra_components {
                     settings.ra_components.push(entry);
                     if IdTable::new(&settings).is_err() {

@@ -1,7 +1,7 @@
-//! What others ask of the components that we show, and what they are told.
+//! Answers queries to our components.
 //!
-//! OpenJAUS answers for the subsystem at the communicator and for a node at its manager only; here
-//! every component answers every question, each from the id that was asked.
+//! OpenJAUS answers for the subsystem only at the communicator and for a node only at its manager.
+//! Here every component answers every query, from the addressed id.
 
 use std::time::Instant;
 
@@ -14,7 +14,7 @@ use crate::{Counter, Message, RaId};
 use jaus::codec;
 
 impl RaNode {
-    /// Answers a question for each component that it is for.
+    /// Answers a query for each addressed component.
     pub(super) fn answer(&mut self, now: Instant, query: &Message) {
         let asked: Vec<_> = self.carrier.recipients(query.destination).collect();
         for id in asked {
@@ -53,8 +53,7 @@ impl RaNode {
         Some(())
     }
 
-    /// Sends something of our own; what cannot be sent is counted by the carrier, and others ask
-    /// again.
+    /// Sends a message of the node. The carrier counts failures; peers repeat their queries.
     pub(super) fn transmit(&mut self, message: &Message) {
         if let Err(error) = self.carrier.send(message) {
             tracing::debug!(?message, %error, "not sent");

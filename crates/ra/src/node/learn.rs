@@ -1,4 +1,4 @@
-//! What others say of themselves, and what they are asked.
+//! Learns about peer subsystems: processes their reports and sends the discovery queries.
 
 use std::time::{Duration, Instant};
 
@@ -15,13 +15,13 @@ use crate::messages::ra33::{
 use crate::{Counter, Message, RaId};
 use jaus::codec::{Message as _, Text};
 
-/// Octets of a Report Identification that is not shortened.
+/// Octets of a complete Report Identification.
 const IDENTIFICATION_LEN: usize = 84;
-/// How long a question waits that may not be asked yet.
+/// Delay of a query that the rate limit holds back.
 const PAUSE: Duration = Duration::from_millis(50);
 
 impl RaNode {
-    /// A subsystem says that it is there.
+    /// Processes a peer's heartbeat.
     pub(super) fn handle_heartbeat(&mut self, now: Instant, source: RaId) {
         let communicator = RaId {
             component: RaId::COMMUNICATOR,
@@ -38,7 +38,7 @@ impl RaNode {
         self.serve(now, source.subsystem);
     }
 
-    /// Takes a report in that is for the node itself; says whether it was.
+    /// Processes a report addressed to the node itself; returns whether it was one.
     pub(super) fn handle_report(&mut self, now: Instant, message: &Message) -> bool {
         let subsystem = message.source.subsystem;
         let learned = match message.code {
@@ -100,7 +100,7 @@ impl RaNode {
         Some(())
     }
 
-    /// The communicator speaks for its whole subsystem, others for their node.
+    /// A report by the communicator covers the whole subsystem, any other only the sender's node.
     fn learn_configuration(
         &mut self,
         now: Instant,
@@ -142,7 +142,7 @@ impl RaNode {
         Some(())
     }
 
-    /// The nodes of a report, without what is not in range, twice there, or too much.
+    /// The nodes of a report, without invalid or duplicate ids and components above the limit.
     fn nodes(&mut self, report: &ReportConfiguration) -> Vec<Node> {
         let mut room = self.settings.max_components;
         let mut nodes: Vec<Node> = Vec::new();
@@ -209,12 +209,12 @@ impl RaNode {
         Some(())
     }
 
-    /// Who asks in our name: the node manager of our first subsystem.
+    /// Source of our queries: the node manager of our first subsystem.
     pub(super) fn asker(&self) -> Option<RaId> {
         self.own.values().next().map(super::own::Own::manager)
     }
 
-    /// Does what is due for a subsystem: asks it, tells the owner of it, or gives it up.
+    /// Runs the due work for a peer: queries, notifications to the owner, or its removal.
     pub(super) fn serve(&mut self, now: Instant, subsystem: u8) {
         let Some(peer) = self.peers.get_mut(&subsystem) else {
             return;
@@ -236,7 +236,7 @@ impl RaNode {
         }
     }
 
-    /// Asks what is due.
+    /// Sends the due queries.
     fn ask(&mut self, now: Instant, subsystem: u8) {
         let Some(asker) = self.asker() else { return };
         let Some(peer) = self.peers.get_mut(&subsystem) else {
@@ -257,7 +257,7 @@ impl RaNode {
         }
     }
 
-    /// A subsystem is gone.
+    /// Removes a peer.
     pub(super) fn lose(&mut self, subsystem: u8) {
         if self.peers.remove(&subsystem).is_some() {
             tracing::info!(subsystem, "RA subsystem lost");
@@ -267,7 +267,7 @@ impl RaNode {
     }
 }
 
-/// The message that asks a question.
+/// Builds the message of a query.
 fn ask(
     asker: RaId,
     communicator: RaId,
@@ -304,7 +304,7 @@ fn ask(
     }
 }
 
-/// A confirmation, in whose presence vector OpenJAUS sets all bits, also those that mean nothing.
+/// Decodes a confirmation. OpenJAUS sets all bits of its presence vector, including undefined ones.
 fn confirmation(message: &Message) -> Option<ConfirmEventRequest> {
     const RATE: u8 = 1;
     let mut data = message.data.to_vec();
@@ -316,7 +316,7 @@ fn confirmation(message: &Message) -> Option<ConfirmEventRequest> {
     known.body().ok()
 }
 
-/// A name up to its first zero, without what cannot be shown.
+/// A name up to its first zero, without control characters.
 fn readable(name: &Text) -> String {
     let octets = name.as_bytes().split(|&octet| octet == 0).next();
     let text = String::from_utf8_lossy(octets.unwrap_or_default());

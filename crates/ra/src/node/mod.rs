@@ -1,21 +1,20 @@
-//! Our presence among RA systems: what we show to them, and what they show to us.
+//! RA node: announces our subsystems to RA systems and discovers theirs.
 //!
-//! Each subsystem that is [announced](RaNode::announce) sends a heartbeat to the group, each second
-//! and from its communicator; names, configuration and services are answered for all of its
-//! components; who asked for it is told of changes. The other way round, a subsystem whose
-//! heartbeat is heard is asked what it is, in the order in which OpenJAUS asks: its name at the
-//! communicator, then nodes and components and to be told of their changes, then each name and the
-//! services. What was asked is asked again until it is answered or was asked often enough. When all
-//! is answered, the owner is told that the subsystem [appeared](Event::Appeared).
+//! Each [announced](RaNode::announce) subsystem sends a heartbeat to the group every second, from
+//! its communicator. The node answers queries for names, configuration and services of all its
+//! components and notifies subscribers of changes. A heartbeat of an unknown subsystem starts
+//! discovery, in the query order of OpenJAUS: its name from the communicator, then nodes and
+//! components and a subscription to their changes, then each name and the services. A query is
+//! repeated until it is answered or the attempts are used up. When no query is open, the owner
+//! learns that the subsystem [appeared](Event::Appeared).
 //!
-//! All questions come from the node manager of our first subsystem. While we show nothing, nobody is
-//! asked.
+//! All queries come from the node manager of our first subsystem. Without an announced subsystem
+//! the node sends no queries.
 //!
-//! [Hosts that multicast does not reach](super::carrier::Settings::peers) are heard by whatever they
-//! send, for their heartbeats go to the group: while nothing comes from one, it is asked for its
-//! pulse.
+//! Heartbeats go to the group, so [hosts beyond multicast](super::carrier::Settings::peers) are
+//! discovered by any message they send. A silent one is queried for its heartbeat pulse.
 //!
-//! Everything else that is for a component of ours comes out as [`Event::Message`].
+//! Every other message for our components is returned as [`Event::Message`].
 
 mod answer;
 mod learn;
@@ -53,35 +52,34 @@ use peer::{Peer, Question};
 pub struct RaNode {
     settings: Settings,
     carrier: Carrier,
-    /// By number, like the peers.
+    /// Local subsystems by number, like the peers.
     own: BTreeMap<u8, Own>,
     peers: BTreeMap<u8, Peer>,
     answers: Buckets<u8>,
     questions: Buckets<u8>,
-    /// Subsystems about which there is news.
+    /// Subsystems with pending notifications.
     news: BTreeSet<u8>,
-    /// Those that the owner was told of.
+    /// Subsystems reported to the owner.
     shown: BTreeSet<u8>,
     messages: VecDeque<Message>,
 }
 
-/// What the owner of a node is to know.
+/// Notification for the owner of a node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A subsystem is there, and has said what it is and what is in it: names and services as far
-    /// as it answered.
+    /// A subsystem was discovered, with the names and services that it reported.
     Appeared(Subsystem),
-    /// It says other things than before.
+    /// A known subsystem reports a different configuration.
     Changed(Subsystem),
-    /// It has said goodbye, or nothing for too long.
+    /// It has shut down or timed out.
     Lost(u8),
-    /// A message for one of our components, or for several of them (its destination tells), that
-    /// the node does not answer itself.
+    /// A message for one or several of our components (see its destination) that the node does not
+    /// handle itself.
     Message(Message),
 }
 
 impl RaNode {
-    /// A node that shows nothing yet.
+    /// A node without local subsystems.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         const ALL: usize = 256;
@@ -98,7 +96,7 @@ impl RaNode {
         }
     }
 
-    /// A datagram has come.
+    /// Processes a received datagram.
     pub fn handle_datagram(&mut self, now: Instant, from: SocketAddr, datagram: Bytes) {
         let is_out_of_reach = self.settings.carrier.peers.contains(&from.ip());
         for message in self.carrier.handle_datagram(now, from, datagram) {
@@ -139,7 +137,7 @@ impl RaNode {
         self.messages.push_back(message);
     }
 
-    /// Time has passed. Call it when [`poll_timeout`](Self::poll_timeout) is reached.
+    /// Runs due timers. Call it when [`poll_timeout`](Self::poll_timeout) is reached.
     pub fn handle_timeout(&mut self, now: Instant) {
         self.carrier.handle_timeout(now);
         let due = self.peers.iter().filter(|(_, peer)| peer.next <= now);
@@ -154,13 +152,13 @@ impl RaNode {
         }
     }
 
-    /// Shows a subsystem, or tells that something about it has changed. Node managers (1.1 in each
-    /// node) and the communicator (35.1 in the first) are added where they are missing, and
-    /// answer by themselves.
+    /// Announces a subsystem, or its changed configuration. Missing node managers (1.1 in each
+    /// node) and a missing communicator (35.1 in the first node) are added; the node answers for
+    /// them.
     ///
     /// # Errors
-    /// Ids that are none or twice there, more than fits the messages, or a subsystem that others
-    /// speak for.
+    /// Invalid or duplicate ids, more than fits the messages, or a subsystem number in use by a
+    /// peer.
     pub fn announce(&mut self, now: Instant, subsystem: Subsystem) -> Result<(), BadSubsystem> {
         let subsystem = own::complete(subsystem)?;
         let id = subsystem.id;
@@ -188,7 +186,7 @@ impl RaNode {
         Ok(())
     }
 
-    /// Shows a subsystem no more, and says so.
+    /// Withdraws a subsystem and notifies the peers.
     pub fn withdraw(&mut self, now: Instant, subsystem: u8) {
         let asker = self.asker();
         self.tell_all(subsystem, true);
@@ -207,23 +205,24 @@ impl RaNode {
         }
     }
 
-    /// Sends a message of a component that we show. Its number is kept, but for large messages.
+    /// Sends a message of one of our components. Its sequence number is kept, except for large
+    /// messages.
     ///
     /// # Errors
-    /// A source that is not ours, a destination whose address is not known, too much data, or too
-    /// much to send at once.
+    /// A foreign source, a destination without known address, too much data, or a full transmit
+    /// queue.
     pub fn send(&mut self, now: Instant, message: &Message) -> Result<(), SendError> {
         self.carrier.send(message)?;
         self.carrier.settle(now);
         Ok(())
     }
 
-    /// The next datagram to be sent.
+    /// The next outgoing datagram.
     pub fn poll_transmit(&mut self) -> Option<Transmit> {
         self.carrier.poll_transmit()
     }
 
-    /// The next thing to know: who came and went before what was said.
+    /// The next event: subsystem changes before messages.
     pub fn poll_event(&mut self) -> Option<Event> {
         while let Some(id) = self.news.pop_first() {
             let was_shown = self.shown.contains(&id);
@@ -252,13 +251,13 @@ impl RaNode {
         all.flatten().min()
     }
 
-    /// What was seen, done and thrown away.
+    /// Counters of traffic and drops.
     #[must_use]
     pub const fn counters(&self) -> &Counters {
         self.carrier.counters()
     }
 
-    /// How datagrams are read and written, and where others are.
+    /// The datagram layer, with peer addresses.
     #[must_use]
     pub const fn carrier(&self) -> &Carrier {
         &self.carrier
@@ -270,19 +269,18 @@ impl RaNode {
         &self.settings
     }
 
-    /// The RA subsystems that are heard now, in order of their numbers, with what they have told so
-    /// far.
+    /// The RA subsystems present, ordered by number, with what is known of them so far.
     pub fn subsystems(&self) -> impl Iterator<Item = &Subsystem> + '_ {
         self.peers.values().map(|peer| &peer.subsystem)
     }
 
-    /// When anything of an RA subsystem was heard last; `None` if it is not known now.
+    /// Time of the last message of an RA subsystem; `None` if it is unknown.
     #[must_use]
     pub fn heard(&self, subsystem: u8) -> Option<Instant> {
         self.peers.get(&subsystem).map(|peer| peer.heard)
     }
 
-    /// What we show, node managers and communicators included.
+    /// Our subsystems, including node managers and communicators.
     pub fn own(&self) -> impl Iterator<Item = &Subsystem> + '_ {
         self.own.values().map(|own| &own.subsystem)
     }

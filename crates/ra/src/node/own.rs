@@ -1,4 +1,4 @@
-//! A subsystem that we show: complete, checked, and how it reads in reports.
+//! A local subsystem: completed, validated and encoded as reports.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
@@ -13,19 +13,19 @@ use crate::messages::ra33::{
 };
 use jaus::codec::{Message as _, Text};
 
-/// A subsystem that we show.
+/// A local subsystem.
 #[derive(Debug)]
 pub(super) struct Own {
     pub(super) subsystem: Subsystem,
     pub(super) next_heartbeat: Instant,
-    /// By event number.
+    /// Subscriptions by event number.
     pub(super) subscriptions: BTreeMap<u8, Subscription>,
-    /// When changes are told that have been gathered since the first.
+    /// When to send the changes collected so far.
     pub(super) tell: Option<Instant>,
 }
 
 impl Own {
-    /// A subsystem that is complete and checked already.
+    /// Takes a complete and validated subsystem.
     pub(super) fn new(now: Instant, subsystem: Subsystem) -> Self {
         Self {
             subsystem,
@@ -35,12 +35,12 @@ impl Own {
         }
     }
 
-    /// Who tells that it is there: the communicator, in the first node.
+    /// Source of heartbeats: the communicator in the first node.
     pub(super) fn communicator(&self) -> RaId {
         self.of_first_node(RaId::COMMUNICATOR)
     }
 
-    /// Who asks others: the manager of the first node.
+    /// Source of queries: the manager of the first node.
     pub(super) fn manager(&self) -> RaId {
         self.of_first_node(RaId::NODE_MANAGER)
     }
@@ -63,7 +63,7 @@ impl Own {
         found.map(|(_, component)| component)
     }
 
-    /// The name of the subsystem (2), the node (3) or the component (4) of an id, as was asked.
+    /// The name of the subsystem (2), the node (3) or the component (4) of an id, as queried.
     pub(super) fn identification(
         &self,
         id: RaId,
@@ -109,7 +109,7 @@ impl Own {
     }
 }
 
-/// As much of a name as fits 80 octets with a zero behind it, which readers may look for.
+/// The longest prefix of a name that fits 80 octets with its terminating zero.
 fn short(name: &str) -> &str {
     const LONGEST: usize = 79;
     let ends = name.char_indices().map(|(at, c)| at + c.len_utf8());
@@ -146,7 +146,7 @@ fn described(service: &Service) -> report_services::ServiceSeq {
     }
 }
 
-/// What the node itself understands and sends in the name of each component.
+/// The messages that the node itself receives and sends for each component.
 fn core() -> Service {
     let commands = |codes: &[u16]| {
         let command = |&code| Command { code, presence: 0 };
@@ -173,7 +173,7 @@ fn core() -> Service {
     }
 }
 
-/// Adds the node managers and the communicator where they are missing, and checks the whole.
+/// Adds missing node managers and the communicator, and validates the result.
 pub(super) fn complete(mut subsystem: Subsystem) -> Result<Subsystem, BadSubsystem> {
     subsystem.nodes.sort_by_key(|node| node.id);
     if subsystem.nodes.is_empty() {

@@ -1,4 +1,4 @@
-//! A subsystem of others: what is known of it, and what is still to be asked.
+//! A peer subsystem: its known state and the open queries.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -7,57 +7,57 @@ use super::Settings;
 use super::subsystem::{Component, Node, Service, Subsystem};
 use crate::RaId;
 
-/// Something to be found out, in the order of asking.
+/// A discovery query, in query order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Question {
-    /// The subsystem's name, asked of its communicator.
+    /// The subsystem's name, from its communicator.
     Subsystem,
     /// Its nodes and components.
     Configuration,
-    /// To be told when they change.
+    /// Subscription to configuration changes.
     Subscription,
-    /// The name of a node, asked of its manager.
+    /// The name of a node, from its manager.
     Node(u8),
-    /// The name of a component, asked of itself.
+    /// The name of a component, from the component itself.
     Name(RaId),
     /// Its services.
     Services(RaId),
 }
 
 impl Question {
-    /// Whether the answer belongs to what the owner is told.
+    /// Whether the answer is part of the subsystem reported to the owner.
     const fn is_detail(self) -> bool {
         !matches!(self, Self::Configuration | Self::Subscription)
     }
 }
 
-/// How often a question has been asked, and when it is due again.
+/// Number of attempts of a query and the time of the next one.
 #[derive(Clone, Copy, Debug)]
 struct Attempts {
     made: u32,
     next: Instant,
 }
 
-/// A subsystem of others.
+/// A peer subsystem.
 #[derive(Debug)]
 pub(super) struct Peer {
     pub(super) subsystem: Subsystem,
     pub(super) communicator: RaId,
-    /// When something of it was heard.
+    /// Time of its last message.
     pub(super) heard: Instant,
-    /// Whether it has told its nodes and components.
+    /// Whether it has reported its nodes and components.
     pub(super) configured: bool,
     pub(super) subscribed: bool,
-    /// Whether something is other than the owner was told.
+    /// Whether it differs from the subsystem last reported to the owner.
     changed: bool,
-    /// Whether something is gone, which the owner is told before all questions are answered.
+    /// Whether parts have vanished; the owner is notified before all queries are answered.
     shrunk: bool,
     questions: BTreeMap<Question, Attempts>,
     next_refresh: Instant,
     next_review: Instant,
-    /// When it is told what we show, if it has not asked for that by then.
+    /// When to send it our configuration, unless it has subscribed by then.
     pub(super) greet: Option<Instant>,
-    /// When there is something to do.
+    /// When work is due.
     pub(super) next: Instant,
 }
 
@@ -84,7 +84,7 @@ impl Peer {
         peer
     }
 
-    /// Its node manager beside the communicator.
+    /// The node manager beside the communicator.
     pub(super) fn manager(&self) -> RaId {
         RaId {
             component: RaId::NODE_MANAGER,
@@ -93,14 +93,14 @@ impl Peer {
         }
     }
 
-    /// Puts a question on the list, unless it is there.
+    /// Opens a query, unless it is open already.
     pub(super) fn wonder(&mut self, now: Instant, question: Question) {
         let attempts = Attempts { made: 0, next: now };
         self.questions.entry(question).or_insert(attempts);
         self.next = self.next.min(now);
     }
 
-    /// Takes a question off the list; what comes after the first is asked then.
+    /// Closes a query; closing the first one opens the next ones.
     pub(super) fn settle(&mut self, now: Instant, question: Question) {
         let was_open = self.questions.remove(&question).is_some();
         if was_open && question == Question::Subsystem && !self.configured {
@@ -109,8 +109,8 @@ impl Peer {
         }
     }
 
-    /// The next question that is due, which counts as asked now. One that was asked in vain too
-    /// often is left for later.
+    /// The next due query, which counts as sent now. A query without answers after the last attempt
+    /// is closed until the next refresh.
     pub(super) fn poll_question(&mut self, now: Instant, settings: &Settings) -> Option<Question> {
         loop {
             let due = self.questions.iter_mut();
@@ -124,7 +124,7 @@ impl Peer {
         }
     }
 
-    /// A question that was due could not be asked yet.
+    /// Postpones a due query that could not be sent.
     pub(super) fn postpone(&mut self, question: Question, until: Instant) {
         if let Some(attempts) = self.questions.get_mut(&question) {
             attempts.made -= 1;
@@ -132,7 +132,7 @@ impl Peer {
         }
     }
 
-    /// Puts on the list again what may have changed unnoticed.
+    /// Reopens queries for state that may have changed unnoticed.
     pub(super) fn refresh(&mut self, now: Instant, settings: &Settings) {
         if self.next_refresh <= now {
             self.next_refresh = now + settings.refresh;
@@ -151,7 +151,7 @@ impl Peer {
         }
     }
 
-    /// Asks for names and services: for `all`, or for those that are not known.
+    /// Opens queries for names and services: all, or only the unknown ones.
     fn wonder_about_parts(&mut self, now: Instant, all: bool) {
         let nodes = self.subsystem.nodes.iter();
         let nodes = nodes.filter(|node| all || node.name.is_empty());
@@ -170,7 +170,7 @@ impl Peer {
         }
     }
 
-    /// Sets when there is something to do again. Questions wait while there is nobody who `asks`.
+    /// Sets when work is due next. Queries wait while no local component `asks`.
     pub(super) fn schedule(&mut self, silence: Duration, asks: bool) {
         let questions = self.questions.values().map(|attempts| attempts.next);
         let question = questions.min().filter(|_| asks);
@@ -184,12 +184,12 @@ impl Peer {
         self.next = times.fold(self.heard + silence, Instant::min);
     }
 
-    /// Whether the owner can be told of it: all that it was asked is answered, or was asked in vain.
+    /// Whether it is complete: every query is answered or given up.
     pub(super) fn is_settled(&self) -> bool {
         self.configured && !self.questions.keys().any(|question| question.is_detail())
     }
 
-    /// Whether there is news for the owner, who is told with this.
+    /// Whether the owner must be notified; clears the notification.
     pub(super) fn take_news(&mut self) -> bool {
         let news = self.configured && (self.shrunk || (self.changed && self.is_settled()));
         if news {
@@ -199,12 +199,12 @@ impl Peer {
         news
     }
 
-    /// It has told its name.
+    /// Stores the subsystem's name.
     pub(super) fn name_subsystem(&mut self, name: String) {
         self.changed |= replace(&mut self.subsystem.name, name);
     }
 
-    /// A node has told its name.
+    /// Stores the name of a node.
     pub(super) fn name_node(&mut self, id: u8, name: String) {
         let nodes = &mut self.subsystem.nodes;
         if let Some(node) = nodes.iter_mut().find(|node| node.id == id) {
@@ -212,21 +212,21 @@ impl Peer {
         }
     }
 
-    /// A component has told its name.
+    /// Stores the name of a component.
     pub(super) fn name_component(&mut self, id: RaId, name: String) {
         if let Some(component) = component(&mut self.subsystem, id) {
             self.changed |= replace(&mut component.name, name);
         }
     }
 
-    /// A component has told its services.
+    /// Stores the services of a component.
     pub(super) fn set_services(&mut self, id: RaId, services: Vec<Service>) {
         if let Some(component) = component(&mut self.subsystem, id) {
             self.changed |= replace(&mut component.services, services);
         }
     }
 
-    /// The messages of all services but those of one component.
+    /// Number of messages in the services of all other components.
     pub(super) fn commands_but_of(&self, id: RaId) -> usize {
         let others = self
             .subsystem
@@ -237,7 +237,7 @@ impl Peer {
             .sum()
     }
 
-    /// It has told its nodes and components, new ones of which are asked for names and services.
+    /// Replaces nodes and components; queries names and services of new ones.
     pub(super) fn configure(&mut self, now: Instant, nodes: Vec<Node>) {
         self.changed |= !self.configured;
         self.configured = true;
@@ -261,7 +261,7 @@ impl Peer {
                 }
             }
         }
-        // What was taken over has left components without number behind.
+        // Moving known components leaves entries without number behind.
         let kept = |node: &Node| self.subsystem.nodes.iter().any(|new| new.id == node.id);
         self.shrunk |= !old.nodes.iter().all(kept);
         self.shrunk |= old.components().any(|(id, _)| id.component != 0);
@@ -280,7 +280,7 @@ impl Peer {
     }
 }
 
-/// How many messages some services list.
+/// Number of messages that services list.
 pub(super) fn commands(services: &[Service]) -> usize {
     let in_one = |service: &Service| 1 + service.inputs.len() + service.outputs.len();
     services.iter().map(in_one).sum()
@@ -292,7 +292,7 @@ fn component(subsystem: &mut Subsystem, id: RaId) -> Option<&mut Component> {
     components.find(|known| (known.component, known.instance) == (id.component, id.instance))
 }
 
-/// Replaces a value, and says whether it was another.
+/// Replaces a value and returns whether it changed.
 fn replace<T: PartialEq>(old: &mut T, new: T) -> bool {
     let other = *old != new;
     *old = new;

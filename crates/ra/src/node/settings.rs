@@ -1,4 +1,4 @@
-//! The settings of a node: times and bounds, with defaults that suit OpenJAUS.
+//! Settings of an RA node: timing and limits, with defaults that suit OpenJAUS.
 
 use std::time::Duration;
 
@@ -8,34 +8,34 @@ use jaus::endpoint::Rate;
 /// The settings of an [`RaNode`](super::RaNode).
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// How datagrams are read and written.
+    /// Settings of the datagram layer.
     pub carrier: carrier::Settings,
-    /// How often each subsystem that we show tells that it is there. OpenJAUS: 1 s.
+    /// Heartbeat period of each local subsystem. OpenJAUS: 1 s.
     pub heartbeat: Duration,
-    /// How long another subsystem may be silent before it is lost. OpenJAUS: 5 s.
+    /// Silence after which a peer is lost. OpenJAUS: 5 s.
     pub silence: Duration,
-    /// How long to wait for an answer before the question is asked again.
+    /// Timeout of a query before it is repeated.
     pub patience: Duration,
-    /// How often a question is asked before it is left until the next [`refresh`](Self::refresh).
+    /// Attempts of a query before it waits for the next [`refresh`](Self::refresh).
     pub tries: u32,
-    /// How often a subsystem's configuration is asked for again, in case that it tells no changes.
+    /// Period of repeated configuration queries, for peers that do not report changes.
     pub refresh: Duration,
-    /// How often names and services of all components are asked for again.
+    /// Period of repeated queries for names and services of all components.
     pub review: Duration,
-    /// How long changes of what we show are gathered before they are told: each of them makes
-    /// OpenJAUS ask everything again.
+    /// How long changes of our configuration are collected before they are sent: OpenJAUS repeats
+    /// all its queries for each change.
     pub gather: Duration,
-    /// Answers to one subsystem.
+    /// Rate limit of answers to one subsystem.
     pub answers: Rate,
-    /// Questions to one subsystem.
+    /// Rate limit of queries to one subsystem.
     pub questions: Rate,
-    /// The most components that are known of one subsystem.
+    /// Maximum number of components per subsystem.
     pub max_components: usize,
-    /// The most messages of services that are known of one subsystem.
+    /// Maximum number of service messages per subsystem.
     pub max_commands: usize,
-    /// The most subscriptions to our configurations.
+    /// Maximum number of subscriptions to our configurations.
     pub max_events: usize,
-    /// The most messages that wait for the owner.
+    /// Maximum number of messages queued for the owner.
     pub queue_limit: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Who wants to be told when what we show changes.
+//! Subscriptions of peers to our configuration.
 
 use std::time::Instant;
 
@@ -12,15 +12,15 @@ use crate::{Counter, Message, RaId};
 use jaus::codec::{EncodeError, Message as _};
 use jaus::wire::ra::CODE_LEN;
 
-/// Somebody who wants to be told of changes.
+/// Subscription of a peer component to configuration changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Subscription {
     client: RaId,
-    /// Whom it asked, and so who tells it.
+    /// Component that received the request and therefore sends the events.
     at: RaId,
-    /// Of the subsystem, or of the node of who was asked.
+    /// Scope: the subsystem, or the node of `at`.
     about: QueryField,
-    /// Counts what it was told.
+    /// Sequence number of the next event.
     sequence: u8,
 }
 
@@ -29,13 +29,13 @@ impl Subscription {
         self.client
     }
 
-    /// The question whose answer it wants to be told, and of whom it was asked.
+    /// The subscribed query and the component that received it.
     pub(super) fn question(&self) -> (RaId, QueryConfiguration) {
         let query_field = self.about;
         (self.at, QueryConfiguration { query_field })
     }
 
-    /// The event that tells a report.
+    /// Builds the event that carries a report.
     pub(super) fn event(
         &mut self,
         event_id: u8,
@@ -52,18 +52,18 @@ impl Subscription {
     }
 }
 
-/// The events that can be had: each change, and the first one.
+/// The only event type on offer: every change, and once at the start.
 pub(super) const EVERY_CHANGE: u8 = 1;
 
-/// Whether a request to cancel is about configurations. OpenJAUS looks for the code of the query
-/// there, where the standard has that of the report.
+/// Whether a cancel request means configurations. OpenJAUS expects the code of the query there, the
+/// standard that of the report.
 fn means_configuration(code: u16) -> bool {
     [ReportConfiguration::CODE, QueryConfiguration::CODE].contains(&code)
 }
 
 impl RaNode {
-    /// Somebody wants an event. Says whether that is the node's business: if it is about a
-    /// configuration, or asked of a node manager or a communicator, who have no other.
+    /// Handles Create Event. Returns whether the node is responsible: for configurations, and for
+    /// any request to a node manager or communicator, which offer nothing else.
     pub(super) fn handle_create_event(&mut self, now: Instant, message: &Message) -> bool {
         let Ok(request) = message.body::<CreateEvent>() else {
             return self.refuse_malformed(message);
@@ -92,7 +92,7 @@ impl RaNode {
         true
     }
 
-    /// Takes a subscription in, or finds that it is there; gives the number of the event.
+    /// Adds a subscription or finds the existing one; returns its event number.
     fn subscribe(&mut self, message: &Message, request: &CreateEvent) -> Result<u8, ResponseCode> {
         let wanted = &request.create_event_rec;
         if wanted.report_code != ReportConfiguration::CODE {
@@ -133,7 +133,7 @@ impl RaNode {
         Ok(event)
     }
 
-    /// Somebody wants no more events. Says whether they were the node's business.
+    /// Handles Cancel Event. Returns whether the node was responsible.
     pub(super) fn handle_cancel_event(&mut self, message: &Message) -> bool {
         let Ok(request) = message.body::<CancelEvent>() else {
             return self.refuse_malformed(message);
@@ -181,13 +181,13 @@ impl RaNode {
         }
     }
 
-    /// Whether a destination is a node manager or communicator, for which the owner of the node
-    /// answers nothing.
+    /// Whether a destination is a node manager or communicator, for which the node's owner answers
+    /// no requests.
     fn is_ours_alone(&self, destination: RaId) -> bool {
         [RaId::NODE_MANAGER, RaId::COMMUNICATOR].contains(&destination.component)
     }
 
-    /// Forgets what a subsystem wanted to be told.
+    /// Removes the subscriptions of a subsystem.
     pub(super) fn forget_subscriber(&mut self, subsystem: u8) {
         for own in self.own.values_mut() {
             own.subscriptions

@@ -1,16 +1,16 @@
-//! What a subsystem says of itself: nodes, components, names and services.
+//! Description of a subsystem: nodes, components, names and services.
 
 use std::fmt;
 use std::net::IpAddr;
 
 use crate::RaId;
 
-/// A subsystem, ours or another's.
+/// A local or peer subsystem.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Subsystem {
     /// 1 ..= 254.
     pub id: u8,
-    /// Its name, at most 79 octets on the wire; empty if it did not say.
+    /// Its name, at most 79 octets on the wire; empty if not reported.
     pub name: String,
     /// Its nodes.
     pub nodes: Vec<Node>,
@@ -21,7 +21,7 @@ pub struct Subsystem {
 pub struct Node {
     /// 1 ..= 254.
     pub id: u8,
-    /// Its name; empty if it did not say.
+    /// Its name; empty if not reported.
     pub name: String,
     /// Its components.
     pub components: Vec<Component>,
@@ -32,22 +32,22 @@ pub struct Node {
 pub struct Component {
     /// Its type, 1 ..= 254.
     pub component: u8,
-    /// Which of several of that type, 1 ..= 254.
+    /// Instance number within the type, 1 ..= 254.
     pub instance: u8,
-    /// Its name; empty if it did not say.
+    /// Its name; empty if not reported.
     pub name: String,
-    /// Its services; empty if it did not say.
+    /// Its services; empty if not reported.
     pub services: Vec<Service>,
 }
 
-/// A service: the messages of one kind that a component understands and sends.
+/// A service: the messages of one kind that a component receives and sends.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Service {
     /// 0 for the core services, else the number of the component type.
     pub kind: u16,
-    /// What it understands.
+    /// Received messages.
     pub inputs: Vec<Command>,
-    /// What it sends.
+    /// Sent messages.
     pub outputs: Vec<Command>,
 }
 
@@ -56,7 +56,7 @@ pub struct Service {
 pub struct Command {
     /// The message (command) code.
     pub code: u16,
-    /// Which optional fields; 0 for messages without presence vector.
+    /// Supported optional fields; 0 for messages without presence vector.
     pub presence: u32,
 }
 
@@ -70,7 +70,7 @@ impl Subsystem {
     }
 }
 
-/// Why a subsystem cannot be shown.
+/// Reason why a subsystem cannot be announced.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BadSubsystem {
     /// A number is out of range.
@@ -81,18 +81,18 @@ pub enum BadSubsystem {
         /// Its value.
         number: u8,
     },
-    /// The same node or component twice.
+    /// Duplicate node or component.
     #[error("{0} is there twice: give each component an instance of its own")]
     Twice(RaId),
     /// More than a message can hold.
     #[error("{0} has more {1} than one message can tell: at most 255")]
     TooMany(RaId, &'static str),
-    /// A subsystem of that number is heard from elsewhere.
+    /// A peer already uses the subsystem number.
     #[error("subsystem {0} is there already{1}: give ours another number")]
     Taken(u8, Where),
 }
 
-/// Where somebody was heard, if that is known; reads as the end of a clause.
+/// The address of a peer, if known; displays as the end of a clause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Where(pub Option<IpAddr>);
 

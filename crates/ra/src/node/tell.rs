@@ -1,12 +1,11 @@
-//! Telling others what we show, and what has changed in it.
+//! Sends heartbeats and configuration changes of our subsystems.
 //!
-//! OpenJAUS asks each question anew, of every component, for each change that it is told. So changes
-//! that come close together are gathered and told once.
+//! OpenJAUS repeats each query to every component for each reported change. Changes in quick
+//! succession are therefore collected and sent once.
 //!
-//! Who knows us from before we were started again does not subscribe a second time: it has not
-//! noticed. Therefore those without a subscription get an ordinary Report Configuration instead,
-//! which OpenJAUS takes in the same way: at each change, and once when they have had the time to
-//! subscribe and did not.
+//! A peer that knew us before our restart has not noticed it and does not subscribe again. Peers
+//! without a subscription therefore receive an ordinary Report Configuration, which OpenJAUS
+//! accepts in the same way: at each change, and once when the time to subscribe has passed.
 
 use std::time::Instant;
 
@@ -22,7 +21,7 @@ use crate::{Message, RaId};
 use jaus::codec::Message as _;
 
 impl RaNode {
-    /// Tells everybody that a subsystem of ours is there, if it is time to.
+    /// Multicasts the heartbeat of a local subsystem, if it is due.
     pub(super) fn heartbeat(&mut self, now: Instant, subsystem: u8) {
         let Some(own) = self.own.get_mut(&subsystem) else {
             return;
@@ -40,8 +39,7 @@ impl RaNode {
         }
     }
 
-    /// Asks those whose heartbeats do not come here, and who have been silent for a while, whether
-    /// they are still there.
+    /// Queries the heartbeat of silent peers that multicast does not reach.
     fn feel_pulses(&mut self, now: Instant, asker: RaId) {
         let named = &self.settings.carrier.peers;
         let is_silent = |(id, peer): &(&u8, &Peer)| {
@@ -62,7 +60,7 @@ impl RaNode {
         }
     }
 
-    /// Tells what has changed in a subsystem of ours, if it is time to.
+    /// Sends the collected changes of a local subsystem, if they are due.
     pub(super) fn tell_changes(&mut self, now: Instant, subsystem: u8) {
         if let Some(own) = self.own.get_mut(&subsystem)
             && own.tell.is_some_and(|tell| tell <= now)
@@ -72,7 +70,7 @@ impl RaNode {
         }
     }
 
-    /// Tells all how a subsystem of ours is now; with `gone`, that it is not any more.
+    /// Sends the configuration of a local subsystem to all peers; an empty one with `gone`.
     pub(super) fn tell_all(&mut self, subsystem: u8, gone: bool) {
         let peers = self.peers.iter();
         let peers = peers.filter(|(_, peer)| gone || peer.greet.is_none());
@@ -106,7 +104,7 @@ impl RaNode {
         }
     }
 
-    /// Tells another subsystem how one of ours is, unless it has subscribed to that.
+    /// Sends the configuration of a local subsystem to a peer that has not subscribed to it.
     fn tell_without_subscription(&mut self, subsystem: u8, peer: u8, gone: bool) {
         let (Some(own), Some(known)) = (self.own.get(&subsystem), self.peers.get(&peer)) else {
             return;
@@ -126,7 +124,7 @@ impl RaNode {
         }
     }
 
-    /// Tells a subsystem what we show, if it had the time to subscribe to that and did not.
+    /// Sends our configurations to a peer that did not subscribe in time.
     pub(super) fn greet(&mut self, now: Instant, peer: u8) {
         let Some(known) = self.peers.get_mut(&peer) else {
             return;
@@ -141,7 +139,7 @@ impl RaNode {
     }
 }
 
-/// What is to be told of a subsystem of ours.
+/// The configuration report of a local subsystem.
 fn report(
     own: &Own,
     at: RaId,

@@ -1,4 +1,4 @@
-//! The Reference Architecture: its messages against independent encoders, recorded traffic, the gateway.
+//! Reference Architecture: messages against independent encoders, recorded traffic, the gateway.
 
 mod gateway;
 mod ra33;

@@ -1,5 +1,5 @@
-//! Recorded traffic of OpenJAUS 3.3.1 node managers, with a node of ours in the place of one of them:
-//! whatever the other asked, ours says what the replaced one said.
+//! Recorded traffic of OpenJAUS 3.3.1 node managers, with a node of ours in the place of one: our
+//! answers equal those of the replaced node.
 
 #![expect(clippy::expect_used, reason = "helpers of tests")]
 

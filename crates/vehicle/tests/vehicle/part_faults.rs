@@ -1,5 +1,5 @@
-//! Faults of motors, sensors and disks below the ready components: what stops, what is reported, and
-//! how it goes on.
+//! Faults of motors, sensors and disks below the ready components: what stops, what is reported,
+//! and how operation resumes.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

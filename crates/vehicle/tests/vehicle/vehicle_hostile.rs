@@ -1,5 +1,5 @@
-//! Whatever anybody says, a vehicle keeps its limits, moves only while somebody may move it, and
-//! stops when nobody may: random messages from random clients, under virtual time.
+//! A vehicle under random messages from random clients, in virtual time: it keeps its limits, moves
+//! only for a client with permission, and stops when there is none.
 #![allow(
     clippy::disallowed_methods,
     clippy::unwrap_used,

@@ -1,6 +1,6 @@
-//! The chain of drivers as a whole: a client gives a path to the path segment driver, and the vehicle
-//! gets there through all stages, whichever part is started again on the way; an emergency at the
-//! last stage ends it for good.
+//! The chain of drivers as a whole: a client sends a path to the path segment driver, and the
+//! vehicle reaches its end through all stages, even if any part restarts on the way; an emergency
+//! at the last stage ends the motion permanently.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

@@ -12,7 +12,7 @@ pub(super) fn to_hex(octets: &[u8]) -> String {
     text
 }
 
-/// The octets, if the text is pairs of digits of either case and nothing else.
+/// The octets, if the text consists of pairs of hexadecimal digits in either case.
 pub(super) fn from_hex(text: &str) -> Option<Vec<u8>> {
     let digit = |octet: u8| {
         char::from(octet)

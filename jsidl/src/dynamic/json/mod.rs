@@ -1,4 +1,4 @@
-//! The JSON view of messages, as people read and write it.
+//! JSON view of messages, for people and tools.
 //!
 //! | JSIDL | JSON |
 //! |---|---|
@@ -15,9 +15,9 @@
 //! | variable_field | `{"index": n, "units": "meter", "value": …}`; units are not read |
 //! | array | nested arrays, indexed in the order of the dimensions |
 //!
-//! The name of the body's own composite is not shown; an empty body is `{}`. Only where a message
-//! has a header or footer of its own, the three stand in an object with the keys `header`, `body`
-//! and `footer`. A NaN comes back as the ordinary quiet one.
+//! The body's own composite is not shown; an empty body is `{}`. Only if a message has its own
+//! header or footer, the three parts are in an object with the keys `header`, `body` and `footer`.
+//! A NaN is restored as the default quiet NaN.
 
 mod hex;
 mod read;
@@ -31,13 +31,13 @@ pub use write::to_json;
 use super::Path;
 use super::error::{Fault, write_place};
 
-/// The key for the bits of a bit field that no sub-field owns.
+/// The key of the bits that no sub-field owns.
 const RESERVED: &str = "_reserved";
 
-/// The key for the octets of a string that is not UTF-8.
+/// The key of the octets of a string that is not UTF-8.
 const HEX: &str = "hex";
 
-/// The keys for the parts of a message that has a header or footer of its own.
+/// The keys of the parts of a message with its own header or footer.
 const SECTIONS: [&str; 3] = ["header", "body", "footer"];
 
 /// JSON that is not a view of the given definition.
@@ -47,7 +47,7 @@ pub struct JsonError {
     pub message: String,
     /// The field.
     pub path: Path,
-    /// What is wrong there.
+    /// The problem.
     pub problem: JsonProblem,
 }
 
@@ -60,30 +60,30 @@ impl fmt::Display for JsonError {
 
 impl std::error::Error for JsonError {}
 
-/// What can be wrong with JSON.
+/// Problems of JSON.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum JsonProblem {
-    /// An object has a key that the definition does not know.
+    /// An object has an unknown key.
     #[error("unknown key \"{key}\"; known here: {known}")]
     UnknownKey {
         /// The key.
         key: String,
-        /// The names that the definition has, separated by commas.
+        /// The known names, separated by commas.
         known: String,
     },
     /// A required member is absent.
     #[error("required, but absent")]
     Missing,
-    /// Something else than the definition has here.
+    /// A value of another kind than the definition requires.
     #[error("expected {expected}, found {found}")]
     Expected {
-        /// What the definition has.
+        /// The required kind.
         expected: String,
-        /// What is there, shortened.
+        /// The actual value, shortened.
         found: String,
     },
-    /// A real number outside the range of a scaled integer, whose limits belong to it.
+    /// A real number outside the range of a scaled integer, which includes its limits.
     #[error("{value} is outside the range from {lower} to {upper} {units}")]
     OutOfRange {
         /// The number.

@@ -1,6 +1,6 @@
-//! JSON to [`Value`].
+//! Converts JSON to a [`Value`].
 //!
-//! The definition says what to expect at every place; the error says so to whoever wrote the JSON.
+//! The definition determines what is expected at every position; errors state it.
 
 use serde_json::{Map, Value as Json};
 
@@ -14,13 +14,13 @@ use crate::model::{
     SubField, Unsigned, ValueSet, Variant,
 };
 
-/// Reads the JSON view of a message.
+/// Converts the JSON view of a message.
 ///
 /// Members of groups may come in any order; optional ones may be absent or `null`. Counts are
 /// checked by [`encode`](crate::dynamic::encode), not here.
 ///
 /// # Errors
-/// If the JSON does not fit the definition: the error names the field and what is expected there.
+/// If the JSON does not fit the definition: the error names the field and the expectation.
 pub fn from_json(message: &Message, json: &Json) -> Result<Value, JsonError> {
     let value = if message.header.is_none() && message.footer.is_none() {
         match &message.body {
@@ -225,7 +225,7 @@ fn limits(signed: Signed) -> (i64, i64) {
     }
 }
 
-/// What to expect where an integer belongs.
+/// The expectation for an integer.
 fn integer(
     least: impl std::fmt::Display,
     greatest: impl std::fmt::Display,
@@ -285,7 +285,7 @@ fn bits(bits: &BitField, json: &Json) -> Read<u64> {
     Ok(raw)
 }
 
-/// The sub-field's bits in place.
+/// The bits of a sub-field, in position.
 fn sub_field(field: &SubField, json: &Json) -> Read<u64> {
     let greatest = field.mask().checked_shr(field.from.into()).unwrap_or(0);
     let value = named_value(&field.values, json).or(json.as_u64());
@@ -356,8 +356,8 @@ fn array(array: &Array, json: &Json) -> Read<Value> {
     ))
 }
 
-/// Where an element goes on the wire, where the first dimension is the fastest, if its position in
-/// the text counts the last dimension fastest.
+/// Wire position of an element (first dimension fastest), for its position in the text (last
+/// dimension fastest).
 fn wire_position(mut position: usize, total: usize, dimensions: &[u32]) -> usize {
     let mut stride = total;
     let mut on_the_wire = 0;
@@ -369,7 +369,7 @@ fn wire_position(mut position: usize, total: usize, dimensions: &[u32]) -> usize
     on_the_wire
 }
 
-/// Collects the elements in the order of the text: the last dimension fastest.
+/// Collects the elements in text order: the last dimension fastest.
 fn dimension(item: &Item, left: &[u32], json: &Json, elements: &mut Vec<Value>) -> Read<()> {
     let Some((&size, inner)) = left.split_first() else {
         elements.push(shape(&item.shape, json)?);
@@ -396,7 +396,7 @@ fn object(json: &Json) -> Read<&Map<String, Json>> {
     json.as_object().ok_or_else(|| expected("an object", json))
 }
 
-/// Refuses a key that is not known, naming those that are.
+/// Refuses unknown keys, and lists the known ones.
 fn known<'a, I: Iterator<Item = &'a str>>(
     object: &Map<String, Json>,
     knows: impl Fn(&str) -> bool,
@@ -429,7 +429,7 @@ fn expected(what: impl Into<String>, json: &Json) -> Fault<JsonProblem> {
     .into()
 }
 
-/// What is there, short enough for a sentence.
+/// The value, short enough for a sentence.
 fn described(json: &Json) -> String {
     const LONGEST: usize = 40;
     match json {

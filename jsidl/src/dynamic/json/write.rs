@@ -1,4 +1,4 @@
-//! [`Value`] to JSON.
+//! Converts a [`Value`] to JSON.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -15,8 +15,8 @@ use crate::model::{
 /// The JSON view of a message's value; see the table at the head of this module's documentation.
 ///
 /// # Errors
-/// If the value does not fit the definition, which never happens with a value that
-/// [`decode`](crate::dynamic::decode) gave for it, unless two members of one group share a name.
+/// If the value does not fit the definition. Values from [`decode`](crate::dynamic::decode) always
+/// fit, unless two members of one group share a name.
 pub fn to_json(message: &Message, value: &Value) -> Result<Json, EncodeError> {
     let view = if message.header.is_none() && message.footer.is_none() {
         match &message.body {
@@ -133,7 +133,7 @@ fn number(scalar: &Scalar, raw: Raw) -> View {
     })
 }
 
-/// JSON has no words for numbers that are not finite.
+/// JSON has no representation of infinite numbers and NaN.
 fn real(number: f64) -> Json {
     match number {
         n if n.is_nan() => "NaN".into(),
@@ -186,7 +186,7 @@ fn array(array: &Array, values: &[Value]) -> View {
     dimension(&array.element, &array.dimensions, 1, 0, values)
 }
 
-/// The elements from `first` on along the outermost of the dimensions left, `stride` apart.
+/// The elements from `first` along the outermost remaining dimension, `stride` apart.
 fn dimension(item: &Item, left: &[u32], stride: usize, first: usize, values: &[Value]) -> View {
     let Some((&size, inner)) = left.split_first() else {
         return shape(&item.shape, &values[first]);

@@ -1,9 +1,9 @@
-//! State machines: the merged machine of a service as an enumeration of states, one of events, a
-//! trait for its actions and guards, and functions that take one step.
+//! Generates state machines: enums of the merged machine's states and events, a trait for its
+//! actions and guards, and step functions.
 //!
-//! A machine is written for each service that says something about it itself, in the module of the
-//! service: its only machine in a module `machine`, several in modules of their names, and those of
-//! older versions in modules of the version around them.
+//! A machine is generated for each service that extends it, in the module of the service: a single
+//! machine in a module `machine`, several in modules with their names, and those of older versions
+//! in modules of their version.
 
 mod states;
 mod steps;
@@ -22,7 +22,7 @@ use crate::behaviour::{MOST_REMEMBERED, Machine, TransitionKind};
 use crate::library::Library;
 use crate::model::{Message, Service};
 
-/// Where the types of messages are found.
+/// Locations of the message types.
 #[derive(Clone, Copy)]
 pub(super) struct Messages<'m> {
     pub(super) library: &'m Library,
@@ -30,8 +30,8 @@ pub(super) struct Messages<'m> {
 }
 
 impl Messages<'_> {
-    /// The type of a message that a service takes part in, as seen from the root of the set; `None`
-    /// for what another set declares.
+    /// The path of a message type of a service's vocabulary from the root of the set; `None` for a
+    /// message of another set.
     fn path(&self, service: &Service, name: &str) -> Option<String> {
         let clients = self.library.lineage(service).flat_map(|it| &it.client_of);
         let servers = clients.filter_map(|server| self.library.service(&server.id));
@@ -245,7 +245,7 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    /// The parameters of `Event`: a lifetime if it has references, and the envelope's type.
+    /// Generic parameters of `Event`: a lifetime if it has references, and the envelope's type.
     fn event_generics(&self, lifetime: &str, envelope: &str) -> String {
         let borrows = |event: &Event| event.message.is_some() || event.envelope;
         let mut generics = Vec::new();
@@ -444,7 +444,7 @@ impl<'a> Emitter<'a> {
     }
 }
 
-/// What an event brings, by name.
+/// Names of an event's parameters.
 fn parameters(event: &Event) -> Vec<String> {
     let message = event.message.iter().map(|_| "message".to_owned());
     let envelope = event.envelope.then(|| "envelope".to_owned());

@@ -1,11 +1,11 @@
-//! The states of a generated machine: short names for long paths.
+//! States of a generated machine, with short names for long paths.
 
 use std::collections::HashMap;
 
 use super::super::ident::Names;
 use crate::behaviour::{Machine, Name, StateIndex};
 
-/// The states that hold no others, and what they are called.
+/// The leaf states with their names.
 pub(super) struct States {
     leaves: Vec<StateIndex>,
     idents: HashMap<StateIndex, String>,
@@ -41,7 +41,7 @@ impl States {
     }
 }
 
-/// How many names all paths begin with; the last one of each stays.
+/// Number of leading names common to all paths; the last one of each is kept.
 fn shared_names(paths: &[&Name]) -> usize {
     let Some((first, rest)) = paths.split_first() else {
         return 0;

@@ -1,4 +1,4 @@
-//! The functions of a generated machine: what each state does with each event.
+//! Step functions of a generated machine: the reaction of each state to each event.
 
 use super::super::writer::Writer;
 use super::states::States;
@@ -7,18 +7,18 @@ use crate::behaviour::{
     Action, Declared, Guard, Machine, StateIndex, Stimulus, Transition, TransitionKind, Trigger,
 };
 
-/// What the functions are made from.
+/// Input of the generator.
 pub(super) struct Steps<'a> {
     pub(super) machine: &'a Machine<'a>,
     pub(super) states: &'a States,
     pub(super) vocabulary: &'a Vocabulary,
 }
 
-/// States that do the same, and what they do.
+/// States with the same reaction, and the reaction.
 type Group = (Vec<StateIndex>, String);
 
 impl Steps<'_> {
-    /// The function that handles an event.
+    /// Writes the function that handles an event.
     pub(super) fn handler(&self, out: &mut Writer, event: &Event, signature: &str) {
         out.gap();
         out.push(signature);
@@ -33,7 +33,7 @@ impl Steps<'_> {
         if let [(_, body)] = groups.as_slice() {
             out.push(body);
         } else {
-            // What most states do, which is nothing as a rule, stands last.
+            // The most common reaction, usually none, comes last.
             groups.sort_by_key(|(states, _)| states.len());
             out.push("match self.state {");
             let last = groups.len() - 1;
@@ -63,7 +63,7 @@ impl Steps<'_> {
         format!("State::{}", self.states.ident(state))
     }
 
-    /// What a state does with an event, as an expression of type `Outcome`.
+    /// The reaction of a state to an event, as an expression of type `Outcome`.
     fn body(&self, event: &Event, leaf: StateIndex) -> String {
         let stimulus = Stimulus {
             event: &event.name,
@@ -76,7 +76,7 @@ impl Steps<'_> {
         let mut text = String::new();
         for Declared { item, .. } in candidates {
             let Some(effect) = self.effect(leaf, item) else {
-                // It leads to a state that does not exist, and is never taken.
+                // Its target does not exist, so it is never taken.
                 continue;
             };
             let Some(condition) = self.condition(item) else {
@@ -99,7 +99,7 @@ impl Steps<'_> {
         text + "{\nOutcome::Rejected\n}"
     }
 
-    /// When a transition can be taken; `None` for always.
+    /// The condition of a transition; `None` for unconditional ones.
     fn condition(&self, transition: &Transition) -> Option<String> {
         let room = match transition.kind {
             TransitionKind::Push(_) => Some("self.remembered.has_room()"),
@@ -116,7 +116,7 @@ impl Steps<'_> {
         }
     }
 
-    /// A guard as a condition of Rust; in parentheses if it binds less than `least`.
+    /// A guard as a Rust condition; in parentheses if it binds less than `least`.
     fn guard(&self, trigger: &Trigger, guard: &Guard, least: u8) -> String {
         let (rank, text) = match guard {
             Guard::Or(left, right) => (
@@ -145,7 +145,7 @@ impl Steps<'_> {
         }
     }
 
-    /// What is done when a transition is taken; `None` if it cannot be.
+    /// The effect of a transition; `None` if it cannot be taken.
     fn effect(&self, leaf: StateIndex, transition: &Transition) -> Option<String> {
         let trigger = Some(&transition.trigger);
         let own = self.actions(trigger, transition.actions.iter());
@@ -173,7 +173,7 @@ impl Steps<'_> {
         Some(text)
     }
 
-    /// Goes back to the state that was remembered last, whichever that is.
+    /// Returns to the state that was remembered last.
     fn back(&self, leaf: StateIndex, own: &str) -> String {
         let leaving = self.by_destination(|to| self.actions(None, self.machine.leaving(leaf, to)));
         let entering =
@@ -197,7 +197,7 @@ impl Steps<'_> {
         format!("match to {{\n{text}_ => {{}}\n}}\n")
     }
 
-    /// Calls, a line each.
+    /// Calls, one per line.
     pub(super) fn actions<'i>(
         &self,
         trigger: Option<&Trigger>,

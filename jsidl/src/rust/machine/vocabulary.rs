@@ -1,4 +1,4 @@
-//! What a machine hears, asks and does: its events, and the methods of its trait.
+//! Vocabulary of a machine: its events, and the methods of its trait.
 
 use std::collections::BTreeSet;
 
@@ -7,57 +7,57 @@ use heck::ToSnakeCase;
 use super::super::ident::Names;
 use crate::behaviour::{Action, Argument, Guard, Machine, Transition, Trigger};
 
-/// Everything that the generated types of one machine have names for.
+/// All names in the generated types of one machine.
 pub(super) struct Vocabulary {
     pub(super) events: Vec<Event>,
     pub(super) methods: Vec<Method>,
     pub(super) choices: Vec<Choice>,
 }
 
-/// Messages of several types for one parameter.
+/// Several message types for one parameter.
 pub(super) struct Choice {
     pub(super) ident: String,
     pub(super) events: BTreeSet<usize>,
 }
 
-/// A choice of more messages is named after a method, not after them all.
+/// A choice of more messages is named after its method, not after the messages.
 const MOST_NAMED: usize = 2;
 
-/// Something that happens to the machine.
+/// An event of the machine.
 pub(super) struct Event {
-    /// Unqualified, as the definition has it.
+    /// Unqualified name from the definition.
     pub(super) name: String,
     pub(super) message: Option<String>,
-    /// The alternative of the enumeration.
+    /// Variant of the enum.
     pub(super) ident: String,
-    /// The function that handles it.
+    /// Name of the handler function.
     pub(super) handler: String,
-    /// Whether it brings what the transport knows of the message.
+    /// Whether it carries the transport's data about the message.
     pub(super) envelope: bool,
-    /// How many numbers it brings.
+    /// Number of its numeric parameters.
     pub(super) numbers: usize,
 }
 
-/// An action, or a question of a guard.
+/// An action, or a guard's call.
 pub(super) struct Method {
     key: Key,
     pub(super) ident: String,
-    /// As the definition calls it, without qualification.
+    /// Unqualified name from the definition.
     pub(super) name: String,
-    /// By position: the events whose messages it is given, and the texts.
+    /// By position: the events whose messages are passed, and the texts.
     pub(super) arguments: Vec<Given>,
-    /// Name of the enumeration of the messages, where they are several.
+    /// Name of the enum of messages, if there are several.
     pub(super) message_type: String,
 }
 
-/// What a method is given in one place.
+/// Argument of a method at one position.
 #[derive(Default)]
 pub(super) struct Given {
     pub(super) events: BTreeSet<usize>,
     pub(super) texts: BTreeSet<String>,
 }
 
-/// Methods with the same key are one.
+/// Methods with the same key are merged.
 #[derive(PartialEq, Eq, Clone)]
 struct Key {
     base: String,
@@ -65,7 +65,7 @@ struct Key {
     kinds: Vec<Kind>,
 }
 
-/// What a parameter of a method is.
+/// Kind of a method's parameter.
 #[derive(PartialEq, Eq, Clone, Copy)]
 pub(super) enum Kind {
     Message,
@@ -74,11 +74,11 @@ pub(super) enum Kind {
     Text,
 }
 
-/// An argument of a call, as the generated code has it.
+/// An argument of a call, in the generated code.
 pub(super) enum Value {
     Message,
     Envelope,
-    /// Which of the numbers of the event.
+    /// Index of the event's numeric parameter.
     Number(usize),
     Text(String),
 }
@@ -94,7 +94,7 @@ impl Value {
     }
 }
 
-/// A call of a method: what it is called, and its arguments.
+/// A call of a method, with its name and arguments.
 struct Spoken {
     key: Key,
     name: String,
@@ -118,7 +118,7 @@ impl Method {
         self.key.asks
     }
 
-    /// The kinds of its parameters, and what is given in their places.
+    /// The kinds of its parameters, with their arguments.
     pub(super) fn parameters(&self) -> impl Iterator<Item = (Kind, &Given)> {
         self.key.kinds.iter().copied().zip(&self.arguments)
     }
@@ -218,7 +218,7 @@ impl Vocabulary {
         let (mut alternatives, mut handlers) = (Names::default(), Names::reserving(&["step"]));
         for event in &mut self.events {
             let name = match &event.message {
-                // An event that is named after its message needs no other name.
+                // An event with its message's name needs no other name.
                 Some(message) if event.name == "Receive" || event.name == *message => {
                     message.clone()
                 }
@@ -256,7 +256,7 @@ impl Vocabulary {
         }
     }
 
-    /// The method that performs an action, and what it is given.
+    /// The method of an action, with the arguments.
     pub(super) fn action(
         &self,
         trigger: Option<&Trigger>,
@@ -265,7 +265,7 @@ impl Vocabulary {
         self.find(action_of(trigger, action))
     }
 
-    /// The method that answers a question of a guard, and what it is given.
+    /// The method of a guard's call, with the arguments.
     pub(super) fn question(
         &self,
         trigger: &Trigger,
@@ -280,7 +280,7 @@ impl Vocabulary {
     }
 }
 
-/// The parameters of a trigger that are neither a message nor what the transport knows of it.
+/// The trigger's parameters except the message and the transport's data.
 fn numbers(trigger: &Trigger) -> impl Iterator<Item = &str> {
     let parameters = trigger.parameters.iter().enumerate();
     let numbers = parameters.filter(|&(position, parameter)| {
@@ -290,8 +290,8 @@ fn numbers(trigger: &Trigger) -> impl Iterator<Item = &str> {
     numbers.map(|(_, parameter)| parameter.name.as_str())
 }
 
-/// A message that is sent is part of the method's name: `Send('ReportStatus', …)` is another
-/// action than `Send('RejectControl', …)`.
+/// The sent message is part of the method's name: `Send('ReportStatus', …)` and
+/// `Send('RejectControl', …)` are different actions.
 fn action_of(trigger: Option<&Trigger>, action: &Action) -> Spoken {
     let last = action.name.last();
     let (name, rest) = match (action.sent(), action.arguments.split_first()) {
@@ -304,7 +304,7 @@ fn action_of(trigger: Option<&Trigger>, action: &Action) -> Spoken {
 fn question_of(trigger: Option<&Trigger>, question: &Guard) -> Spoken {
     match question {
         Guard::Call(call) => spoken(trigger, call.name.last().to_owned(), &call.arguments, true),
-        // A comparison, or a name alone: what it says is its name, and it is given everything.
+        // A comparison or a bare name: its text is the method's name, and it gets all parameters.
         other => {
             let words = other.to_string();
             let all = trigger.into_iter().flat_map(|trigger| &trigger.parameters);
@@ -324,7 +324,7 @@ fn spoken(trigger: Option<&Trigger>, name: String, arguments: &[Argument], asks:
     Spoken { key, name, values }
 }
 
-/// What is no parameter of the event is a text: nothing else is known of it.
+/// An argument that is no parameter of the event is a text.
 fn value(trigger: Option<&Trigger>, argument: &Argument) -> Value {
     let Argument::Variable(name) = argument else {
         return Value::Text(match argument {

@@ -1,5 +1,4 @@
-//! `jaus-tester`: drives the whole chain of a vehicle and checks each answer; puts load on nodes
-//! and measures.
+//! `jaus-tester`: end-to-end test of a vehicle, and load test of nodes.
 
 mod load;
 mod mission;

@@ -1,4 +1,4 @@
-//! `jaus-tester mission`: a mission through the whole chain, checked step by step.
+//! `jaus-tester mission`: a mission through all components, checked step by step.
 #![expect(
     clippy::disallowed_methods,
     reason = "what passes is told with the time since the beginning"
@@ -69,7 +69,7 @@ pub(crate) struct MissionCommand {
     network: Network,
 }
 
-/// Passages that may wait to be shown.
+/// Maximum number of messages queued for display.
 const WAITING: usize = 4096;
 
 impl MissionCommand {
@@ -112,7 +112,7 @@ impl MissionCommand {
         let until = runtime::end(None);
         tokio::pin!(until);
         let steps = {
-            // It tells as many steps as there are, and no more.
+            // The test reports a bounded number of steps.
             let running = test.run(&tester, |step| _ = tell.send(step.clone()));
             tokio::pin!(running);
             loop {
@@ -160,7 +160,7 @@ async fn next(tap: &mut Option<Tap>) -> Option<Tapped> {
     }
 }
 
-/// A flag's place in the local frame: `4,-2.5`.
+/// Parses a place in the local frame: `4,-2.5`.
 fn point(text: &str) -> Result<(f64, f64), String> {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|it| it.is_finite());
     let pair = text
@@ -169,7 +169,7 @@ fn point(text: &str) -> Result<(f64, f64), String> {
     pair.ok_or_else(|| "write X and Y in metres such as 4,-2.5".to_owned())
 }
 
-/// A flag's speed.
+/// Parses a speed.
 fn speed(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(speed) if (0.01..=100.0).contains(&speed) => Ok(speed),

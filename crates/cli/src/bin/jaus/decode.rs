@@ -1,4 +1,4 @@
-//! `jaus decode`: captures, or lines of hex, to one JSON object a line.
+//! `jaus decode`: prints captures, or lines of hex, as one JSON object per line.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -95,7 +95,7 @@ impl Decode {
     }
 }
 
-/// Standard output, and whether every line so far could be read.
+/// Standard output, and whether every line so far was readable.
 struct Printer {
     output: Output,
     complete: bool,
@@ -108,7 +108,7 @@ impl Printer {
     }
 }
 
-/// The file, or standard input for `-` and for no file.
+/// Opens the file, or standard input for `-` and for no file.
 fn open(path: Option<&Path>) -> Result<Box<dyn Read>, Failure> {
     match path {
         Some(path) if path != Path::new("-") => {
@@ -119,7 +119,7 @@ fn open(path: Option<&Path>) -> Result<Box<dyn Read>, Failure> {
     }
 }
 
-/// Every line one message; blank lines are passed over.
+/// Reads one message per line; blank lines are skipped.
 fn read_hex(
     mut input: impl BufRead,
     dictionary: &Dictionary,
@@ -148,7 +148,7 @@ fn read_hex(
     }
 }
 
-/// Says on standard error what the capture holds besides the lines printed.
+/// Reports on standard error what the capture holds besides the printed lines.
 fn report_unread(network: &Network, log: &MessageLog<'_>) {
     let counts = network.counts();
     let notes = [

@@ -1,4 +1,4 @@
-//! `--jsidl` and `--service`: which definitions messages are read and written by.
+//! `--jsidl` and `--service`: the definitions for reading and writing messages.
 
 use std::path::PathBuf;
 
@@ -32,7 +32,7 @@ pub(crate) fn built_in() -> Dictionary {
 }
 
 impl Definitions {
-    /// The built-in definitions and those of `--jsidl`.
+    /// Loads the built-in definitions and those of `--jsidl`.
     pub(crate) fn load(&self) -> Result<Dictionary, Failure> {
         let mut dictionary = built_in();
         self.add(&mut dictionary)?;

@@ -1,4 +1,4 @@
-//! `jaus discover`: who is there, and what they offer.
+//! `jaus discover`: prints subsystems, nodes, components and services.
 
 use std::time::Duration;
 
@@ -39,14 +39,14 @@ pub(crate) struct Discover {
     network: Network,
 }
 
-/// How long to look if nobody says.
+/// Default duration.
 const LOOK: Duration = Duration::from_secs(3);
 
 impl Discover {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
         runtime::run(async {
             let (port, stay) = self.network.join_for_a_moment().await?;
-            // As a guest it has a name for itself alone, and none for the subsystem that it is in.
+            // On the host's node it names only itself, not the subsystem.
             let subsystem = if stay.is_guest() { "" } else { "jaus discover" };
             let component = Component::builder(Kind::OtherSubsystem, subsystem)
                 .component_name("jaus discover")

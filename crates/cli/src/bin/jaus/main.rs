@@ -108,7 +108,7 @@ fn main() -> ExitCode {
     let ended = cli.logging.start("warn").and_then(|()| cli.command.run());
     match ended {
         Ok(status) => status,
-        // Whoever read our output has seen enough, as `head` does.
+        // The reader has closed our output early, as `head` does.
         Err(Failure::OutputClosed) => ExitCode::SUCCESS,
         Err(failure) => {
             output::say(failure);

@@ -1,4 +1,4 @@
-//! `jaus node`: a node that is there, and tells what it sees.
+//! `jaus node`: a discoverable node that prints its observations.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -62,10 +62,10 @@ pub(crate) struct NodeCommand {
     network: Network,
 }
 
-/// The time between two looks at what was dropped, for the log.
+/// Interval of drop reports in the log.
 const LOG: Duration = Duration::from_secs(10);
 
-/// The id of whoever does not choose one.
+/// Default id.
 const ID: JausId = JausId::new(101, 1, 1);
 
 impl NodeCommand {
@@ -96,7 +96,7 @@ impl NodeCommand {
         })
     }
 
-    /// Prints what happens, until the end.
+    /// Prints events until the end.
     async fn watch(
         &self,
         node: &Node,
@@ -108,7 +108,7 @@ impl NodeCommand {
         let end = runtime::end(self.seconds);
         tokio::pin!(end);
         let clock = Clock::start();
-        // A conflict is news with every message of the other; once is enough for people.
+        // Every message of the other component repeats the conflict; report it once.
         let mut conflicts = BTreeSet::new();
         let mut turns = interval(self.stats.filter(|time| !time.is_zero()).unwrap_or(LOG));
         turns.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -139,7 +139,7 @@ impl NodeCommand {
     }
 }
 
-/// Prints what the node is and where.
+/// Prints the node's id and links.
 pub(crate) fn introduce(
     node: &Node,
     component: &Component,
@@ -185,7 +185,7 @@ pub(crate) fn introduce(
     output.line("Ctrl-C ends it.\n")
 }
 
-/// News of the endpoint that discovery does not tell.
+/// Describes endpoint events that discovery does not report.
 fn in_words(event: &Event) -> Option<String> {
     match event {
         Event::PeerMoved { id, from, to } => {

@@ -1,4 +1,4 @@
-//! `jaus ping`: asks a component for a sign of life, again and again, and measures the round trip.
+//! `jaus ping`: queries a component repeatedly and measures the round trip.
 #![expect(clippy::disallowed_methods, reason = "a round trip has its time")]
 
 use std::fmt;
@@ -91,13 +91,13 @@ impl fmt::Display for Question {
     }
 }
 
-/// What came back, and how long it took.
+/// An answer with its round trip.
 struct Answer {
     time: Duration,
     path: Option<Path>,
 }
 
-/// What has been asked and answered so far.
+/// Queries and answers so far.
 #[derive(Default)]
 struct Tally {
     asked: u64,
@@ -131,7 +131,7 @@ impl Ping {
         })
     }
 
-    /// Asks until the count is reached or the user has seen enough, and sums up.
+    /// Repeats the query until the count is reached or the user stops it, and prints a summary.
     async fn go_on(&self, port: &mut Port) -> Result<Outcome, Failure> {
         let mut output = Output::new();
         let mut tally = Tally::default();
@@ -183,7 +183,7 @@ impl Ping {
         Ok(())
     }
 
-    /// The first question that is answered.
+    /// Finds the first query that is answered.
     async fn ask_in_turn(
         &self,
         port: &mut Port,
@@ -217,7 +217,7 @@ impl Ping {
         query: Bytes,
         report: u16,
     ) -> Result<Option<Answer>, Failure> {
-        // What came too late for the question before is none to this one.
+        // Discard late answers to an earlier query.
         while port.try_recv().is_some() {}
         let start = Instant::now();
         let outgoing = Outgoing::new(port.id(), self.address, query);

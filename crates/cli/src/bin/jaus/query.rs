@@ -1,4 +1,4 @@
-//! `jaus query`: asks a component, and prints what it answers.
+//! `jaus query`: sends a query to a component and prints the report.
 #![expect(clippy::disallowed_methods, reason = "a question has its time")]
 
 use std::collections::BTreeSet;
@@ -20,7 +20,7 @@ use tokio::time::{Instant, timeout_at};
 
 use crate::definitions::Definitions;
 
-/// How often a question is asked while no answer comes.
+/// Interval of repeated queries without an answer.
 const AGAIN: Duration = Duration::from_millis(500);
 
 /// Ask a component, and print its report as JSON
@@ -89,7 +89,7 @@ impl Query {
         })
     }
 
-    /// Asks until there is an answer; with wildcards until the time is over.
+    /// Repeats the query until the answer; with wildcards until the time is over.
     async fn ask(
         &self,
         mut port: Port,
@@ -127,7 +127,7 @@ impl Query {
         self.address.matches(received.source) && received.payload.starts_with(&report.to_le_bytes())
     }
 
-    /// What to say when nobody answered.
+    /// The message after a timeout.
     fn silence(&self) -> String {
         let (address, message) = (self.address, &self.message);
         let seconds = self.seconds.as_secs_f64();
@@ -143,7 +143,7 @@ impl Query {
     }
 }
 
-/// A report, with who sent it.
+/// A report with its sender.
 #[derive(Serialize)]
 struct Answer<'d> {
     source: String,
@@ -156,7 +156,7 @@ fn answer(source: JausId, line: Line<'_>) -> Result<String, Failure> {
     serde_json::to_string(&Answer { source, line }).map_err(Failure::of)
 }
 
-/// The code of the report that answers a message, if it is a query.
+/// The code of the report for a query, if the message is one.
 fn report_to(query: &[u8]) -> Option<u16> {
     report_code(u16::from_le_bytes(*query.first_chunk()?))
 }

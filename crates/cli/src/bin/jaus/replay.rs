@@ -69,10 +69,10 @@ pub(crate) struct Replay {
     dry_run: bool,
 }
 
-/// A capture whose times are further apart is damaged, or nothing to wait for.
+/// A capture with a longer span is damaged or not worth the wait.
 const LONGEST: Duration = Duration::from_secs(366 * 86_400);
 
-/// Where a replay goes.
+/// Destination of a replay.
 #[derive(Clone, Copy, Debug)]
 struct Target(SocketAddr);
 
@@ -102,13 +102,13 @@ fn speed(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A datagram to send, and when, counted from the first.
+/// A datagram, with its time relative to the first.
 struct Recorded {
     after: Duration,
     payload: Bytes,
 }
 
-/// What was found in a capture.
+/// Content of a capture.
 #[derive(Default)]
 struct Found {
     recorded: Vec<Recorded>,
@@ -143,7 +143,7 @@ impl Replay {
         })
     }
 
-    /// Reads the whole capture: what is wrong with it is said before anything is sent.
+    /// Reads the whole capture first, so that errors are reported before anything is sent.
     fn read(&self) -> Result<Found, Failure> {
         let in_file =
             |error: &dyn fmt::Display| Failure::new(format!("{}: {error}", self.file.display()));
@@ -179,7 +179,7 @@ impl Replay {
         Ok(found)
     }
 
-    /// Takes a datagram in, or counts why not.
+    /// Selects a datagram, or counts why it is left out.
     fn sort(&self, datagram: &Datagram<'_>, after: Duration, found: &mut Found) {
         if datagram.missing > 0 {
             found.cut += 1;
@@ -246,11 +246,11 @@ impl Replay {
                     .map_err(|error| Failure::new(format!("sending to {to} failed: {error}")))?;
                 *sent += 1;
                 if self.speed == 0.0 && sent.is_multiple_of(32) {
-                    // As fast as is kind: the receiver, perhaps on this processor, has its turn.
+                    // Yield to the receiver, which may run on this processor.
                     tokio::time::sleep(Duration::from_micros(200)).await;
                 }
             }
-            // However short the capture: it is not to be a busy loop.
+            // Even a short capture must not become a busy loop.
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
         Ok(())

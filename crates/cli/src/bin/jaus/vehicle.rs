@@ -1,5 +1,4 @@
-//! `jaus vehicle`: the reference vehicle, a simulated platform behind the services that vehicles
-//! are asked for.
+//! `jaus vehicle`: reference vehicle, a simulated platform with its JAUS services.
 #![expect(
     clippy::disallowed_methods,
     reason = "the simulation runs in real time and knows the time of day"
@@ -114,9 +113,9 @@ struct Simulation {
     seed: u64,
 }
 
-/// The id of whoever does not choose one.
+/// Default id.
 const ID: JausId = JausId::new(101, 1, 1);
-/// Between two lines about the motion.
+/// Interval of motion reports.
 const LOOK: Duration = Duration::from_secs(1);
 
 impl VehicleCommand {
@@ -177,7 +176,7 @@ impl VehicleCommand {
         }
     }
 
-    /// The id of the component that drives.
+    /// The id of the driving component.
     fn navigation(&self, id: JausId) -> Result<JausId, Failure> {
         let component = id.component().saturating_add(u8::from(self.split));
         let navigation = JausId::new(id.subsystem(), id.node(), component);
@@ -190,7 +189,7 @@ impl VehicleCommand {
         )))
     }
 
-    /// Prints what happens, until the end.
+    /// Prints events until the end.
     async fn watch(
         &self,
         component: &Component,
@@ -253,7 +252,7 @@ impl Simulation {
     }
 }
 
-/// A component with all that it takes to be driven.
+/// A component with all services of a drivable vehicle.
 fn drivable(
     builder: Builder,
     vehicle: &Vehicle,
@@ -281,13 +280,13 @@ fn drivable(
         .offer(vehicle.global_path_segment_driver().only_newest())
 }
 
-/// The time since the beginning of 1970; 0 on a computer whose clock is before that.
+/// Time since the beginning of 1970; 0 if the clock is earlier.
 fn time_of_day() -> Duration {
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
     since_1970.unwrap_or_default()
 }
 
-/// What is new about the component's state and who controls it.
+/// Describes changes of the component's state and controller.
 fn standing_in_words(before: &Standing, now: &Standing) -> Option<String> {
     let client = (now.controller != before.controller).then(|| match now.controller {
         Some(client) => format!(
@@ -314,7 +313,7 @@ fn in_words(motion: &Motion) -> String {
     )
 }
 
-/// A flag's place on the globe: `52.5,13.4`.
+/// Parses a place on the globe: `52.5,13.4`.
 fn place(text: &str) -> Result<Frame, String> {
     let number = |text: &str| text.trim().parse::<f64>().ok();
     let pair = text

@@ -1,4 +1,4 @@
-//! One party acts on another: every scenario, on a network of their own.
+//! Encounter of two parties: one acts on the other in every scenario, on their own network.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

@@ -1,5 +1,5 @@
-//! Two hosts on a switch, and an observer at it: three network namespaces that nothing else of this
-//! machine is connected to. They are gone, with everything that runs in them, when dropped.
+//! Two hosts on a switch, with an observer: three network namespaces, isolated from the rest of
+//! this machine. Dropping them removes them with all their processes.
 
 use std::process::Command;
 use std::sync::atomic::{AtomicU32, Ordering};

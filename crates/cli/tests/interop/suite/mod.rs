@@ -1,4 +1,4 @@
-//! The suite itself: whom it has meet whom, and what it says in the end.
+//! The interoperability suite: selects the encounters, runs them and reports.
 
 mod encounter;
 mod hosts;

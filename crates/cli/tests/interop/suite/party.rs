@@ -1,4 +1,4 @@
-//! A party on its host: its processes, and the words of its commands.
+//! A party on its host: its processes and the text of its commands.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

@@ -1,5 +1,5 @@
-//! Processes of the parties in their namespaces: what they say is kept in a file and can be waited
-//! for, and they end with all of their children.
+//! Processes of the parties in their namespaces: their output is kept in a file and can be waited
+//! for, and they end with all their children.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};

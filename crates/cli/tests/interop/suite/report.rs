@@ -1,4 +1,4 @@
-//! The table, for people in Markdown and for build servers in JUnit XML.
+//! Writes the table as Markdown for people and as JUnit XML for build servers.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What is tried with every peer, in the order in which it is tried.
+//! Scenarios for every peer, in execution order.
 
 use crate::suite::settings::Side;
 

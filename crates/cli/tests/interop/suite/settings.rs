@@ -1,6 +1,5 @@
-//! What the suite knows of a party: a TOML file says who it is, what is started to answer, what is
-//! started to act on somebody else, and what it cannot do. `README.md` beside this file explains
-//! every key.
+//! Settings of a party: a TOML file with its name, the commands that start it as the answering and
+//! as the acting side, and its limitations. `README.md` beside this file explains every key.
 
 use std::collections::BTreeMap;
 use std::fmt;

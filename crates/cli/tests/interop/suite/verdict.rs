@@ -1,4 +1,4 @@
-//! What a run finds: one cell of the table for each scenario and direction.
+//! Results of a run: one cell of the table per scenario and direction.
 
 use std::path::PathBuf;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! A client that says again what was captured, and hears what the vehicle answers.
+//! A client that replays captured messages and records the vehicle's answers.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::net::{Ipv4Addr, UdpSocket};

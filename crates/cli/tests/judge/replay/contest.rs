@@ -1,5 +1,5 @@
-//! The judging tool of the 2015 competition: its scored run and a practice run. Every answer of
-//! the vehicle is in a file beside this one, which was read by people before it was kept.
+//! The judging tool of the 2015 competition: its scored run and a practice run. The vehicle's
+//! answers are compared with a file beside this one, reviewed by hand.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;

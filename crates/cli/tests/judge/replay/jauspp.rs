@@ -1,5 +1,5 @@
 //! JAUS++ clients that drove a vehicle: two with events and wrench efforts, and an operator's
-//! console with waypoints. Most of their datagrams carry stale octets behind the message.
+//! console with waypoints. Most of their datagrams have stale octets after the message.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;

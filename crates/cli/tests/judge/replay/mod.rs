@@ -1,5 +1,5 @@
-//! What real clients said, octet for octet as it was captured, said again to the reference vehicle:
-//! the judging tool of a competition, and JAUS++ clients driving a vehicle.
+//! Captured messages of real clients, replayed octet for octet to the reference vehicle: the
+//! judging tool of a competition, and JAUS++ clients that drive a vehicle.
 //!
 //! Only ids are replaced: the vehicle's, and those of event streams, which a vehicle chooses. The
 //! order is kept; long pauses are shortened. The captures are not part of the project; see

@@ -1,4 +1,4 @@
-//! `jaus vehicle`, in a process of its own.
+//! `jaus vehicle` as a process.
 
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};
 

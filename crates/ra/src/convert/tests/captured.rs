@@ -1,5 +1,5 @@
-//! Messages that OpenJAUS 3.3.1 sent, each with what it says; and, where the capture is at hand, all
-//! messages in it.
+//! Messages sent by OpenJAUS 3.3.1 with their expected meaning, and all messages of the capture, if
+//! it is available.
 
 use super::*;
 use jaus::messages::{core, mobility};
@@ -56,7 +56,7 @@ fn the_control_of_openjaus_is_understood() {
     assert_eq!(status.status, core::report_status::Status::STANDBY);
 }
 
-/// Codes of the capture that are no matter of conversion: connections, discovery.
+/// Captured codes that are not converted: connections, discovery.
 const NOT_CONVERTED: &[u16] = &[0x0008, 0x0009, 0x2B00, 0x2B03, 0x4B00, 0x4B03];
 
 #[test]
@@ -70,7 +70,7 @@ fn every_message_of_the_capture_is_converted_and_comes_back() {
 
     let file = evidence::captures().join("openjaus33/openjaus33-opc-lo.pcap");
     let mut capture = Capture::new(std::fs::File::open(file).unwrap()).unwrap();
-    // Where a node manager of OpenJAUS speaks with its components.
+    // Port between an OpenJAUS node manager and its components.
     let mut network = Network::new([24629]);
     let mut seen = BTreeMap::new();
     while let Some(frame) = capture.next_frame() {
@@ -85,7 +85,7 @@ fn every_message_of_the_capture_is_converted_and_comes_back() {
         let payload = to_jaus(header.code, data).unwrap();
         let (code, back) = to_ra(&payload).unwrap();
         assert_eq!(code, header.code);
-        // Our steps may be wider; on them, nothing moves any more.
+        // Our steps may be coarser; a value on a step converts without change.
         assert_eq!(to_jaus(code, &back).unwrap(), payload, "{code:04X}h");
         *seen.entry(code).or_insert(0) += 1;
     }

@@ -1,4 +1,4 @@
-//! Where the two sides differ: what is refused, and what is left out.
+//! Differences of the two sides: refused messages and omitted fields.
 
 use super::*;
 use crate::RaId;
@@ -71,14 +71,14 @@ fn what_is_out_of_the_other_range_is_refused_with_the_field() {
         Reason::OutOfRange,
         "Speed",
     );
-    // One step below the range, which is where the least integer lies.
+    // One step below the range, the position of the least integer.
     let yaw = to_jaus(0x4403, &octets("4000 0080"));
     refused(yaw, Reason::OutOfRange, "Yaw");
 }
 
 #[test]
 fn bits_of_a_presence_vector_that_nobody_owns_are_forgiven_to_ra_systems_alone() {
-    // What OpenJAUS sets by default: all bits, though four of them stand for nothing.
+    // OpenJAUS sets all bits by default, although four of them are undefined.
     let data = octets("FFFF 0100 0200 0300 0400 0500 0600 01 02 03 04 05 06");
     let payload = to_jaus(0x0405, &data).unwrap();
     let ours = mobility::SetWrenchEffort::decode(&payload).unwrap();

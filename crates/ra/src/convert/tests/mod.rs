@@ -11,7 +11,7 @@ fn ra<M: Message>(message: &M) -> (u16, Bytes) {
     (M::CODE, message.encode().unwrap().slice(2..))
 }
 
-/// What becomes of an RA message among ours.
+/// Converts an RA message to ours.
 fn into_ours<Ra: Message, Jaus: Message>(message: &Ra) -> Result<Jaus, Refusal> {
     into_ours_with(Context::default(), message)
 }
@@ -24,7 +24,7 @@ fn into_ours_with<Ra: Message, Jaus: Message>(
     to_jaus_with(context, code, &data).map(|payload| Jaus::decode(&payload).unwrap())
 }
 
-/// What becomes of one of our messages in the Reference Architecture.
+/// Converts one of our messages to the Reference Architecture.
 fn into_theirs<Jaus: Message, Ra: Message>(message: &Jaus) -> Result<Ra, Refusal> {
     into_theirs_with(Context::default(), message)
 }

@@ -1,4 +1,4 @@
-//! What holds for every pair and any message.
+//! Properties of every pair, for arbitrary messages.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -11,7 +11,7 @@ use jaus::codec::view::Value;
 use jaus::codec::{MessageInfo, Registry};
 use jaus::messages::registry;
 
-/// Octets that a random message is made from; of few octets, all that follows is zero or absent.
+/// Octets to generate a message from; after the last octet, all values are zero or absent.
 fn seed() -> impl Strategy<Value = Vec<u8>> {
     prop_oneof![
         Just(Vec::new()),
@@ -20,7 +20,7 @@ fn seed() -> impl Strategy<Value = Vec<u8>> {
     ]
 }
 
-/// The layout of a pair's message in a set: of several, that of the version it is made for.
+/// The layout of a pair's message in a set: of several, that of the pair's version.
 fn layout(registry: Registry, code: u16, name: &str, pair: &Pair) -> &'static MessageInfo {
     let old = pair.is_meant(contexts()[1]) && !pair.is_meant(Context::default());
     let mut same = registry
@@ -35,7 +35,7 @@ fn random(info: &MessageInfo, seed: &[u8]) -> Bytes {
     message.encode().unwrap()
 }
 
-/// What is known of components in the runs: nothing, or that they are of version 1.0.
+/// Contexts of the runs: none, and components of version 1.0.
 fn contexts() -> [Context<'static>; 2] {
     let old = Context {
         minor: Some(0),
@@ -44,11 +44,11 @@ fn contexts() -> [Context<'static>; 2] {
     [Context::default(), old]
 }
 
-/// Messages of which few can be converted: an emergency of the right code, a list of the right
-/// shape, a vector whose speed is not beyond ours.
+/// Messages that rarely convert: an emergency with the right code, a list of the right shape, a
+/// vector with a speed within our range.
 const RARE: &[u16] = &[0x0006, 0x0007, 0x041A, 0x0407, 0x4407, 0x0408, 0x4408];
 
-/// Runs over all pairs, and makes sure that some messages of each were converted.
+/// Runs over all pairs, and requires that some messages of each convert.
 fn for_every_pair(
     info: impl Fn(&Pair) -> &'static MessageInfo,
     property: impl Fn(&Pair, &MessageInfo, Bytes) -> Result<bool, TestCaseError>,
@@ -90,7 +90,7 @@ fn one_of_ours_comes_back_as_it_was_or_is_refused() {
                 close(&before.view(), &after.view(), "")?;
                 converted = true;
             }
-            // Once it is on the steps of both scales, nothing moves any more.
+            // A value on the steps of both scales converts without change.
             prop_assert_eq!(&pair.to_ra(&back, context).unwrap(), &data);
         }
         Ok(converted)
@@ -138,7 +138,7 @@ fn no_octets_whatever_make_a_conversion_panic() {
         .unwrap();
 }
 
-/// Fields that only one side has, which a way there and back leaves out or fills in.
+/// Fields of one side only, which a round trip leaves out or fills in.
 const LEFT_OUT: &[&str] = &[
     "SecondaryStatusCode",
     "Reserved",
@@ -152,10 +152,10 @@ const LEFT_OUT: &[&str] = &[
     "ElementUID",
 ];
 
-/// Left out of Set Velocity State and, where it is a report, of Local Vector.
+/// Left out of Set Velocity State and, in reports, of Local Vector.
 const LEFT_OUT_OF_SOME: &[&str] = &["VelocityRMS", "RateRMS", "TimeStamp", "Z", "Roll", "Pitch"];
 
-/// Half a step of the coarser scale, and a little for the digits that are shown.
+/// Half a step of the coarser scale, plus the rounding of the displayed digits.
 fn tolerance(field: &str) -> f64 {
     match field {
         // 10 000 m/s in 16 bits.
@@ -168,7 +168,7 @@ fn tolerance(field: &str) -> f64 {
     }
 }
 
-/// Whether two views say the same, but for what is left out on the way.
+/// Whether two views are equal except for fields left out in the conversion.
 fn close(before: &Value, after: &Value, field: &str) -> Result<(), TestCaseError> {
     match (before, after) {
         (Value::Object(before), Value::Object(after)) => {

@@ -1,4 +1,4 @@
-//! The same quantity on both sides, by its value in engineering units.
+//! Quantities convert by their value in engineering units.
 
 use super::*;
 use crate::messages::ra33;

@@ -1,13 +1,13 @@
-//! The places that an RA client sets at a JAUS driver, as elements of that one's list.
+//! Maps the places that an RA client sets at a JAUS driver to elements of the driver's list.
 //!
-//! The place with the number n becomes the element n + 1, which follows the element n. Elements are set
-//! one by one, each when the one before it is confirmed; what is not confirmed is set again. What
-//! somebody else has left in the list is deleted before the first.
+//! Place n becomes element n + 1, which follows element n. Elements are set one by one, each after
+//! the confirmation of its predecessor; unconfirmed ones are set again. Foreign elements left in
+//! the list are deleted before the first one is set.
 //!
-//! A speed above zero is for the list as a whole, and must not begin it anew each time: the driver
-//! is asked which element it is at. If it is at one, the speed alone changes; if it is at none, it
-//! begins with the first of the places that were set since it drove last, and without such it gets the
-//! speed alone. A speed of zero goes at once.
+//! A speed above zero applies to the whole list, and must not restart it each time, so the driver
+//! is queried for its active element first. With an active element, only the speed changes. Without
+//! one, execution begins with the first place set since the driver last moved; without such a
+//! place, the driver gets the speed alone. A speed of zero is sent at once.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -26,44 +26,44 @@ use jaus::messages::core::{
 use jaus::messages::mobility::{ExecuteList, QueryActiveElement};
 use jaus::service::{ElementList, code_of};
 
-/// What an RA client has set at a JAUS driver. It knows of no list but this.
+/// Places of an RA client at a JAUS driver, mirrored in the driver's list.
 #[derive(Debug)]
 pub(in crate::gateway) struct Entries {
     places: Places,
     patience: Duration,
     set: BTreeMap<u16, Element>,
-    /// How many of them, from 0 on, are in the driver's list; `None` before it was emptied for them.
+    /// Number of places, from 0, in the driver's list; `None` until the list was cleared.
     there: Option<u16>,
-    /// Those of them that have been replaced since.
+    /// Places in the list that were replaced since.
     replaced: Vec<u16>,
     current: Option<Request>,
     request_id: u8,
-    /// Whether the list was made anew because the driver had lost it.
+    /// Whether the list was rebuilt because the driver had lost it.
     made_anew: bool,
     /// The speed that waits for the list, or for the driver's answer.
     speed: Option<ExecuteList>,
-    /// What the driver was asked which element it is at for.
+    /// Purpose of the pending query for the active element.
     asked: Option<Asked>,
-    /// The first of the places that were set since the driver was at an element.
+    /// The first place set since the driver was at an element.
     fresh: Option<u16>,
     wants: Vec<Want>,
 }
 
-/// What is to be done for a client's places.
+/// Actions that the entries request.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::gateway) enum Want {
     /// Send a message to the driver.
     Send(Bytes),
-    /// Ask it which element it is at, with this query.
+    /// Query the driver's active element.
     Ask(Bytes),
-    /// Count what was refused.
+    /// Count a refusal.
     Refuse(u16, Refused),
 }
 
-/// A request that is to be confirmed.
+/// A request that awaits its confirmation.
 #[derive(Debug)]
 struct Request {
-    /// The number of the place; `None` for the deletion of all.
+    /// Number of the place; `None` to delete all.
     number: Option<u16>,
     id: u8,
     payload: Bytes,
@@ -73,20 +73,20 @@ struct Request {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Asked {
-    /// How it is to be given its speed.
+    /// To decide how to apply the speed.
     ForSpeed,
-    /// Whether it has begun.
+    /// To learn whether execution has begun.
     AfterBegin,
 }
 
-/// Stands for all elements.
+/// Element id that addresses all elements.
 const ALL: u16 = u16::MAX;
 
 impl Entries {
-    /// Between two requests for the same.
+    /// Interval of repeated requests.
     const AGAIN: Duration = Duration::from_millis(300);
 
-    /// Nothing yet, for a driver to such places.
+    /// No places, for a driver to places of this kind.
     pub(in crate::gateway) const fn new(places: Places, patience: Duration) -> Self {
         Self {
             places,
@@ -104,7 +104,7 @@ impl Entries {
         }
     }
 
-    /// The client sets a place, with this data.
+    /// Handles a place set by the client.
     pub(in crate::gateway) fn handle_set(&mut self, now: Instant, data: &Bytes) {
         if let Err(why) = self.take_in(data) {
             self.refuse(why);
@@ -112,7 +112,7 @@ impl Entries {
         self.pump(now);
     }
 
-    /// The client sets the speed, with this data.
+    /// Handles a speed set by the client.
     pub(in crate::gateway) fn handle_speed(&mut self, now: Instant, code: u16, data: &Bytes) {
         match speed_to_jaus(data) {
             Err(why) => self.wants.push(Want::Refuse(code, why.into())),
@@ -125,7 +125,7 @@ impl Entries {
         self.pump(now);
     }
 
-    /// The driver has confirmed or refused a request. Says whether that was waited for.
+    /// Handles a confirmation or refusal by the driver. Returns whether it was expected.
     pub(in crate::gateway) fn handle_answer(&mut self, now: Instant, payload: &Bytes) -> bool {
         let (id, refused) = match code_of(payload) {
             Some(ConfirmElementRequest::CODE) => match ConfirmElementRequest::decode(payload) {
@@ -150,7 +150,7 @@ impl Entries {
         true
     }
 
-    /// The driver has said at which element it is, 0 for none, or nothing.
+    /// Handles the driver's active element: 0 for none, `None` without an answer.
     pub(in crate::gateway) fn handle_active(&mut self, now: Instant, active: Option<u16>) {
         let is_at_one = active.is_some_and(|uid| uid != 0);
         if is_at_one {
@@ -159,7 +159,7 @@ impl Entries {
         if self.asked.take() == Some(Asked::ForSpeed)
             && let Some(mut execute) = self.speed.take()
         {
-            // 0 stands for the first.
+            // 0 addresses the first element.
             execute.element_uid = self.fresh.map(|number| match number {
                 0 => 0,
                 number => number + 1,
@@ -172,7 +172,7 @@ impl Entries {
         self.pump(now);
     }
 
-    /// The driver's list is empty: it was reset.
+    /// Clears the state after a reset has emptied the driver's list.
     pub(in crate::gateway) fn forget(&mut self) {
         let (places, patience) = (self.places, self.patience);
         let request_id = self.request_id;
@@ -184,12 +184,12 @@ impl Entries {
         };
     }
 
-    /// What is to be done since this was asked last.
+    /// Takes the requested actions.
     pub(in crate::gateway) fn take_wants(&mut self) -> Vec<Want> {
         std::mem::take(&mut self.wants)
     }
 
-    /// The time of [`poll_timeout`](Self::poll_timeout) has come; earlier does no harm.
+    /// Runs due timers; calls before [`poll_timeout`](Self::poll_timeout) do no harm.
     pub(in crate::gateway) fn handle_timeout(&mut self, now: Instant) {
         let Some(request) = &mut self.current else {
             return;
@@ -204,7 +204,7 @@ impl Entries {
         }
     }
 
-    /// When there is something to do.
+    /// Time of the next timer.
     pub(in crate::gateway) fn poll_timeout(&self) -> Option<Instant> {
         self.current.as_ref().map(|request| request.next)
     }
@@ -229,7 +229,7 @@ impl Entries {
     }
 
     fn handle_refusal(&mut self, number: Option<u16>, code: ResponseCode) {
-        // The list is another than we think: somebody has emptied or changed it.
+        // The list differs from its mirror: another client has emptied or changed it.
         let is_lost = matches!(
             code,
             ResponseCode::INVALID_PREVIOUS_ELEMENT | ResponseCode::INVALID_NEXT_ELEMENT
@@ -248,7 +248,7 @@ impl Entries {
         self.replaced.retain(|number| set.contains_key(number));
     }
 
-    /// Asks for the next thing to be put into the list; when all is there, the speed follows.
+    /// Requests the next change of the list; when the list is complete, the speed follows.
     fn pump(&mut self, now: Instant) {
         if self.current.is_some() {
             return;
@@ -267,7 +267,7 @@ impl Entries {
         self.ask(Asked::ForSpeed);
     }
 
-    /// The next request, and the number of the place that it is about.
+    /// The next request, with the number of its place.
     fn next(&mut self) -> Option<(Option<u16>, Result<Bytes, EncodeError>)> {
         self.request_id = self.request_id.wrapping_add(1);
         let Some(there) = self.there else {
@@ -328,7 +328,7 @@ impl Entries {
         }
     }
 
-    /// The first number that is not in the list, if one was set that is not.
+    /// The lowest number not in the list, if a later one was set.
     fn missing(&self) -> Option<u16> {
         let last = self.set.last_key_value().map(|(&number, _)| number)?;
         let there = self.there.unwrap_or_default();

@@ -1,21 +1,21 @@
-//! Giving an RA driver its places one by one: each is set, and then asked for until it is told. So they
-//! come in order, and what got lost is given again; a driver that answers no such questions gets them
-//! one after the other all the same.
+//! Transfers places to an RA driver one by one: each is set, and then queried until it is reported.
+//! This keeps the order and repeats lost places; a driver that does not answer the queries gets the
+//! places at a fixed pace.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-/// Places on their way to an RA driver.
+/// Transfer of places to an RA driver.
 #[derive(Debug, Default)]
 pub(super) struct Handover {
-    /// What is still to be given, by number.
+    /// Places still to be sent, by number.
     waiting: VecDeque<(u16, Bytes)>,
     current: Option<Step>,
-    /// Whether it answers. Not known before it was asked once.
+    /// Whether the driver answers queries. Unknown before the first one.
     answers: Option<bool>,
-    /// Whether it keeps what it had under a number, and tells that alone.
+    /// Whether it keeps the first place of a number, and reports only that.
     keeps: bool,
     news: Option<Do>,
 }
@@ -24,57 +24,57 @@ pub(super) struct Handover {
 struct Step {
     number: u16,
     data: Bytes,
-    /// How often it was asked for.
+    /// Number of queries.
     asked: u32,
-    /// How often it was set.
+    /// Number of times the place was set.
     sets: u32,
-    /// Whether another place was told under its number.
+    /// Whether another place was reported under its number.
     differs: bool,
     next: Instant,
     until: Instant,
 }
 
-/// What is to be done for a handover.
+/// Actions of a transfer.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Do {
-    /// Set the place with this data.
+    /// Set this place.
     Set(Bytes),
-    /// Ask for the place with this number.
+    /// Query the place with this number.
     Ask(u16),
-    /// The driver answers no such questions, and gets the rest without.
+    /// The driver does not answer queries; the remaining places follow without.
     Mute,
-    /// It keeps what it had under a number.
+    /// The driver keeps its earlier place under this number.
     Keeps(u16),
-    /// It answered before and does not now: what is left is not given.
+    /// The driver no longer answers: the remaining places are not sent.
     GiveUp(u16),
 }
 
 impl Handover {
-    /// Between two questions.
+    /// Interval of queries.
     const AGAIN: Duration = Duration::from_millis(250);
-    /// How often a place is set under whose number another one is told.
+    /// How often a place is set while another one is reported under its number.
     const MOST_SETS: u32 = 3;
-    /// Between two places for a driver that answers no questions.
+    /// Interval of places for a driver that does not answer queries.
     const PACE: Duration = Duration::from_millis(5);
 
-    /// Whether all has been given.
+    /// Whether the transfer is complete.
     pub(super) fn is_done(&self) -> bool {
         self.current.is_none() && self.waiting.is_empty()
     }
 
-    /// Puts places behind those that wait.
+    /// Queues places.
     pub(super) fn add(&mut self, places: impl IntoIterator<Item = (u16, Bytes)>) {
         self.waiting.extend(places);
     }
 
-    /// Gives nothing more.
+    /// Cancels the transfer.
     pub(super) fn clear(&mut self) {
         self.waiting.clear();
         self.current = None;
     }
 
-    /// The driver has told a place, and whether it is the same `as` one with some data. Says whether
-    /// that was waited for.
+    /// Handles a place reported by the driver; `is_same_as` compares it to given data. Returns
+    /// whether it was expected.
     pub(super) fn handle_report(
         &mut self,
         number: u16,
@@ -86,8 +86,8 @@ impl Handover {
         self.answers = Some(true);
         if !self.keeps && !is_same_as(&step.data) {
             if step.sets < Self::MOST_SETS {
-                // What was set may be what was lost; or the right one comes behind it, for OpenJAUS
-                // tells all that it has under a number.
+                // Either the set message was lost, or the right place follows: OpenJAUS reports all
+                // places that it has under a number.
                 step.differs = true;
                 return true;
             }
@@ -98,7 +98,7 @@ impl Handover {
         true
     }
 
-    /// The next thing to do now.
+    /// The actions that are due.
     pub(super) fn poll(&mut self, now: Instant, patience: Duration) -> Vec<Do> {
         let mut all = Vec::from_iter(self.news.take());
         loop {
@@ -136,7 +136,7 @@ impl Handover {
             if now < step.until {
                 step.asked += 1;
                 step.next = (now + Self::AGAIN).min(step.until);
-                // The question may be what was lost; a place twice is one too many for OpenJAUS.
+                // The query may have been lost; OpenJAUS would store a repeated place twice.
                 if std::mem::take(&mut step.differs) || step.asked > 2 {
                     step.sets += 1;
                     all.push(Do::Set(step.data.clone()));
@@ -155,7 +155,7 @@ impl Handover {
         }
     }
 
-    /// When there is something to do.
+    /// Time of the next timer.
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         self.current.as_ref().map(|step| step.next)
     }

@@ -1,11 +1,10 @@
-//! The list that JAUS clients set for an RA driver.
+//! Course: the list that JAUS clients set for an RA driver.
 //!
-//! The list is kept here, and the driver gets it when it is executed: the elements from the one that it
-//! is executed from, with the numbers from 0 on, and then the speed. While it drives, elements may be
-//! put behind the last or be replaced, which it is told at once; whatever else would change their order
-//! is refused. As drivers forget no place, a list that is shorter than the one before ends with its
-//! last waypoint once more under each number that is left; of path segments, where that would be a
-//! way of its own, it is refused.
+//! The list is kept here. On execution, the driver gets the elements from the starting element,
+//! numbered from 0, and then the speed. While it moves, elements may be appended or replaced, which
+//! updates the driver at once; any other change of their order is refused. As drivers keep every
+//! place, a list shorter than its predecessor is padded with its last waypoint under each remaining
+//! number; for path segments, which would form a path of their own, it is refused.
 
 use std::time::{Duration, Instant};
 
@@ -31,37 +30,37 @@ pub(in crate::gateway) struct Course {
     places: Places,
     patience: Duration,
     list: ElementList,
-    /// The elements that the driver was given, in the order of their numbers: those that are driven
-    /// along, or were before it was stopped.
+    /// The elements sent to the driver, in the order of their numbers: the path that it follows, or
+    /// followed until it was stopped.
     given: Vec<ElementRec>,
-    /// How many numbers it holds.
+    /// Number of places that the driver holds.
     held: usize,
-    /// Whether it drives along them.
+    /// Whether it moves along them.
     under_way: bool,
     handover: Handover,
-    /// The speed that follows when all has been given.
+    /// The speed that follows after the last place.
     speed: Option<Bytes>,
-    /// The speed that it was given last.
+    /// The last speed sent to the driver.
     told_speed: Option<Bytes>,
-    /// Whether it tells its speed, as far as is known.
+    /// Whether it reports its speed, as far as known.
     pub(in crate::gateway) tells_speed: bool,
     said: Effects,
 }
 
-/// What is to be sent, told and counted.
+/// Messages to send and refusals to count.
 #[derive(Debug, Default)]
 pub(in crate::gateway) struct Effects {
     /// Answers to the client whose message was handled.
     pub(in crate::gateway) answers: Vec<Bytes>,
     /// Code and data of messages for the driver.
     pub(in crate::gateway) to_ra: Vec<(u16, Bytes)>,
-    /// Whether the answers to queries are others now.
+    /// Whether answers to queries have changed.
     pub(in crate::gateway) changed: bool,
-    /// What was refused, by the code of the message.
+    /// Refusals by message code.
     pub(in crate::gateway) refused: Vec<(u16, Refused)>,
 }
 
-/// Why something about a list was not done.
+/// Reason why a list request was not carried out.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(in crate::gateway) enum Refused {
     #[error(transparent)]
@@ -94,11 +93,11 @@ pub(in crate::gateway) enum Refused {
     Unanswered,
 }
 
-/// Stands for all elements.
+/// Element id that addresses all elements.
 const ALL: u16 = u16::MAX;
 
 impl Course {
-    /// An empty list for drivers to such places.
+    /// An empty list for drivers to places of this kind.
     pub(in crate::gateway) fn new(places: Places, patience: Duration) -> Self {
         Self {
             places,
@@ -115,7 +114,7 @@ impl Course {
         }
     }
 
-    /// Whether a command with this code is about the list.
+    /// Whether a command with this code concerns the list.
     pub(in crate::gateway) const fn is_command(code: u16) -> bool {
         matches!(
             code,
@@ -123,7 +122,7 @@ impl Course {
         )
     }
 
-    /// A command of the client in control.
+    /// Handles a command of the client in control.
     pub(in crate::gateway) fn handle_command(&mut self, now: Instant, payload: &Bytes) {
         let done = match code_of(payload) {
             Some(SetElement::CODE) => self.handle_set(payload),
@@ -141,7 +140,7 @@ impl Course {
         self.pump(now);
     }
 
-    /// What the list answers to a query, if it is about the list.
+    /// The answer to a query about the list.
     pub(in crate::gateway) fn answer(&self, payload: &Bytes) -> Option<Bytes> {
         match code_of(payload)? {
             QueryElement::CODE => {
@@ -183,18 +182,18 @@ impl Course {
         QueryActiveElement::CODE,
     ];
 
-    /// The data of the report of the speed that the driver was given last, if it does not tell it
-    /// itself.
+    /// The data of a report of the last speed sent to the driver, if the driver does not report its
+    /// speed itself.
     pub(in crate::gateway) fn given_speed(&self) -> Option<Bytes> {
         self.told_speed.clone().filter(|_| !self.tells_speed)
     }
 
-    /// A client has set the speed without a list.
+    /// Notes a speed that a client has set without a list.
     pub(in crate::gateway) fn note_speed(&mut self, data: Bytes) {
         self.told_speed = Some(data);
     }
 
-    /// The driver has told something with this code. Says whether that was waited for.
+    /// Handles a report of the driver. Returns whether it was expected.
     pub(in crate::gateway) fn handle_report(
         &mut self,
         now: Instant,
@@ -213,7 +212,7 @@ impl Course {
         waited_for
     }
 
-    /// Nobody controls it any more: it is stopped.
+    /// Stops the driver, as no client is in control any more.
     pub(in crate::gateway) fn leave(&mut self) {
         if self.under_way
             && let Err(why) = self.halt()
@@ -223,7 +222,7 @@ impl Course {
         self.stop();
     }
 
-    /// It drives no more: it was sent to standby, or is to be.
+    /// Ends the execution: the driver was or will be sent to standby.
     pub(in crate::gateway) fn stop(&mut self) {
         self.handover.clear();
         self.speed = None;
@@ -231,7 +230,7 @@ impl Course {
         self.given.clear();
     }
 
-    /// It was reset: its list is empty. OpenJAUS's drivers keep their waypoints over that.
+    /// Clears the list after a reset. OpenJAUS's drivers keep their waypoints across a reset.
     pub(in crate::gateway) fn reset(&mut self) {
         self.stop();
         self.list.clear();
@@ -241,17 +240,17 @@ impl Course {
         }
     }
 
-    /// What is to be sent and counted since this was asked last.
+    /// Takes the queued messages and refusals.
     pub(in crate::gateway) fn take_said(&mut self) -> Effects {
         std::mem::take(&mut self.said)
     }
 
-    /// The time of [`poll_timeout`](Self::poll_timeout) has come.
+    /// Runs due timers.
     pub(in crate::gateway) fn handle_timeout(&mut self, now: Instant) {
         self.pump(now);
     }
 
-    /// When there is something to do.
+    /// Time of the next timer.
     pub(in crate::gateway) fn poll_timeout(&self) -> Option<Instant> {
         self.handover.poll_timeout()
     }
@@ -272,7 +271,7 @@ impl Course {
         self.reply(id, done)
     }
 
-    /// Tells the client whether its request was carried out.
+    /// Reports the result of a request to the client.
     fn reply(&mut self, request_id: u8, done: Result<(), Refused>) -> Result<(), Refused> {
         let answer = match &done {
             Ok(()) => ConfirmElementRequest { request_id }.encode(),
@@ -307,7 +306,7 @@ impl Course {
         self.replace(list)
     }
 
-    /// Takes another list, and gives the driver what is new in it while it drives.
+    /// Replaces the list; while the driver moves, sends it the changes.
     fn replace(&mut self, list: ElementList) -> Result<(), Refused> {
         if self.under_way {
             let chain = self.continuation(&list).ok_or(Refused::UnderWay)?;
@@ -317,8 +316,7 @@ impl Course {
         Ok(())
     }
 
-    /// The elements of a list that goes on as the one that the driver was given, from the first of
-    /// those on.
+    /// The elements of a list that continues the one sent to the driver, from its first element on.
     fn continuation(&self, list: &ElementList) -> Option<Vec<ElementRec>> {
         let first = self.given.first()?.element_uid;
         let chain = chain(list, first);
@@ -327,7 +325,7 @@ impl Course {
         goes_on.then_some(chain)
     }
 
-    /// Gives the driver those elements that are others than it was given.
+    /// Sends the elements that are new or changed.
     fn give_new(&mut self, chain: Vec<ElementRec>) -> Result<(), Refused> {
         let is_new = |(number, element): &(usize, &ElementRec)| {
             let before = self.given.get(*number);
@@ -341,7 +339,7 @@ impl Course {
         Ok(())
     }
 
-    /// The number and the data of an element at its place.
+    /// The number and data of an element at this position.
     fn place(&self, at: usize, element: &ElementRec) -> Result<(u16, Bytes), Refused> {
         let number = u16::try_from(at).map_err(|_| Refused::TooMany)?;
         Ok((number, self.places.to_ra(&element.element_data, number)?))
@@ -363,7 +361,7 @@ impl Course {
         Ok(())
     }
 
-    /// Gives the driver the list from an element on.
+    /// Sends the list from an element on.
     fn begin(&mut self, uid: u16) -> Result<(), Refused> {
         let first = self.list.get(uid).ok_or(Refused::NoSuchElement)?;
         let chain = chain(&self.list, first.element_uid);
@@ -398,7 +396,7 @@ impl Course {
         self.said.to_ra.push((SetTravelSpeed::CODE, speed));
     }
 
-    /// Gives what is to be given now, and the speed behind it. To stop needs nothing before.
+    /// Sends the due places, then the speed. A stop waits for nothing.
     fn pump(&mut self, now: Instant) {
         if !self.under_way
             && let Some(stop) = self.speed.take()
@@ -439,7 +437,7 @@ fn chain(list: &ElementList, first: u16) -> Vec<ElementRec> {
 }
 
 impl Refused {
-    /// What the client is told of it.
+    /// The response code to the client.
     fn response(&self) -> ResponseCode {
         match self {
             Self::List(code) => *code,

@@ -1,15 +1,15 @@
-//! Places in order, across: lists of ours and the numbered waypoints and path segments of RA drivers.
+//! Ordered places across the gateway: JAUS lists and the numbered places of RA drivers.
 //!
-//! Ours are elements that name their neighbours, and the list is executed from one of them on. RA
-//! drivers know places by number, from 0 on, and set out when they are given a speed of travel; they
-//! forget none, and tell neither which one they are driving to nor whether they took one.
+//! A JAUS list consists of elements that name their neighbours, and is executed from one of them.
+//! RA drivers know places by number, from 0, and start when they get a travel speed; they keep
+//! every place, and report neither their current target nor whether they accepted a place.
 //!
-//! | here | what it does |
+//! | type | purpose |
 //! |---|---|
-//! | [`Course`] | keeps the list that JAUS clients set for an RA driver, and gives it the driver when it is executed |
-//! | [`Entries`] | makes elements of a JAUS driver's list of the places that an RA client sets |
+//! | [`Course`] | keeps the list that JAUS clients set for an RA driver, and sends it on execution |
+//! | [`Entries`] | turns the places that an RA client sets into list elements of a JAUS driver |
 //!
-//! Both are told the time and say what is to be sent.
+//! Both take the time as an argument and return the messages to send.
 
 mod entries;
 mod handover;

@@ -1,4 +1,4 @@
-//! What is set on one side is what the other side holds, whatever is lost on the way.
+//! After every loss, the other side holds exactly the places that were set.
 
 mod course;
 mod entries;
@@ -32,7 +32,7 @@ fn segments() -> Places {
     Places::of(RaComponent::LOCAL_PATH_SEGMENT_DRIVER).unwrap()
 }
 
-/// A place that is told apart by its number.
+/// A place identified by its number.
 fn element(places: Places, place: u16) -> Element {
     if places.is_path {
         let mut segment = jaus::messages::mobility::ReportLocalPathSegment::default();
@@ -48,7 +48,7 @@ fn element(places: Places, place: u16) -> Element {
     FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, waypoint.encode().unwrap())
 }
 
-/// An element of a list: its number and its neighbours'.
+/// A list element: its number and its neighbours.
 fn rec(places: Places, [previous, uid, next]: [u16; 3], place: u16) -> ElementRec {
     ElementRec {
         element_uid: uid,

@@ -1,5 +1,4 @@
-//! Which JAUS messages are an RA component's business, by their codes; and the codes of those RA
-//! messages that are looked at here.
+//! Classifies JAUS message codes by responsibility, and names the RA codes that the proxy handles.
 
 use crate::messages::ra33;
 use jaus::codec::Message as _;
@@ -24,9 +23,9 @@ pub(super) const SPEED: u16 = ra33::ReportTravelSpeed::CODE;
 pub(in crate::gateway) const QUERY_STATUS: u16 = ra33::QueryComponentStatus::CODE;
 pub(in crate::gateway) const STATUS: u16 = ra33::ReportComponentStatus::CODE;
 
-/// Whether a message with this code is the RA component's business; all others are ours: transport,
-/// discovery, liveness, events, who is in control, and what JAUS drivers say of elements that the RA
-/// component has put into their lists.
+/// Whether a message with this code goes to the RA component. The proxy itself handles all others:
+/// transport, discovery, liveness, events, access control, and driver answers about list elements
+/// that the RA component has set.
 pub(super) const fn crosses(code: u16) -> bool {
     if matches!(code, 0x041C | 0x041D) {
         return false;
@@ -43,13 +42,13 @@ pub(super) const fn is_management(code: u16) -> bool {
     matches!(code, 0x0002..=0x0007)
 }
 
-/// Whether a command is for the client in control alone. Anybody may stop a vehicle in an emergency,
-/// and knowledge stores are nobody's to drive.
+/// Whether a command requires control. Any client may set an emergency, and knowledge stores need
+/// no control.
 pub(super) const fn needs_control(code: u16) -> bool {
     !matches!(code, 0x0006 | 0x0007 | 0x0A00..=0x0AFF)
 }
 
-/// The report by which a command is answered, of those few that are.
+/// The report that answers a command, for the few commands with an answer.
 pub(super) const fn answer_to_command(code: u16) -> Option<u16> {
     match code {
         0x0A20 => Some(0x4A20),

@@ -1,9 +1,10 @@
-//! Emergency and standby of RA components. Components over OpenJAUS's library report both, and obey
-//! as before: the library keeps the state that it reports apart from the one that it acts upon. So
-//! the gateway stops the component by a command that it does obey, and gives it no driving command
-//! until it reports that the emergency is over, or its client has sent Resume. A component that keeps
-//! to the standard stops anyway. As a JAUS component with Management, a driver is in standby after
-//! control was granted: a client that merely renews what an earlier gateway granted does not drive.
+//! Emergency and standby of RA components. Components based on OpenJAUS's library report both
+//! states but keep obeying commands: the library separates the reported state from the effective
+//! one. The gateway therefore stops the component with a command that it does obey, and sends no
+//! driving command until it reports the end of the emergency or its client has sent Resume. A
+//! component that follows the standard stops anyway. Like a JAUS component with Management, a
+//! driver is in standby after a grant of control: a client that merely renews control from an
+//! earlier gateway does not drive.
 
 use std::time::Instant;
 
@@ -17,15 +18,15 @@ use super::codes::{
 use super::ready::status;
 use crate::gateway::counters::Counter;
 
-/// The primary status code for an emergency.
+/// Primary status code of the emergency state.
 const EMERGENCY: u8 = 5;
-/// Those for ready and standby.
+/// Primary status codes of the ready and standby states.
 const READY: u8 = 1;
 const STANDBY_STATE: u8 = 2;
 
 impl Proxy {
-    /// A status as JAUS clients are told it: a component that is being reclaimed initializes, and one
-    /// that reports ready to a client that has not sent Resume is in standby.
+    /// The status reported to JAUS clients: initialize while the component is being reclaimed, and
+    /// standby instead of ready until its client has sent Resume.
     pub(super) fn shown_status(&mut self, report: u16, data: Bytes) -> Bytes {
         if report != STATUS {
             return data;
@@ -44,8 +45,8 @@ impl Proxy {
         shown.into()
     }
 
-    /// Why a command may not be given to the RA component now, if so. If an emergency may be over by
-    /// now, the RA component is asked.
+    /// The reason to refuse a command to the RA component now, if any. If the emergency may be
+    /// over, the RA component's status is queried.
     pub(super) fn holds_back(&mut self, now: Instant, code: u16) -> Option<Counter> {
         if !needs_control(code) || is_management(code) {
             return None;
@@ -60,10 +61,10 @@ impl Proxy {
         self.in_standby.then_some(Counter::InStandby)
     }
 
-    /// Stops the RA component when its client sends it to another state.
+    /// Stops the RA component when its client changes its state.
     pub(super) fn heed_management(&mut self, code: u16) {
         match code {
-            // Whether it is over, the next status tells.
+            // The next status report shows whether the emergency is over.
             CLEAR_EMERGENCY => return self.in_emergency = false,
             RESUME => return self.in_standby &= self.in_emergency,
             SHUTDOWN | STANDBY | RESET | SET_EMERGENCY => {}

@@ -1,4 +1,4 @@
-//! Places that an RA component sets at JAUS drivers: its client half puts them into their lists.
+//! Places that an RA component sets at JAUS drivers: its RA client adds them to their lists.
 
 use std::time::Instant;
 
@@ -18,10 +18,10 @@ use jaus::messages::mobility::ReportActiveElement;
 use jaus::service::{Inquiry, NoAnswer, Stack};
 
 impl RaClient {
-    /// The most lists that are entered.
+    /// Maximum number of lists.
     const MOST_ENTRIES: usize = 16;
 
-    /// The RA component sets a place or a speed, if the message is one of those.
+    /// Handles a message of the RA component that sets a place or a speed.
     pub(super) fn enter(
         &mut self,
         now: Instant,
@@ -58,7 +58,7 @@ impl RaClient {
         true
     }
 
-    /// A JAUS driver has said at which element it is, if that was asked for a list.
+    /// Handles the active element of a JAUS driver, if the query was for a list.
     pub(super) fn handle_active(
         &mut self,
         now: Instant,
@@ -79,7 +79,7 @@ impl RaClient {
         true
     }
 
-    /// Time has passed for the lists.
+    /// Runs due timers of the lists.
     pub(super) fn handle_timeout(&mut self, now: Instant, stack: &mut Stack, tally: &mut Tally) {
         let due =
             |(_, entries): &(Target, Entries)| entries.poll_timeout().is_some_and(|due| due <= now);
@@ -97,13 +97,13 @@ impl RaClient {
         }
     }
 
-    /// When there is something to do for the lists.
+    /// The next timeout of the lists.
     pub(super) fn poll_timeout(&self) -> Option<Instant> {
         let entries = self.entries.values();
         entries.filter_map(|(_, it)| it.poll_timeout()).min()
     }
 
-    /// Carries out what a list wants.
+    /// Executes the actions that a list requests.
     fn follow_entries(&mut self, now: Instant, at: RaId, stack: &mut Stack, tally: &mut Tally) {
         let Some((peer, entries)) = self.entries.get_mut(&at) else {
             return;
@@ -123,8 +123,8 @@ impl RaClient {
 }
 
 impl Proxy {
-    /// A JAUS component says something that nobody asked for: says whether it confirms or refuses what
-    /// was put into its list.
+    /// Handles an unsolicited message of a JAUS component; returns whether it confirms or refuses a
+    /// list element.
     pub(in crate::gateway) fn handle_entered(
         &mut self,
         now: Instant,

@@ -1,8 +1,8 @@
-//! Events that an RA component has at JAUS components: each becomes an event of the JAUS component.
+//! Subscriptions of an RA component to events of JAUS components.
 //!
-//! Reports at a rate and on every change are there on both sides. Conditions on a field, reports at a
-//! rate but only if something has changed, and single ones are refused with the code for it.
-//! The configuration is the business of the node among RA systems, and does not come here.
+//! Periodic and every-change reports exist on both sides. Conditions on a field, periodic reports
+//! on change only, and single reports are refused with the code for it. The RA node handles
+//! configuration events; they do not arrive here.
 
 use std::time::Instant;
 
@@ -25,7 +25,7 @@ use jaus::codec::Message as _;
 use jaus::service::{Stack, SubscriptionId, SubscriptionNews, Topic, When, code_of};
 
 impl RaClient {
-    /// The RA component asks for an event, or about events, if the message is one of those.
+    /// Handles an event request of the RA component.
     pub(super) fn handle_event_request(
         &mut self,
         now: Instant,
@@ -57,7 +57,7 @@ impl RaClient {
         true
     }
 
-    /// Makes an event; with a number, in place of the one that has it.
+    /// Creates an event; with a number, replaces that one.
     fn create_event(
         &mut self,
         now: Instant,
@@ -96,7 +96,7 @@ impl RaClient {
         let same = |it: &RaEvent| it.at == at && it.topic == topic;
         let known = self.events.values_mut().find(|it| same(it));
         if let Some(known) = known.filter(|it| replaced.is_none_or(|id| id == it.id)) {
-            // Asked again, because the answer got lost.
+            // Repeated, because the answer got lost.
             known.request = request.clone();
             known.wanted = create.create_event_rec;
             let (wanted, id, confirmed) = (known.wanted, known.id, known.confirmed);
@@ -132,10 +132,10 @@ impl RaClient {
         Ok(())
     }
 
-    /// The most events of one RA component.
+    /// Maximum number of events of one RA component.
     const MOST_EVENTS: usize = 64;
 
-    /// Something has become of an event, if it is one of these.
+    /// Handles news of a subscription, if it belongs to an event.
     pub(super) fn handle_event_news(
         &mut self,
         now: Instant,
@@ -165,7 +165,7 @@ impl RaClient {
                     convert::refuse(now, tally, code, &refusal);
                 }
             },
-            // It comes up again by itself.
+            // The subscription recovers by itself.
             SubscriptionNews::Down { .. } => {}
             SubscriptionNews::Ended(why) => {
                 tally.refuse(now, Counter::Unanswered, CreateEvent::CODE, why);
@@ -177,7 +177,7 @@ impl RaClient {
         true
     }
 
-    /// Tells the RA component that it does not get, or does not have any more, an event.
+    /// Notifies the RA component that it does not get, or no longer has, an event.
     fn end_unasked(&mut self, event: &RaEvent) {
         let code = ResponseCode::CONNECTION_REFUSED;
         if !event.confirmed {
@@ -220,7 +220,7 @@ impl RaClient {
         self.answer_event(request, (about, id), None, code);
     }
 
-    /// Ends those events; says whether there were any.
+    /// Ends these events; returns whether there were any.
     fn end_events(
         &mut self,
         now: Instant,
@@ -261,7 +261,7 @@ impl RaClient {
         self.said.extend(Message::with_body(from, to, &report).ok());
     }
 
-    /// Answers a request for an event, or about one.
+    /// Answers an event request.
     fn answer_event(
         &mut self,
         request: &Message,
@@ -276,7 +276,7 @@ impl RaClient {
             confirmed_periodic_rate: None,
             response_code,
         };
-        // What was asked for is in range, and no more is confirmed.
+        // The requested rate is in range, and the confirmed one is not higher.
         let _ = confirm.set_confirmed_periodic_rate_hz(hz.unwrap_or_default());
         let (from, to) = (request.destination, request.source);
         self.said
@@ -291,7 +291,7 @@ const fn hz_of(topic: &Topic) -> Option<f64> {
     }
 }
 
-/// What stands for an event among JAUS components.
+/// The JAUS topic of an event.
 fn topic(create: &CreateEvent, peer: Target, words: &Words) -> Result<Topic, ResponseCode> {
     let when = when(create)?;
     let code = create.create_event_rec.report_code;
@@ -311,7 +311,7 @@ fn topic(create: &CreateEvent, peer: Target, words: &Words) -> Result<Topic, Res
     })
 }
 
-/// When an event fires, if ours can.
+/// The trigger of an event, if ours support it.
 fn when(create: &CreateEvent) -> Result<When, ResponseCode> {
     let is_conditional = create.event_boundary_rec.is_some()
         || create.limit_data_field_rec.is_some()
@@ -337,7 +337,7 @@ fn when(create: &CreateEvent) -> Result<When, ResponseCode> {
     }
 }
 
-/// The same event as if it were asked for anew.
+/// The update of an event as a new request.
 fn as_create(update: UpdateEvent) -> CreateEvent {
     let wanted = update.update_event_rec;
     CreateEvent {

@@ -1,11 +1,11 @@
-//! What an RA client has set at the JAUS components that it controls.
+//! Holds the setpoints of an RA client at the JAUS components that it controls.
 //!
-//! RA clients send an effort once or slowly, for RA components keep the last one. A JAUS vehicle
-//! stops when an effort is not repeated for half a second. The gateway therefore repeats it, as long
-//! as the client itself shows life: any message of the component, which is asked for its status; for
-//! a component that has never answered that, any message of its subsystem, such as its heartbeat. The
-//! gateway answers for its own life when a JAUS vehicle asks the controller, so it also stops what the
-//! client has left moving by a vector, and ends the client's control when it is dead.
+//! RA clients send an effort once or at a low rate, as RA components keep the last one. A JAUS
+//! vehicle stops half a second after the last effort. The gateway therefore repeats the effort as
+//! long as the client is alive: proven by any message of the component, whose status is queried;
+//! for a component that has never answered that, by any message of its subsystem, such as the
+//! heartbeat. As the gateway itself answers liveness probes of JAUS vehicles, it also stops vectors
+//! of a silent client, and ends the control of a dead one.
 
 use std::time::{Duration, Instant};
 
@@ -22,12 +22,12 @@ use crate::ids::RaComponent;
 use jaus::messages::core::Standby;
 use jaus::service::{MotionGuard, MotionPolicy, Stack, StopCause, Validity};
 
-/// The signs of life of an RA client.
+/// Signs of life of an RA client.
 #[derive(Debug, Default)]
 pub(super) struct ClientLife {
-    /// The last message of the component itself.
+    /// Time of the component's last message.
     component: Option<Instant>,
-    /// The last message of its subsystem.
+    /// Time of its subsystem's last message.
     subsystem: Option<Instant>,
     /// Whether it has ever reported its status.
     answers: bool,
@@ -35,26 +35,26 @@ pub(super) struct ClientLife {
 }
 
 impl ClientLife {
-    /// The client is dead when it has been silent for so long: RA systems drop a subsystem then.
+    /// Timeout of a dead client: RA systems drop a subsystem after the same time.
     const DEATH: Duration = Duration::from_secs(5);
-    /// Between two questions for its status while it moves something, and else.
+    /// Interval of status queries while it moves something, and otherwise.
     const MOVING: Duration = Duration::from_millis(250);
     const SILENCE: Duration = Duration::from_secs(1);
-    /// Heartbeats come once a second. One that comes half a second late is no reason to stop.
+    /// Heartbeats come once per second. A delay of half a second is no reason to stop.
     const LATE: Duration = Duration::from_millis(500);
 
-    /// A message with this code has come from the component.
+    /// Notes a message of the component with this code.
     pub(super) fn hear(&mut self, now: Instant, code: u16) {
         self.component = Some(now);
         self.answers |= code == STATUS;
     }
 
-    /// Its subsystem was heard last at this time.
+    /// Notes the time of the subsystem's last message.
     pub(super) fn hear_subsystem(&mut self, at: Instant) {
         self.subsystem = self.subsystem.max(Some(at));
     }
 
-    /// The last sign of life, as the motion guard judges it.
+    /// The last sign of life for the motion guard.
     fn sign(&self) -> Option<Instant> {
         let heartbeat = self.subsystem.filter(|_| !self.answers);
         self.component.max(heartbeat.map(|at| at + Self::LATE))
@@ -73,21 +73,21 @@ impl ClientLife {
     }
 }
 
-/// The setpoint of an RA client at one JAUS component.
+/// Setpoint of an RA client at one JAUS component.
 #[derive(Debug)]
 pub(super) struct Hold {
     guard: MotionGuard,
-    /// An effort, and when it is sent again.
+    /// An effort and the time of its next repetition.
     repeat: Option<(Bytes, Instant)>,
-    /// The command that ends the setpoint.
+    /// Command that stops the motion.
     stop: Option<Bytes>,
 }
 
 impl Hold {
-    /// Between two repetitions of an effort: JAUS vehicles stop after half a second without one.
+    /// Repetition interval of an effort: JAUS vehicles stop after half a second without one.
     const REPEAT: Duration = Duration::from_millis(150);
 
-    /// Nothing is set.
+    /// No setpoint.
     pub(super) fn new() -> Self {
         Self {
             guard: MotionGuard::new(MotionPolicy::Hold),
@@ -96,14 +96,14 @@ impl Hold {
         }
     }
 
-    /// Forgets the setpoint.
+    /// Clears the setpoint.
     fn clear(&mut self, cause: StopCause) {
         self.guard.stop(cause);
         self.repeat = None;
         self.stop = None;
     }
 
-    /// The command that is due now: the stop, or the effort again.
+    /// The due command: the stop, or the repeated effort.
     fn poll(&mut self, now: Instant, life: &ClientLife) -> Option<Bytes> {
         self.guard.note_life(|_| life.sign());
         if let Some(cause) = self.guard.expire(now) {
@@ -123,7 +123,7 @@ impl Hold {
 }
 
 impl RaClient {
-    /// Between two rejections that tell a client that it has no control.
+    /// Interval of rejections to a client without control.
     const REJECTION: Duration = Duration::from_secs(1);
 
     /// Whether the RA client has control of a JAUS component.
@@ -132,8 +132,8 @@ impl RaClient {
         held_controls.any(|it| it.held && it.peer == peer.id)
     }
 
-    /// Refuses a command of a client that has no control, and tells it so: it may have had control
-    /// through an earlier gateway with our id, and must request it anew.
+    /// Refuses a command of a client without control and notifies it: it may have had control
+    /// through an earlier gateway with our id, and must request control again.
     pub(super) fn refuse_uncontrolled(
         &mut self,
         now: Instant,
@@ -152,7 +152,7 @@ impl RaClient {
         true
     }
 
-    /// Notes a command that has been sent to a JAUS component.
+    /// Stores the setpoint of a command sent to a JAUS component.
     pub(super) fn note_setpoint(
         &mut self,
         now: Instant,
@@ -182,8 +182,8 @@ impl RaClient {
             (validity == Validity::Brief).then(|| (payload.clone(), now + Hold::REPEAT));
     }
 
-    /// Repeats what the client holds, stops it when the client is silent, and ends the control of a
-    /// dead client. To be called before messages that have waited are handled.
+    /// Repeats held setpoints, stops those of a silent client, and ends the control of a dead
+    /// client. Call it before queued messages are handled.
     pub(super) fn tend(&mut self, now: Instant, stack: &mut Stack) {
         if self.held_controls.is_empty() {
             return;
@@ -199,7 +199,7 @@ impl RaClient {
         }
     }
 
-    /// Whether the client should be asked for its status now, to show life.
+    /// Whether the client's status query is due, as a liveness probe.
     pub(super) fn take_probe(&mut self, now: Instant) -> bool {
         let due = self.probe_at().is_some_and(|due| due <= now);
         if due {
@@ -216,7 +216,7 @@ impl RaClient {
         self.life.probe_at(self.held_controls.values().any(moving))
     }
 
-    /// When [`tend`](Self::tend) has something to do.
+    /// The next timeout of [`tend`](Self::tend).
     pub(super) fn tend_at(&self) -> Option<Instant> {
         let holds = self
             .held_controls
@@ -229,7 +229,7 @@ impl RaClient {
         holds.chain(self.probe_at()).chain(dies).min()
     }
 
-    /// Stops all JAUS components that the client controls, and ends its control of them.
+    /// Stops all JAUS components under the client's control, and releases them.
     pub(super) fn end_control(&mut self, now: Instant, stack: &mut Stack) {
         for (id, mut held_control) in std::mem::take(&mut self.held_controls) {
             let (client, of) = (

@@ -1,5 +1,5 @@
-//! The list that JAUS clients set for an RA driver: its place among the services of a proxy, and in
-//! what passes through it.
+//! The list that JAUS clients set for an RA driver, as a service of the proxy and in its message
+//! flow.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -21,12 +21,12 @@ use jaus::messages::core::list_manager;
 use jaus::messages::mobility::ExecuteList;
 use jaus::service::{Context, Handled, Service};
 
-/// The list of an RA driver. Cheap to clone; the clones are one.
+/// The list of an RA driver. Clones share one list.
 #[derive(Debug, Clone)]
 pub(super) struct Listing(Arc<Mutex<Course>>);
 
 impl Listing {
-    /// An empty list for a component in this role, if it goes to places.
+    /// An empty list for a component in this role, if it drives to places.
     pub(super) fn of(role: Option<&Role>, patience: Duration) -> Option<Self> {
         let places = Places::of(role?.part)?;
         let course = Course::new(places, patience);
@@ -38,7 +38,7 @@ impl Listing {
     }
 }
 
-/// Answers what clients ask about the list; commands come another way.
+/// Service that answers list queries; commands take another path.
 #[derive(Debug)]
 pub(super) struct Listed {
     pub(super) listing: Listing,
@@ -71,13 +71,13 @@ impl Service for Listed {
 }
 
 impl Proxy {
-    /// Whether a message with this code is about the list that is kept here.
+    /// Whether a message with this code concerns the list.
     pub(super) fn is_listed(&self, code: u16) -> bool {
         let concerns = Course::is_command(code) || Course::QUERIES.contains(&code);
         self.listing.is_some() && concerns
     }
 
-    /// A client asks about the list or changes it.
+    /// Handles a list query or command of a client.
     pub(super) fn handle_listed(
         &mut self,
         now: Instant,
@@ -103,7 +103,7 @@ impl Proxy {
         self.follow_list(now, Some(client), tally);
     }
 
-    /// A client's command has been given to the driver, which may end the way along the list.
+    /// Notes a client's command to the driver, which may end the execution of the list.
     pub(super) fn note_command(&self, code: u16, body: &Bytes) {
         let Some(listing) = &self.listing else { return };
         match code {
@@ -114,7 +114,7 @@ impl Proxy {
         }
     }
 
-    /// The driver has told a place; says whether it was asked for by the list.
+    /// Handles a place reported by the driver; returns whether the list had queried it.
     pub(super) fn handle_place(
         &mut self,
         now: Instant,
@@ -133,7 +133,7 @@ impl Proxy {
         waited_for
     }
 
-    /// Time has passed for the list. A driver that does not tell its speed has the one that it was given.
+    /// Runs due timers of the list. A driver that does not report its speed has its last set speed.
     pub(super) fn handle_list_timeout(&mut self, now: Instant, tally: &mut Tally) {
         let Some(listing) = self.listing.clone() else {
             return;
@@ -150,8 +150,8 @@ impl Proxy {
         self.follow_list(now, None, tally);
     }
 
-    /// Tells the speed that the driver was given, if that report is wanted and it does not tell it
-    /// itself.
+    /// Reports the last set speed, if that report is requested and the driver does not report its
+    /// speed itself.
     pub(super) fn tell_given_speed(&mut self, now: Instant, report: u16) {
         if report != SPEED {
             return;
@@ -163,8 +163,8 @@ impl Proxy {
         }
     }
 
-    /// If nobody is in control any more, the driver is stopped before it is released. In an emergency,
-    /// whoever has set it, nothing more is handed over, and no speed follows.
+    /// Without a client in control, stops the driver before it is released. In an emergency,
+    /// from any client, no further places and no speed follow.
     pub(super) fn stop_list_where_due(&mut self, now: Instant, tally: &mut Tally) {
         let Some(listing) = &self.listing else { return };
         if self.lease.controller().is_none() {
@@ -177,7 +177,7 @@ impl Proxy {
         self.follow_list(now, None, tally);
     }
 
-    /// Carries out what the list wants. `client` is whose message it was.
+    /// Executes the actions of the list. `client` sent the message that caused them.
     pub(super) fn follow_list(&mut self, now: Instant, client: Option<JausId>, tally: &mut Tally) {
         let Some(listing) = &self.listing else { return };
         let said = listing.lock().take_said();
@@ -204,7 +204,7 @@ impl Proxy {
     }
 }
 
-/// Counts what was refused about a list.
+/// Counts a refused list request.
 pub(super) fn refuse(now: Instant, tally: &mut Tally, code: u16, why: &Refused) {
     match why {
         Refused::Conversion(refusal) => convert::refuse(now, tally, code, refusal),

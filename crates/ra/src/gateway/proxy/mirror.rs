@@ -1,5 +1,4 @@
-//! What an RA component has reported last, as the services of its counterpart tell it: the part of a
-//! proxy that answers at once.
+//! Caches the last reports of an RA component; the proxy's services answer from this cache.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -18,16 +17,16 @@ use jaus::messages::core::{
 
 use jaus::service::{Context, Controller, Handled, Service, code_of};
 
-/// A report that is older tells nothing any more.
+/// Maximum age of a report.
 const OLDEST: Duration = Duration::from_secs(10);
 
-/// What is known of one RA component. Cheap to clone; the clones are one.
+/// Cached state of one RA component. Clones share one cache.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Mirror(Arc<Mutex<Known>>);
 
 #[derive(Debug, Default)]
 struct Known {
-    /// The states, by the code of their reports: as many as there are such codes.
+    /// States by report code; bounded by the number of such codes.
     reports: BTreeMap<u16, Kept>,
     controller: Option<Controller>,
 }
@@ -39,7 +38,7 @@ struct Kept {
 }
 
 impl Mirror {
-    /// A report has come. Says whether it is another than before.
+    /// Stores a report. Returns whether it differs from the one before.
     pub(super) fn keep(&self, now: Instant, report: u16, data: Bytes) -> bool {
         let kept = Kept { at: now, data };
         let mut known = self.lock();
@@ -49,25 +48,25 @@ impl Mirror {
         changed
     }
 
-    /// What was reported is out of date.
+    /// Invalidates a report.
     pub(super) fn outdate(&self, report: u16) {
         self.lock().reports.remove(&report);
     }
 
-    /// How old a report is; `None` if there is none.
+    /// Age of a report; `None` if there is none.
     pub(super) fn age(&self, now: Instant, report: u16) -> Option<Duration> {
         let known = self.lock();
         let kept = known.reports.get(&report)?;
         Some(now.saturating_duration_since(kept.at))
     }
 
-    /// Notes who is in control. Says whether that was known.
+    /// Stores the controller. Returns whether it was known already.
     pub(super) fn controller_is(&self, controller: Option<Controller>) -> bool {
         let before = std::mem::replace(&mut self.lock().controller, controller);
         before == controller
     }
 
-    /// The answer to a JAUS query, from what was reported.
+    /// Answers a JAUS query from the cache.
     fn answer(&self, now: Instant, query: &Bytes, words: &Words) -> Option<Bytes> {
         let (code, body) = words.to_ra(query).ok()?;
         let state = pairs::state(pairs::report_of(code)?)?;
@@ -90,13 +89,13 @@ impl Mirror {
     }
 }
 
-/// The services of an RA component's counterpart.
+/// The services of a proxy.
 #[derive(Debug)]
 pub(super) struct Mirrored {
     pub(super) mirror: Mirror,
     pub(super) words: Words,
     pub(super) offers: Vec<ServiceId>,
-    /// How long control lasts without a renewal; zero: until it is released or taken.
+    /// Timeout of control without a renewal; zero: until it is released or taken.
     pub(super) timeout: Duration,
 }
 

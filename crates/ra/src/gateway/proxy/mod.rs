@@ -1,16 +1,16 @@
-//! An RA component as JAUS clients see it: a [`Stack`] that answers from what the RA component has
-//! reported, and asks it for what is not known yet.
+//! Proxy: an RA component as a JAUS component. Its [`Stack`] answers from the RA component's
+//! reports and queries it for missing ones.
 //!
-//! | a client | becomes of it |
+//! | client request | handling |
 //! |---|---|
-//! | asks for a state (pose, velocity, …) | answered from the last report if that is fresh; else the client waits until one has come, and for [patience](super::Settings::patience) at most |
-//! | subscribes to a state | a [service connection](streams) at the greatest rate that is wanted keeps the report fresh; Events tells it at each client's rate, or when it is another |
-//! | asks for anything else | the query is relayed, and the next report that answers it goes to the client |
-//! | asks for control | [`Lease`] asks the RA component, and tells the client what that says |
-//! | commands | converted and passed on, if it is in control |
-//! | sets or executes a list | it is [kept here](listing), and given the RA driver when it is executed |
+//! | query of a state (pose, velocity, …) | answered from the last report if that is fresh; else on the next report, within the [timeout](super::Settings::patience) |
+//! | subscription to a state | a [service connection](streams) at the highest requested rate keeps the report fresh; Events reports it at each client's rate, or on change |
+//! | other query | relayed; the next report that answers it goes to the client |
+//! | control request | [`Lease`] requests control from the RA component, and forwards the answer |
+//! | command | converted and forwarded, if the client is in control |
+//! | set or execute a list | [kept here](listing), and sent to the RA driver on execution |
 //!
-//! The same stack is the RA component's client half among JAUS components: see [`RaClient`].
+//! The same stack is the RA component's client side towards JAUS components: see [`RaClient`].
 
 mod codes;
 mod emergency;
@@ -69,42 +69,42 @@ use jaus::service::{
     Discovery, Event, Liveness, Profile, Scope, Service, Stack, Timing, Transport, code_of,
 };
 
-/// An RA component among JAUS components.
+/// JAUS proxy of an RA component.
 pub(super) struct Proxy {
     ra: RaId,
     pub(super) stack: Stack,
     pub(super) ra_client: RaClient,
-    /// Until when it is kept though no RA system lists it.
+    /// Expiry of a guest that no RA system lists.
     pub(super) kept_until: Option<Instant>,
     patience: Duration,
     words: Words,
     mirror: Mirror,
-    /// Whether it has said last that it is in an emergency.
+    /// Whether its last status was the emergency state.
     in_emergency: bool,
-    /// Whether its client has sent it to Standby, and not to Resume after that.
+    /// Whether its client has sent Standby without a later Resume.
     in_standby: bool,
     lease: Lease,
     motion: Motion,
-    /// What it is told of the gateway's readiness.
+    /// Readiness of the gateway as reported to the RA component.
     readiness: Readiness,
-    /// The list of places, of a driver that goes to such.
+    /// The list of places, of a driver that drives to places.
     listing: Option<Listing>,
     streams: Streams,
     held: Vec<Held>,
     relayed: VecDeque<Relayed>,
-    /// Service connections of both kinds with the RA component.
+    /// Service connections with the RA component, in both directions.
     connections: Connections,
-    /// The gateway as the RA component sees it.
+    /// The gateway's RA id.
     own: RaId,
     to_ra: Vec<(u16, Bytes)>,
-    /// When to look again at what clients subscribe to.
+    /// Time of the next review of client subscriptions.
     review: Option<Instant>,
 }
 
-/// How a proxy is made.
+/// Parameters of a proxy.
 pub(super) struct Plan {
     pub(super) ra: RaId,
-    /// The gateway among RA systems.
+    /// The gateway's RA id.
     pub(super) own: RaId,
     pub(super) id: JausId,
     pub(super) profile: Profile,
@@ -115,15 +115,15 @@ pub(super) struct Plan {
 }
 
 impl Proxy {
-    /// The most messages that wait for reports, of each kind.
+    /// Maximum number of queued messages that wait for reports, of each kind.
     const MOST_WAITING: usize = 64;
-    /// How old a report may be to be told without asking again.
+    /// Maximum age of a report that is sent without a new query.
     const FRESH: Duration = Duration::from_millis(50);
-    /// Between two queries for the same report.
+    /// Minimum interval between queries for the same report.
     const ASK_AGAIN: Duration = Duration::from_millis(250);
-    /// How often a report comes that somebody wants to be told of when it changes.
+    /// Rate of reports for subscriptions to changes.
     const CHANGES_HZ: f64 = 10.0;
-    /// Between two looks at what clients subscribe to.
+    /// Interval of subscription reviews.
     const REVIEW: Duration = Duration::from_secs(1);
 
     pub(super) fn new(plan: Plan) -> Self {
@@ -183,7 +183,7 @@ impl Proxy {
         }
     }
 
-    /// Begins to live. What an earlier gateway with our id has left held is released.
+    /// Starts the proxy. Releases control left over from an earlier gateway with our id.
     pub(super) fn start(&mut self, now: Instant) {
         self.stack.start(now);
         if !RaComponent(self.ra.component).is_infrastructure() {
@@ -196,7 +196,7 @@ impl Proxy {
         self.ra
     }
 
-    /// A message of a JAUS component has come.
+    /// Processes a message of a JAUS component.
     pub(super) fn handle_message(&mut self, now: Instant, message: &Received, tally: &mut Tally) {
         let client = message.source;
         self.end_overdue(now);
@@ -238,7 +238,7 @@ impl Proxy {
         self.follow(now, tally);
     }
 
-    /// A message for the RA component.
+    /// Forwards a message to the RA component.
     fn cross(&mut self, now: Instant, message: &Received, code: u16, tally: &mut Tally) {
         let (ra_code, body) = match self.words.to_ra(&message.payload) {
             Ok(converted) => converted,
@@ -279,8 +279,8 @@ impl Proxy {
         }
     }
 
-    /// A message of the RA component has come: for us, or for the JAUS component that it sees under
-    /// the id which the message is for.
+    /// Processes a message of the RA component: for the gateway, or for the JAUS component at the
+    /// RA id it was sent to.
     pub(super) fn handle_ra(
         &mut self,
         now: Instant,
@@ -322,7 +322,7 @@ impl Proxy {
         }
     }
 
-    /// Looks after what has become of service connections. `target` is who a new one is to.
+    /// Processes events of service connections. `target` is the provider of a new one.
     fn follow_connections(&mut self, now: Instant, target: Option<Target>, tally: &mut Tally) {
         while let Some(event) = self.connections.poll_event() {
             match event {
@@ -345,8 +345,8 @@ impl Proxy {
         }
     }
 
-    /// The RA component wants to be told something: of a JAUS component, or that we are ready, for it
-    /// stands still for a controller that does not say so.
+    /// Handles a requested service connection: to a JAUS component, or to the gateway's status,
+    /// which RA drivers need in order to move.
     fn provide(
         &mut self,
         now: Instant,
@@ -376,7 +376,7 @@ impl Proxy {
         }
     }
 
-    /// Something has happened to the stack.
+    /// Processes an event of the stack.
     pub(super) fn handle_event(&mut self, now: Instant, event: Event, tally: &mut Tally) {
         let Self {
             ra_client,
@@ -437,12 +437,12 @@ impl Proxy {
         }
     }
 
-    /// Its subsystem was heard last at this time.
+    /// Notes the time of the subsystem's last message.
     pub(super) fn hear_subsystem(&mut self, at: Instant) {
         self.ra_client.life.hear_subsystem(at);
     }
 
-    /// A JAUS client is gone.
+    /// Removes a lost JAUS client.
     pub(super) fn forget(&mut self, now: Instant, client: JausId, tally: &mut Tally) {
         self.lease.forget(now, client);
         self.stack.forget(now, client);
@@ -452,7 +452,7 @@ impl Proxy {
         self.follow(now, tally);
     }
 
-    /// The time of [`poll_timeout`](Self::poll_timeout) has come; earlier does no harm.
+    /// Runs due timers; calls before [`poll_timeout`](Self::poll_timeout) do no harm.
     pub(super) fn handle_timeout(&mut self, now: Instant, tally: &mut Tally) {
         if self.stack.poll_timeout().is_some_and(|due| due <= now) {
             self.stack.handle_timeout(now);
@@ -482,7 +482,8 @@ impl Proxy {
         self.follow(now, tally);
     }
 
-    /// Carries out what has been decided, and looks at what clients want.
+    /// Sends pending decisions of the lease, and updates the service connections to client
+    /// subscriptions.
     fn follow(&mut self, now: Instant, tally: &mut Tally) {
         let said = self.lease.take_said();
         if said.granted {
@@ -508,12 +509,12 @@ impl Proxy {
         }
     }
 
-    /// Whether everything is released that was controlled on either side.
+    /// Whether everything that was under control on either side is released.
     pub(super) fn is_released(&self) -> bool {
         self.lease.is_released() && !self.stack.is_releasing()
     }
 
-    /// Ends what runs with the RA component, because we stop.
+    /// Ends control and connections of the RA component at shutdown.
     pub(super) fn take_leave(&mut self, now: Instant, tally: &mut Tally) {
         self.lease.end(now);
         self.ra_client.is_closed = true;
@@ -524,13 +525,13 @@ impl Proxy {
         self.stack.take_leave(now);
     }
 
-    /// The next message for JAUS components.
+    /// The next message to JAUS components.
     pub(super) fn poll_transmit(&mut self) -> Option<Outgoing> {
         let probe = self.motion.poll_transmit();
         probe.or_else(|| self.stack.poll_transmit())
     }
 
-    /// What is to be sent to the RA component since this was asked last.
+    /// Takes the queued messages to the RA component.
     pub(super) fn take_said(&mut self) -> Vec<Message> {
         let (own, ra) = (self.own, self.ra);
         let ours = std::mem::take(&mut self.to_ra).into_iter();
@@ -540,7 +541,7 @@ impl Proxy {
         ours.chain(connections).chain(ra_client).collect()
     }
 
-    /// Whether we control the RA component, or ask for it.
+    /// Whether we control the RA component, or have requested control.
     pub(super) const fn is_engaged(&self) -> bool {
         self.lease.is_engaged()
     }
@@ -570,7 +571,7 @@ impl Proxy {
     }
 }
 
-/// What the counterpart of an RA component offers.
+/// The services that the proxy offers.
 fn offers(ra: RaId, role: Option<&Role>) -> Vec<jaus::codec::ServiceId> {
     let guarded = !RaComponent(ra.component).is_infrastructure();
     let guards = [

@@ -1,6 +1,6 @@
-//! Motion of an RA component on behalf of its JAUS client. RA components keep their last command, so
-//! the gateway sends the command that stops them when the client's setpoint ends: an effort that is
-//! not repeated, a vector whose client shows no life, anything whose client loses control.
+//! Guards motion of an RA component on behalf of its JAUS client. RA components keep their last
+//! command, so the gateway sends the stop command when the client's setpoint ends: an effort is not
+//! repeated, the client of a vector is silent, or a client loses control.
 
 use std::time::Instant;
 
@@ -14,18 +14,18 @@ use jaus::address::JausId;
 use jaus::endpoint::{Outgoing, Received};
 use jaus::service::{Life, MotionGuard, Outbox, Rank, StopCause, Validity, code_of};
 
-/// What moves an RA component, and the life of the client that moves it.
+/// Active motion command of an RA component, and the liveness of its client.
 #[derive(Debug)]
 pub(super) struct Motion {
     guard: MotionGuard,
-    /// The last command that moves it: code and data.
+    /// The last motion command: code and data.
     last: Option<(u16, Bytes)>,
     life: Life,
     out: Outbox,
 }
 
 impl Motion {
-    /// Nothing moves. `id` is the RA component among JAUS components.
+    /// No motion. `id` is the RA component's JAUS id.
     pub(super) fn new(id: JausId) -> Self {
         Self {
             guard: MotionGuard::default(),
@@ -35,13 +35,13 @@ impl Motion {
         }
     }
 
-    /// A message of a JAUS component has come.
+    /// Notes a message of a JAUS component.
     pub(super) fn hear(&mut self, now: Instant, message: &Received) {
         let code = code_of(&message.payload);
         self.life.hear(now, message.source, code);
     }
 
-    /// Probes for clients.
+    /// Takes the next liveness probe.
     pub(super) fn poll_transmit(&mut self) -> Option<Outgoing> {
         self.out.pop()
     }
@@ -61,7 +61,7 @@ pub(super) const fn moves(code: u16) -> bool {
 }
 
 impl Proxy {
-    /// Gives the RA component a command of the client in control.
+    /// Sends a command of the client in control to the RA component.
     pub(super) fn give(&mut self, now: Instant, (code, data): (u16, Bytes)) {
         if moves(code)
             && let Some(client) = self.lease.controller()
@@ -73,7 +73,7 @@ impl Proxy {
         self.to_ra.push((code, data));
     }
 
-    /// Sends the RA component the command that stops it, and forgets the setpoint.
+    /// Sends the stop command to the RA component, and clears the setpoint.
     pub(super) fn stop(&mut self) {
         let part = RaComponent(self.ra.component);
         let last = self.motion.last.take();
@@ -88,8 +88,8 @@ impl Proxy {
         }
     }
 
-    /// Ends control and setpoints whose time is over. Messages may have waited while the gateway
-    /// did not run, so this comes before any of them is handled.
+    /// Ends expired control and setpoints. Runs before queued messages are handled, as they may
+    /// have waited while the gateway did not run.
     pub(super) fn end_overdue(&mut self, now: Instant) {
         self.lease.handle_timeout(now);
         self.ra_client.tend(now, &mut self.stack);
@@ -118,7 +118,7 @@ impl Proxy {
         }
     }
 
-    /// Another client has control, or none.
+    /// Follows a change of the client in control.
     pub(super) fn follow_controller(&mut self, now: Instant) {
         let controller = self.lease.controller();
         let is_driver = RaComponent(self.ra.component).is_driver();

@@ -1,13 +1,13 @@
-//! An RA component among JAUS components as their client: it asks, is told regularly, and takes
-//! control, all in its own name, so that each JAUS component decides for itself what it may.
+//! Client side of an RA component towards JAUS components: it queries, subscribes and takes control
+//! in its own name, so that each JAUS component applies its own access control.
 //!
-//! | the RA component | becomes of it |
+//! | request of the RA component | handling |
 //! |---|---|
-//! | sends a query | the JAUS component is asked, and its answer converted; nothing if it says nothing |
-//! | creates an event | an event of the JAUS component, if that has the like |
-//! | creates a service connection | an event of the JAUS component at that rate; confirmed when that one has confirmed |
-//! | requests control | Request Control with its authority; Confirm or Reject when it is decided |
-//! | sends a command | converted and passed on; the JAUS component obeys if this one is in control |
+//! | query | sent to the JAUS component, and the answer converted; no answer on timeout |
+//! | event | a subscription to the JAUS component, if it has the event |
+//! | service connection | a subscription at that rate; confirmed when the JAUS component has confirmed |
+//! | control | Request Control with its authority; Confirm or Reject after the decision |
+//! | command | converted and forwarded; the JAUS component obeys if this component has control |
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -36,7 +36,7 @@ use jaus::service::{
     SubscriptionNews, Topic, When, code_of,
 };
 
-/// What an RA component wants of JAUS components.
+/// Requests of an RA component to JAUS components.
 #[derive(Debug)]
 pub(in crate::gateway) struct RaClient {
     pub(super) patience: Patience,
@@ -44,22 +44,22 @@ pub(in crate::gateway) struct RaClient {
     asked: BTreeMap<Inquiry, (Message, Target)>,
     told: BTreeMap<SubscriptionId, ServiceConnection>,
     pub(super) held_controls: BTreeMap<ControlId, HeldControl>,
-    /// The places that it sets, by whom it sets them at.
+    /// Its places, by the RA id of the driver.
     pub(super) entries: BTreeMap<RaId, (Target, Entries)>,
-    /// Questions at which element a list is.
+    /// Pending queries for the active element of a list.
     pub(super) active: BTreeMap<Inquiry, RaId>,
     /// Its events.
     pub(super) events: BTreeMap<SubscriptionId, RaEvent>,
-    /// Messages for the RA component, from those whom it asked.
+    /// Queued messages to the RA component, from the queried components.
     pub(super) said: Vec<Message>,
     /// Its signs of life.
     pub(super) life: ClientLife,
-    /// When it was last told that it commands without control.
+    /// Time of the last rejection of a command without control.
     pub(super) rejected: Option<Instant>,
-    /// When a JAUS component probed it for the first time, and when control was disowned last.
+    /// Time of the first probe by a JAUS component, and of the last release of leftover control.
     probed: Option<Instant>,
     disowned: Option<Instant>,
-    /// Whether the gateway stops, and requests control for nobody any more.
+    /// Whether the gateway is stopping and requests no further control.
     pub(super) is_closed: bool,
 }
 
@@ -72,7 +72,7 @@ struct ServiceConnection {
     confirmed: bool,
 }
 
-/// What the client half shares with the rest of its component.
+/// Parts of the proxy shared with its RA client.
 pub(super) struct Common<'a> {
     pub(super) stack: &'a mut Stack,
     pub(super) connections: &'a mut Connections,
@@ -88,15 +88,15 @@ pub(super) struct HeldControl {
 }
 
 impl RaClient {
-    /// The most questions that wait for an answer.
+    /// Maximum number of pending queries.
     const MOST_ASKED: usize = 64;
-    /// The most service connections.
+    /// Maximum number of service connections.
     const MOST_TOLD: usize = 64;
-    /// The most components under control.
+    /// Maximum number of components under control.
     const MOST_GRIPS: usize = 32;
-    /// By then control from before a restart has timed out everywhere.
+    /// After this time, control from before a restart has timed out everywhere.
     const LEFTOVER: Duration = Duration::from_secs(6);
-    /// Between two releases of control that the component does not have.
+    /// Minimum interval between releases of leftover control.
     const DISOWNING: Duration = Duration::from_millis(100);
 
     pub(super) fn new(patience: Duration, ids: Ids) -> Self {
@@ -126,18 +126,18 @@ impl RaClient {
         Words::new(self.ids.clone(), as_what.component, minor)
     }
 
-    /// Whether anything is under way.
+    /// Whether requests, connections, events or control are active.
     pub(in crate::gateway) fn is_busy(&self) -> bool {
         let is_told = !(self.told.is_empty() && self.events.is_empty());
         is_told || !(self.asked.is_empty() && self.held_controls.is_empty())
     }
 
-    /// What is to be sent to the RA component since this was asked last.
+    /// Takes the queued messages to the RA component.
     pub(super) fn take_said(&mut self) -> Vec<Message> {
         std::mem::take(&mut self.said)
     }
 
-    /// The RA component sends a message to what it takes for another one, and is a JAUS component.
+    /// Handles a message of the RA component to a JAUS component.
     pub(super) fn handle_ra(
         &mut self,
         now: Instant,
@@ -149,7 +149,7 @@ impl RaClient {
         match request.code {
             REQUEST_CONTROL => self.request_control(now, request, peer, stack, tally),
             RELEASE_CONTROL => self.release_control(now, peer.id, stack),
-            // Answers to what JAUS components never ask of RA components.
+            // Answers to requests that JAUS components never send to RA components.
             CONFIRM_CONTROL | REJECT_CONTROL => {
                 tally.refuse(now, Counter::Unasked, request.code, request.source);
             }
@@ -208,7 +208,7 @@ impl RaClient {
         self.asked.insert(inquiry, (request.clone(), peer));
     }
 
-    /// A question has been answered, or nobody will.
+    /// Handles the answer to a query, or its timeout.
     pub(super) fn handle_answer(
         &mut self,
         now: Instant,
@@ -237,7 +237,7 @@ impl RaClient {
         }
     }
 
-    /// A JAUS component says something that was not asked for, such as what it made of a command.
+    /// Forwards an unsolicited message of a JAUS component, such as the response to a command.
     pub(in crate::gateway) fn handle_report(
         &mut self,
         now: Instant,
@@ -252,7 +252,7 @@ impl RaClient {
         self.said.extend(told);
     }
 
-    /// The RA component wants to be told a report regularly.
+    /// Opens a service connection of the RA component.
     pub(super) fn connect(
         &mut self,
         now: Instant,
@@ -261,7 +261,7 @@ impl RaClient {
         Common { stack, connections }: Common<'_>,
         tally: &mut Tally,
     ) {
-        // At another rate than before, perhaps.
+        // The connection may exist at another rate.
         self.disconnect(now, id, stack);
         let report = request.code;
         if self.told.len() >= Self::MOST_TOLD {
@@ -289,7 +289,7 @@ impl RaClient {
         }
     }
 
-    /// The RA component does not want to be told any more.
+    /// Closes a service connection of the RA component.
     pub(super) fn disconnect(&mut self, now: Instant, id: ConnectionId, stack: &mut Stack) {
         let ended = self.told.iter().find(|(_, it)| it.connection == id);
         if let Some((&subscription, _)) = ended {
@@ -298,7 +298,7 @@ impl RaClient {
         }
     }
 
-    /// Something has become of an event.
+    /// Handles news of a subscription.
     pub(super) fn handle_subscription(
         &mut self,
         now: Instant,
@@ -396,10 +396,10 @@ impl RaClient {
         }
     }
 
-    /// A JAUS component probes the RA component. If that has no control of it and requests none, this
-    /// may be a gateway that was started again, and the component may still obey the RA component,
-    /// which the answer would show to be alive. Such control is released at once, instead of by its
-    /// timeout. The release is repeated with the probes, because it may be lost.
+    /// Handles a liveness probe of a JAUS component. Without control or a pending request, the
+    /// gateway may have restarted while the component still obeys the RA component, and an answer
+    /// would keep that control alive. Such control is released at once, instead of by its timeout.
+    /// The release is repeated with the probes, because it may be lost.
     pub(super) fn handle_probe(&mut self, now: Instant, peer: JausId, stack: &mut Stack) {
         let begun = *self.probed.get_or_insert(now);
         let is_recent = |at: Instant| now < at + Self::DISOWNING;
@@ -413,7 +413,7 @@ impl RaClient {
         stack.send(peer, &ReleaseControl {});
     }
 
-    /// Something has become of control.
+    /// Handles news of control over a JAUS component.
     pub(super) fn handle_control(
         &mut self,
         now: Instant,
@@ -453,13 +453,13 @@ impl RaClient {
         self.said.push(request.answer(CONFIRM_CONTROL, accepted));
     }
 
-    /// OpenJAUS takes any confirmation for a yes, and says no by rejecting.
+    /// OpenJAUS takes any confirmation for a grant, and denies by rejecting.
     pub(super) fn reject_control(&mut self, request: &Message) {
         self.said.push(request.answer(REJECT_CONTROL, Bytes::new()));
     }
 }
 
-/// A JAUS report, and what it became, as an answer to an RA message.
+/// Converts a JAUS report to the answer to an RA message.
 fn tell(
     now: Instant,
     request: &Message,
@@ -479,7 +479,7 @@ fn tell(
     }
 }
 
-/// What stands for a report among JAUS components; `None` if there is no such report.
+/// The JAUS topic of a report; `None` if there is no such report.
 fn topic(request: &Request, peer: JausId, words: &Words) -> Option<Topic> {
     let state = pairs::state(request.code)?;
     let query = words.to_jaus(state.query(), &state.query_for(request.presence));
@@ -488,7 +488,7 @@ fn topic(request: &Request, peer: JausId, words: &Words) -> Option<Topic> {
         peer,
         report: code_of(&query).and_then(pairs::report_of)?,
         query,
-        // What events can say at least.
+        // The lowest rate that events can encode.
         when: When::hz(request.rate.max(1.0 / 60.0)),
     })
 }

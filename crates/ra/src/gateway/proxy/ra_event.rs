@@ -1,4 +1,4 @@
-//! One event that an RA component has at a JAUS component.
+//! An event of an RA component at a JAUS component.
 
 use bytes::Bytes;
 
@@ -11,23 +11,23 @@ use jaus::service::Topic;
 /// An event of the RA component.
 #[derive(Debug)]
 pub(super) struct RaEvent {
-    /// Its number. All events of the RA component have different ones.
+    /// Event number, unique per RA component.
     pub(super) id: u8,
-    /// The JAUS component as the RA component sees it.
+    /// RA id of the JAUS component.
     pub(super) at: RaId,
-    /// The message that created or changed it, to answer.
+    /// The request that created or changed it, to answer.
     pub(super) request: Message,
     pub(super) wanted: CreateEventRec,
     pub(super) topic: Topic,
     pub(super) words: Words,
-    /// Counts what was told.
+    /// Sequence number of the next report.
     pub(super) sequence: u8,
-    /// Whether the RA component knows that it has it.
+    /// Whether the event is confirmed to the RA component.
     pub(super) confirmed: bool,
 }
 
 impl RaEvent {
-    /// The message that tells a report.
+    /// Builds the event message of a report.
     pub(super) fn tell(&mut self, report_message: Bytes) -> Option<Message> {
         let event = Event {
             event_id: self.id,

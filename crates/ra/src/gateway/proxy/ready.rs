@@ -1,9 +1,9 @@
-//! What an RA component and JAUS clients are told of readiness.
+//! Readiness as reported to an RA component and to JAUS clients.
 //!
-//! OpenJAUS's primitive driver drives only while its controller reports that it is ready or in standby,
-//! and asks for that by a service connection as long as it takes the gateway for its controller. So
-//! the gateway is ready for a component only while a JAUS client has control of it; and a component
-//! that wants the status when none has is still held in the gateway's id and is released again.
+//! OpenJAUS's primitive driver moves only while its controller reports ready or standby, and opens
+//! a service connection for that as long as it considers the gateway its controller. The gateway is
+//! therefore ready for a component only while a JAUS client has control; a component that requests
+//! the status without a client in control is still held in the gateway's id and is released again.
 
 use std::time::{Duration, Instant};
 
@@ -16,35 +16,35 @@ use crate::ids::RaComponent;
 use crate::messages::ra33::ReportComponentControl;
 use crate::{Message, RaId};
 
-/// The service connection by which the RA component is told whether the gateway is ready.
+/// The service connection that reports the gateway's readiness to the RA component.
 #[derive(Debug, Default)]
 pub(super) struct Readiness {
     connection: Option<ConnectionId>,
-    /// What it was told last.
+    /// Last reported readiness.
     told: Option<bool>,
     /// Whether JAUS clients were told that the component is not available.
     was_reclaiming: bool,
-    /// When the component is released again if the connection is still there and no client has control.
+    /// When to release the component again, if the connection remains without a client in control.
     release: Option<Instant>,
-    /// How often that has happened since the connection was made.
+    /// Number of such releases since the connection was made.
     releases: u32,
 }
 
 impl Readiness {
-    /// A connection that is there for so long without a client in control shows that the release was
+    /// A connection that remains this long without a client in control shows that the release was
     /// lost.
     const GHOST: Duration = Duration::from_secs(3);
-    /// A component that keeps the connection for reasons of its own is released no more often.
+    /// Limit of releases, for components that keep the connection for their own reasons.
     const MOST_RELEASES: u32 = 10;
 
-    /// The RA component has connected.
+    /// Handles a connection of the RA component.
     pub(super) fn connect(&mut self, now: Instant, connection: ConnectionId) {
         self.connection = Some(connection);
         self.told = None;
         self.release = Some(now + Self::GHOST);
     }
 
-    /// A connection has ended, perhaps this one.
+    /// Handles the end of a connection, possibly this one.
     pub(super) fn disconnect(&mut self, connection: ConnectionId) {
         if self.connection == Some(connection) {
             *self = Self {
@@ -60,13 +60,12 @@ impl Readiness {
 }
 
 impl Proxy {
-    /// What the RA component is told of the gateway's state.
+    /// The gateway status reported to the RA component.
     pub(super) fn own_status(&self) -> Bytes {
         status(self.lease.controller().is_some())
     }
 
-    /// Tells the RA component whether the gateway is ready, and JAUS clients when the component has
-    /// become available.
+    /// Reports readiness to the RA component, and availability of the component to JAUS clients.
     pub(super) fn tell_readiness(&mut self, now: Instant) {
         let reclaiming = self.lease.is_reclaiming();
         if std::mem::replace(&mut self.readiness.was_reclaiming, reclaiming) && !reclaiming {
@@ -84,8 +83,8 @@ impl Proxy {
         }
     }
 
-    /// Releases a driver that still wants to know whether the gateway is ready though no client has
-    /// control of it.
+    /// Releases a driver that still requests the gateway's status although no client has control of
+    /// it.
     pub(super) fn release_again(&mut self, now: Instant) {
         let Readiness {
             release, releases, ..
@@ -108,14 +107,14 @@ impl Proxy {
     }
 }
 
-/// Report Component Status without further words: ready, or initializing.
+/// Report Component Status without secondary status: ready, or initializing.
 pub(in crate::gateway) const fn status(is_ready: bool) -> Bytes {
     const READY: &[u8] = &[1, 0, 0, 0, 0];
     const INITIALIZE: &[u8] = &[0, 0, 0, 0, 0];
     Bytes::from_static(if is_ready { READY } else { INITIALIZE })
 }
 
-/// Who controls the sender of a Report Component Control.
+/// Controller of the sender of a Report Component Control.
 pub(super) fn controller(message: &Message) -> Option<RaId> {
     let report: ReportComponentControl = message.body().ok()?;
     Some(RaId {

@@ -1,5 +1,5 @@
-//! The commands that stop RA drivers. Drivers over OpenJAUS's library keep the last command whatever
-//! state they are sent to, so each stop is a command of the kind that moved them.
+//! Stop commands of RA drivers. Drivers based on OpenJAUS's library keep the last command in every
+//! state, so the stop is a command of the kind that moved them.
 
 use bytes::Bytes;
 
@@ -9,14 +9,14 @@ use crate::ids::RaComponent;
 use crate::messages::ra33::{SetGlobalVector, SetLocalVector, SetTravelSpeed, SetWrenchEffort};
 use jaus::codec::{Message, OutOfRange};
 
-/// How a component of this type is stopped; `None` if it drives nothing.
+/// Stop procedure of a component of this type; `None` if it is no driver.
 pub(super) fn halt(part: RaComponent) -> Option<Halt> {
     part.is_driver().then(|| Halt {
         command: command(part),
     })
 }
 
-/// The command that stops a component of this type, where it needs nothing but the type.
+/// The stop command of a component type, where it depends on the type alone.
 pub(super) fn command(part: RaComponent) -> Option<(u16, Bytes)> {
     match part {
         RaComponent::PRIMITIVE_DRIVER => encoded(&no_effort().ok()?),
@@ -30,7 +30,7 @@ pub(super) fn command(part: RaComponent) -> Option<(u16, Bytes)> {
     }
 }
 
-/// The command that ends another one: a vector keeps its heading, so that nothing turns.
+/// The stop command after another command: a vector keeps its heading to avoid a turn.
 pub(super) fn after(part: RaComponent, (code, data): (u16, &Bytes)) -> Option<(u16, Bytes)> {
     match code {
         SET_LOCAL_VECTOR => {
@@ -47,7 +47,7 @@ pub(super) fn after(part: RaComponent, (code, data): (u16, &Bytes)) -> Option<(u
     }
 }
 
-/// Nothing that drives, and full brakes.
+/// No propulsion, and full brakes.
 fn no_effort() -> Result<SetWrenchEffort, OutOfRange> {
     let mut effort = SetWrenchEffort::default();
     effort.set_propulsive_linear_effort_x_percent(0.0)?;
@@ -66,8 +66,8 @@ fn no_global_speed() -> Result<SetGlobalVector, OutOfRange> {
     Ok(vector)
 }
 
-/// The heading cannot be left out. That of the vector that is to end is not known here, and standing
-/// still matters more than which way.
+/// The heading is mandatory. The heading of the current vector is unknown here, and standing still
+/// matters more than the direction.
 fn no_local_speed() -> Result<SetLocalVector, OutOfRange> {
     let mut vector = SetLocalVector::default();
     vector.set_speed_m_per_s(0.0)?;

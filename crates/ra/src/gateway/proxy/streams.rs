@@ -1,6 +1,5 @@
-//! How an RA component keeps us told of what somebody subscribes to: one service connection for each
-//! report, at the greatest rate that anybody wants. A component that does not confirm one, or refuses
-//! it, is asked with queries instead.
+//! Service connections to an RA component for client subscriptions: one per report, at the highest
+//! requested rate. If the component refuses or does not confirm a connection, queries replace it.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -11,10 +10,10 @@ use super::super::pairs;
 use crate::RaId;
 use crate::connection::{ConnectionId, Connections, Request};
 
-/// What one RA component keeps us told of, by the code of the report.
+/// Reports requested of one RA component, by report code.
 #[derive(Debug)]
 pub(super) struct Streams {
-    /// The RA component and we.
+    /// The RA component and the gateway.
     between: (RaId, RaId),
     all: BTreeMap<u16, Stream>,
 }
@@ -23,16 +22,16 @@ pub(super) struct Streams {
 struct Stream {
     state: pairs::State,
     hz: f64,
-    /// Its connection, unless that was refused.
+    /// Its connection, unless refused.
     connection: Option<ConnectionId>,
-    /// The rate that was confirmed, while reports come.
+    /// The confirmed rate, while reports arrive.
     confirmed: Option<f64>,
-    /// When the next query stands in for the connection.
+    /// When the next query replaces the connection.
     query: Option<Instant>,
 }
 
 impl Streams {
-    /// The most queries in a second that stand in for a connection.
+    /// Maximum rate of queries that replace a connection, in hertz.
     const MOST_QUERIES: f64 = 10.0;
 
     pub(super) const fn new(provider: RaId, client: RaId) -> Self {
@@ -42,7 +41,7 @@ impl Streams {
         }
     }
 
-    /// What is wanted now: the rates, by the code of the report.
+    /// Sets the requested rates, by report code.
     pub(super) fn want(
         &mut self,
         now: Instant,
@@ -95,7 +94,7 @@ impl Streams {
         all.find(|stream| stream.connection == Some(connection))
     }
 
-    /// A connection is confirmed at this rate.
+    /// Stores the confirmed rate of a connection.
     pub(super) fn handle_established(&mut self, connection: ConnectionId, hz: f64) {
         if let Some(stream) = self.of(connection) {
             stream.confirmed = Some(hz);
@@ -103,7 +102,7 @@ impl Streams {
         }
     }
 
-    /// Nothing comes over a connection, which is asked for again.
+    /// Falls back to queries while a silent connection is requested again.
     pub(super) fn handle_silence(&mut self, now: Instant, connection: ConnectionId) {
         if let Some(stream) = self.of(connection) {
             stream.confirmed = None;
@@ -111,7 +110,7 @@ impl Streams {
         }
     }
 
-    /// A connection is refused, or ended by the RA component; says whether it was one of these.
+    /// Handles a refused or terminated connection; returns whether it was one of these.
     pub(super) fn handle_end(&mut self, now: Instant, connection: ConnectionId) -> bool {
         let Some(stream) = self.of(connection) else {
             return false;
@@ -122,13 +121,13 @@ impl Streams {
         true
     }
 
-    /// How old a report may be while its connection stands; `None` without one.
+    /// Maximum age of a report with a connection; `None` without one.
     pub(super) fn freshness(&self, report: u16) -> Option<Duration> {
         let hz = self.all.get(&report)?.confirmed?;
         Some(Duration::from_secs_f64(2.0 / hz.max(0.01)))
     }
 
-    /// The queries that are due in place of connections.
+    /// The due queries that replace connections.
     pub(super) fn take_queries(&mut self, now: Instant) -> Vec<(u16, Bytes)> {
         let mut queries = Vec::new();
         for stream in self.all.values_mut() {

@@ -16,7 +16,7 @@ use jaus::messages::core::CreateEvent;
 use jaus::service::code_of;
 
 impl Proxy {
-    /// A subscription needs a report that can be told at once.
+    /// Handles a subscription; it needs a report that can be sent at once.
     pub(super) fn subscribe(
         &mut self,
         now: Instant,
@@ -34,7 +34,7 @@ impl Proxy {
         }
     }
 
-    /// The rates of all that somebody subscribes to, by the code of the RA report.
+    /// The rates of all subscriptions, by RA report code.
     pub(super) fn wanted(&self) -> BTreeMap<u16, f64> {
         let mut wanted = BTreeMap::new();
         let subscribed = self.stack.subscribed();
@@ -58,7 +58,7 @@ pub(super) fn hz_of(create: &CreateEvent) -> f64 {
     }
 }
 
-/// The RA report that answers a JAUS query, if it tells a state.
+/// The RA report that answers a JAUS query, if it is a state.
 fn state_of(words: &Words, query: &Bytes) -> Option<u16> {
     let code = code_of(query)?;
     let (code, _) = crosses(code).then(|| words.to_ra(query).ok())??;

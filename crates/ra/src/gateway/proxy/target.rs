@@ -1,5 +1,5 @@
-//! A JAUS component as an RA component sees it, and the list of places that it may have: what stands
-//! there for the numbered places of the Reference Architecture.
+//! A JAUS component as an RA component addresses it, and its list elements as numbered places of
+//! the Reference Architecture.
 
 use bytes::Bytes;
 
@@ -10,31 +10,31 @@ use jaus::address::JausId;
 use jaus::codec::Message as _;
 use jaus::messages::core::{QueryElement, ReportElement};
 
-/// A JAUS component as an RA component sees it.
+/// A JAUS component addressed by an RA component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::gateway) struct Target {
     /// Its id.
     pub(in crate::gateway) id: JausId,
-    /// The minor version of the service that is meant.
+    /// The minor version of its service.
     pub(in crate::gateway) minor: u8,
-    /// Whether it works a list of places off.
+    /// Whether it executes a list of places.
     pub(in crate::gateway) lists: bool,
 }
 
-/// The places that a JAUS driver goes to, if it has a list of them.
+/// The places of a JAUS driver, if it has a list.
 pub(super) fn places(request: &Message, peer: Target) -> Option<Places> {
     let part = RaComponent(request.destination.component);
     Places::of(part).filter(|_| peer.lists)
 }
 
-/// What stands for a query for a place: that for its element.
+/// Converts a query for a place to a query for its element.
 pub(super) fn element_query(places: Places, request: &Message) -> Option<Bytes> {
     let number = places.queried(&request.data)?;
     let element_uid = number.checked_add(1)?;
     QueryElement { element_uid }.encode().ok()
 }
 
-/// The code and data of the report of a place, for that of its element.
+/// Converts the report of an element to code and data of a place report.
 pub(super) fn place_report(places: Places, report: &Bytes) -> Result<(u16, Bytes), Refusal> {
     let report = ReportElement::decode(report)?;
     let number = report.element_uid.saturating_sub(1);

@@ -1,5 +1,5 @@
-//! Who waits for reports of the RA component: clients whose query or subscription needs one that is
-//! not there yet, and clients whose query was passed on.
+//! JAUS clients that wait for reports of the RA component: for a missing state, or for the answer
+//! to a relayed query.
 
 use std::time::Instant;
 
@@ -12,17 +12,17 @@ use jaus::address::JausId;
 use jaus::endpoint::Received;
 use jaus::service::code_of;
 
-/// A client's message that waits for a report.
+/// A client message that waits for a report.
 pub(super) struct Held {
     pub(super) message: Received,
     pub(super) report: u16,
-    /// The rate of the service connection that it needs, if it needs one.
+    /// The rate of the required service connection, if any.
     pub(super) hz: Option<f64>,
     pub(super) until: Instant,
     pub(super) next: Instant,
 }
 
-/// A client that waits for the answer to a query which was passed on.
+/// A client that waits for the answer to a relayed query.
 pub(super) struct Relayed {
     pub(super) client: JausId,
     pub(super) report: u16,
@@ -30,7 +30,7 @@ pub(super) struct Relayed {
 }
 
 impl Proxy {
-    /// Passes on a query, and remembers who is to have the answer.
+    /// Relays a query and remembers its client.
     pub(super) fn relay(
         &mut self,
         now: Instant,
@@ -47,7 +47,7 @@ impl Proxy {
         self.expect(now, client, report);
     }
 
-    /// The next report of this code is for the client.
+    /// Sends the next report of this code to the client.
     pub(super) fn expect(&mut self, now: Instant, client: JausId, report: u16) {
         if self.relayed.len() < Self::MOST_WAITING {
             self.relayed.push_back(Relayed {
@@ -58,7 +58,7 @@ impl Proxy {
         }
     }
 
-    /// Keeps a client's message until the report has come that it needs.
+    /// Holds a client's message until its report arrives.
     pub(super) fn hold(
         &mut self,
         now: Instant,
@@ -93,21 +93,21 @@ impl Proxy {
         });
     }
 
-    /// Asks the RA component for the whole of a state.
+    /// Queries the whole of a state.
     pub(super) fn ask(&mut self, report: u16) {
         if let Some(state) = pairs::state(report) {
             self.to_ra.push((state.query(), state.query_for_all()));
         }
     }
 
-    /// Whether the last report is young enough to be told without asking.
+    /// Whether the last report is recent enough to be sent without a query.
     pub(super) fn is_fresh(&self, now: Instant, report: u16) -> bool {
         let limit = self.streams.freshness(report).unwrap_or_default();
         let age = self.mirror.age(now, report);
         age.is_some_and(|age| age <= limit.max(Self::FRESH))
     }
 
-    /// Asks again for what clients wait for, and gives up what has waited for too long.
+    /// Repeats pending queries, and drops expired ones.
     pub(super) fn ask_again(&mut self, now: Instant, tally: &mut Tally) {
         let mut reports = Vec::new();
         let mut need_connection = false;
@@ -119,7 +119,7 @@ impl Proxy {
             }
             if now >= it.next {
                 it.next = now + Self::ASK_AGAIN;
-                // Some components tell by service connections alone.
+                // Some components report by service connections only.
                 need_connection |= it.hz.is_none();
                 it.hz.get_or_insert(Self::CHANGES_HZ);
                 if !reports.contains(&it.report) {

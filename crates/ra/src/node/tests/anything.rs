@@ -1,10 +1,10 @@
-//! Random octets, and random messages in valid packets: nothing panics, all stays bounded.
+//! Random octets, and random messages in valid packets: no panics, bounded state.
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// A packet with a valid header, mostly about what the node handles itself.
+/// A packet with a valid header, mostly with messages that the node handles itself.
 fn packet() -> impl Strategy<Value = Bytes> {
     let id = (
         any::<u8>(),

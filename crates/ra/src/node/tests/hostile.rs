@@ -1,4 +1,4 @@
-//! Traffic that means no good: all of it bounded, and counted.
+//! Hostile traffic is bounded and counted.
 
 use super::*;
 use jaus::endpoint::Rate;

@@ -1,4 +1,4 @@
-//! Two nodes find each other, tell changes, and notice who is gone.
+//! Two nodes discover each other, report changes, and detect a loss.
 
 use super::*;
 

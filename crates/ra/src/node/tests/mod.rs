@@ -1,4 +1,4 @@
-//! Nodes that meet on a simulated network, with virtual time.
+//! Nodes on a simulated network, with virtual time.
 
 mod anything;
 mod hostile;
@@ -54,7 +54,7 @@ fn vehicle(id: u8) -> Subsystem {
     }
 }
 
-/// A node, where it is, and what its owner was told.
+/// A node with its address and events.
 struct Host {
     node: RaNode,
     address: SocketAddr,
@@ -65,9 +65,9 @@ struct Host {
 struct World {
     now: Instant,
     hosts: Vec<Host>,
-    /// Whether datagrams for the group arrive.
+    /// Whether multicasts are delivered.
     multicast: bool,
-    /// Loses every so many-th datagram; 0 loses none.
+    /// Loses every n-th datagram; 0 loses none.
     loses: u32,
     sent: u32,
 }
@@ -92,7 +92,7 @@ impl World {
         }
     }
 
-    /// Hosts that show a vehicle each: subsystems 10, 20, …
+    /// Hosts with one vehicle each: subsystems 10, 20, …
     fn of_vehicles(hosts: u8) -> Self {
         let mut world = Self::new(hosts);
         for number in 0..hosts {
@@ -103,7 +103,7 @@ impl World {
         world
     }
 
-    /// Carries datagrams until there are no more.
+    /// Delivers datagrams until none is left.
     fn exchange(&mut self) {
         let mut waiting = VecDeque::new();
         loop {
@@ -170,7 +170,7 @@ impl World {
     }
 }
 
-/// One node, and what it sends to somebody whose part the test plays.
+/// One node, and its messages to a scripted peer.
 struct Rig {
     now: Instant,
     node: RaNode,
@@ -186,7 +186,7 @@ impl Rig {
         rig
     }
 
-    /// Hears what somebody sends.
+    /// Delivers a message of the peer.
     fn hear(&mut self, host: u8, source: RaId, destination: RaId, code: u16, data: &[u8]) {
         let datagram = datagram(&Message::new(
             source,

@@ -1,4 +1,4 @@
-//! The exchanges that were recorded between OpenJAUS 3.3.1 node managers, octet by octet.
+//! Recorded exchanges between OpenJAUS 3.3.1 node managers, octet by octet.
 
 use super::*;
 
@@ -79,7 +79,7 @@ fn the_questions_of_a_node_manager_get_the_answers_that_another_gave() {
     assert_eq!((goodbye.code, &goodbye.data[..]), (0x41F1, &expected[..]));
 }
 
-/// What is asked, as destination, code and data.
+/// The queries sent: destination, code and data.
 fn asked(rig: &mut Rig) -> Vec<(RaId, u16, Vec<u8>)> {
     let sent = rig.sent().into_iter();
     let asked = sent.inspect(|message| assert_eq!(message.source, OUR_MANAGER));

@@ -1,8 +1,8 @@
-//! Hosts that multicast does not reach, but that are named to each other.
+//! Discovery between hosts that multicast does not reach but that are configured as peers.
 
 use super::*;
 
-/// Two vehicles; the first names the other, which knows of nobody.
+/// Two vehicles; only the first has the other configured as a peer.
 fn world(dialects: Vec<Dialect>) -> World {
     let mut settings = Settings::default();
     settings.carrier.group_dialects = dialects;

@@ -1,4 +1,4 @@
-//! RA vector drivers as JAUS clients ask them: with the octets of components over OpenJAUS's library.
+//! JAUS clients query RA vector drivers: with octets of components based on OpenJAUS's library.
 
 use std::time::Duration;
 

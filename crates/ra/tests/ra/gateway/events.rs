@@ -1,4 +1,4 @@
-//! Events of the Reference Architecture that an RA client has at a JAUS component.
+//! Events of the Reference Architecture between an RA client and a JAUS component.
 
 use std::time::Duration;
 

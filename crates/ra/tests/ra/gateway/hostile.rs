@@ -1,4 +1,4 @@
-//! Hostile and broken RA traffic: bounded, counted, and felt by nobody else.
+//! Hostile and malformed RA traffic: bounded, counted, and without effect on others.
 
 use std::net::SocketAddr;
 use std::time::Duration;

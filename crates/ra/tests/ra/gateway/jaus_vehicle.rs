@@ -1,4 +1,4 @@
-//! A JAUS vehicle as RA systems have it: listed, asked, connected to, driven.
+//! A JAUS vehicle seen from RA systems: discovery, queries, service connections, driving.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Knowledge stores of both sides, and messages that are too large for one datagram.
+//! Knowledge stores on both sides, and messages larger than one datagram.
 
 use std::time::Duration;
 

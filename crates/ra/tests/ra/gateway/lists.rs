@@ -1,4 +1,5 @@
-//! Lists of places: a JAUS client's at an RA waypoint driver, and an RA client's at a JAUS one.
+//! Lists of places: of a JAUS client at an RA waypoint driver, and of an RA client at a JAUS
+//! driver.
 
 use std::time::Duration;
 

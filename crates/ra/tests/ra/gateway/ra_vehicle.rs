@@ -1,4 +1,4 @@
-//! An RA vehicle as JAUS clients have it: found, asked, subscribed to, driven.
+//! An RA vehicle seen from JAUS clients: discovery, queries, subscriptions, driving.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! Recorded traffic of OpenJAUS 3.3.1, with the gateway in the place of one of its peers: whatever is
-//! asked gets an answer that the peer can use.
+//! Recorded traffic of OpenJAUS 3.3.1, with the gateway in the place of one peer: every request
+//! gets a usable answer.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;

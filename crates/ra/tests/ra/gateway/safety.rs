@@ -1,5 +1,5 @@
-//! Nothing moves through the gateway without a living controller: whichever side the controller is
-//! on, and whatever becomes of it, of the gateway and of the cables.
+//! No motion through the gateway without a living controller, on either side, whatever happens to
+//! the controller, the gateway and the cables.
 
 use std::time::Duration;
 

@@ -1,6 +1,6 @@
 //! Two networks in virtual time with a gateway between them. Datagrams and messages arrive at once;
-//! time goes from one wake-up to the next. The gateway can be killed, suspended and started again, and
-//! cut off on either side.
+//! time advances from timer to timer. The gateway can be killed, suspended, restarted, and cut off
+//! on either side.
 
 use std::collections::BTreeSet;
 use std::net::SocketAddr;

@@ -1,4 +1,4 @@
-//! The octets that OpenJAUS's own encoders make of known values.
+//! Octets of known values from OpenJAUS's own encoders.
 
 use std::collections::BTreeSet;
 

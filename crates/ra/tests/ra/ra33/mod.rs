@@ -1,5 +1,5 @@
-//! The definitions of the Reference Architecture against what OpenJAUS 3.3.1 writes: its encoders'
-//! octets, which are kept beside this file, and recorded traffic.
+//! The definitions of the Reference Architecture against OpenJAUS 3.3.1: octets of its encoders,
+//! kept beside this file, and recorded traffic.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,5 +1,5 @@
-//! What people are shown of frames with the older headers: by the Reference Architecture's
-//! definitions if the source is one of its ids, as before otherwise.
+//! Display of frames with the older headers: by the Reference Architecture's definitions if the
+//! source is one of its ids, as before otherwise.
 
 use std::fs::File;
 

@@ -1,4 +1,4 @@
-//! A vehicle that is put together for tests.
+//! A vehicle assembled from fakes.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! Missions that arrive, that are begun again, and that are stopped.
+//! Missions that arrive, restart, and are stopped.
 
 use jaus_vehicle::messages::ground::report_mission::Stage;
 use jaus_vehicle::messages::ground::report_stage::State;

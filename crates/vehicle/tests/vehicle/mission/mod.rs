@@ -1,6 +1,5 @@
-//! The planner among other components: missions from the destination to the arrival, on loopback.
-//! The store and the stages are small fakes here, so that each thing that can go wrong can be made
-//! to go wrong; the vehicle drives in a simulation.
+//! The planner among other components: missions from destination to arrival, on loopback. The store
+//! and the stages are small fakes, so that every failure can be provoked; the vehicle is simulated.
 #![allow(
     clippy::disallowed_methods,
     clippy::disallowed_types,

@@ -1,5 +1,5 @@
-//! The whole chain with all its real parts, each on a node of its own: the tester's mission, and
-//! what becomes of it when a part dies on the way.
+//! The whole chain with all real parts, each on a node of its own: the tester's mission, and its
+//! reaction to the death of a part.
 
 use std::path::PathBuf;
 use std::time::Duration;

@@ -1,5 +1,5 @@
-//! A disk on which one bit changes: the store is refused, or repaired, or the bit lay in an unused
-//! place. What is opened is exactly what was kept.
+//! A single bit error on the disk: the store is refused or repaired, or the bit was unused. An
+//! opened store has exactly the written content.
 
 use std::panic::catch_unwind;
 

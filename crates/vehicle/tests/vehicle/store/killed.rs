@@ -1,4 +1,4 @@
-//! A process that writes as fast as it can is killed at random instants.
+//! A process that writes at full speed is killed at random instants.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

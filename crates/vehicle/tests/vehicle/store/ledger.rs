@@ -1,5 +1,5 @@
-//! Writes of which it can be told afterwards which of them are there: each step is one write that
-//! changes objects, cells and a description, and what a world is after a step follows from its number.
+//! Verifiable writes: each step is one write that changes objects, cells and a description, and the
+//! expected world after a step follows from its number.
 
 use bytes::Bytes;
 use jaus_vehicle::world::{

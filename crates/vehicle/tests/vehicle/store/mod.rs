@@ -1,8 +1,8 @@
-//! Power cuts while a world is written: nothing that was acknowledged is lost, and nothing keeps it
-//! from being opened again.
+//! Power cuts during writes: nothing acknowledged is lost, and the store can always be opened
+//! again.
 //!
-//! Some tens of cuts by default; `JAUS_POWER_CUTS=1000` makes as many as it says of each kind, and
-//! `JAUS_SEED` chooses which.
+//! Some tens of cuts by default; `JAUS_POWER_CUTS=1000` makes 1000 of each kind, and `JAUS_SEED`
+//! selects them.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

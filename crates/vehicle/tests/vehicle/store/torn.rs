@@ -1,5 +1,5 @@
-//! A disk that loses its power: of what it was not told to keep, it keeps some, whole or in part, in
-//! any order.
+//! A disk that loses power: of the unflushed writes it keeps some, complete or partial, in any
+//! order.
 
 use std::io;
 use std::sync::{Arc, Mutex};

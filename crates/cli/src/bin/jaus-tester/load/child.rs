@@ -1,4 +1,4 @@
-//! The child's side of the load: a node, or a number of components that send and measure.
+//! Child process of the load test: a node, or components that send and measure.
 #![expect(clippy::disallowed_methods, reason = "a program owns its tasks")]
 
 use std::net::SocketAddr;
@@ -16,7 +16,7 @@ use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 use super::components::Components;
 use super::process::{Answer, NodeOrder, Order};
 
-/// The subsystem of the load.
+/// Subsystem of the load test.
 const SUBSYSTEM: u16 = 101;
 
 /// Takes orders from the `jaus-tester load` that started it.
@@ -30,7 +30,7 @@ impl LoadChild {
             let lines = std::io::stdin().lines().map_while(Result::ok);
             lines.for_each(|line| drop(sender.send(line)));
         });
-        // In a task, as components are: what a runtime blocks on costs one more system call a turn.
+        // As a task, like components: blocking on a future costs one more system call per turn.
         runtime::run(async {
             let task = tokio::spawn(obey(orders));
             task.await.map_err(Failure::of)?
@@ -38,7 +38,7 @@ impl LoadChild {
     }
 }
 
-/// What this process runs.
+/// The node or components of this process.
 #[derive(Default)]
 struct Running {
     node: Option<Node>,
@@ -62,7 +62,7 @@ async fn obey(mut orders: UnboundedReceiver<String>) -> Result<Outcome, Failure>
             _ => None,
         };
         node.shutdown().await;
-        // The last node to end removes the directory, also when the parent was killed.
+        // The last node to end removes the directory, even if the parent was killed.
         if let Some(directory) = socket.as_deref().and_then(std::path::Path::parent) {
             let _ = std::fs::remove_dir(directory);
         }

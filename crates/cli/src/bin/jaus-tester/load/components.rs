@@ -1,4 +1,4 @@
-//! The components of one process: each sends to its partner, acknowledges what it receives, and
+//! Components of one process: each sends to its partner, acknowledges received messages, and
 //! measures the time until its own messages are acknowledged.
 #![expect(
     clippy::disallowed_methods,
@@ -16,61 +16,61 @@ use tokio::time::MissedTickBehavior;
 
 use super::process::{Acknowledger, Pace, Run, Tally};
 
-/// The code of a message that the receiving component acknowledges: user-defined, so that no
-/// service acts on it.
+/// Code of a message that the receiving component acknowledges: user-defined, so that no service
+/// acts on it.
 const LOAD: u16 = 0xD7F1;
-/// The code of a component's acknowledgement.
+/// Code of a component's acknowledgement.
 const ACKNOWLEDGEMENT: u16 = 0xD7F2;
-/// The code of a message that only the receiving node acknowledges.
+/// Code of a message that only the receiving node acknowledges.
 const LOAD_FOR_NODE: u16 = 0xD7F3;
-/// Octets of a message before its padding: code, number of the step, nanoseconds when it was sent.
+/// Octets of a message before its padding: code, step number, send time in nanoseconds.
 pub(super) const HEAD: usize = 2 + 4 + 8;
-/// What is sent before this has passed does not count.
+/// Messages sent during the warm-up do not count.
 pub(super) const WARM_UP: Duration = Duration::from_millis(500);
-/// How long acknowledgements may still arrive after the last message was sent.
+/// Time for late acknowledgements after the last message.
 pub(super) const REST: Duration = Duration::from_secs(2);
-/// A component that keeps a window gives its messages up after this time without any
-/// acknowledgement, and fills its window again.
+/// A component with a window discards its pending messages after this time without an
+/// acknowledgement, and refills the window.
 const GIVE_UP: Duration = Duration::from_secs(1);
-/// What is due is sent at each tick.
+/// Due messages are sent at each tick.
 const TICK: Duration = Duration::from_millis(1);
 
 /// The attached components of this process.
 pub(super) struct Components {
     members: Vec<Member>,
     step: Mutex<Step>,
-    /// Send times count from here.
+    /// Start of the send times.
     origin: Instant,
 }
 
-/// One component's way to send.
+/// Sender of one component.
 struct Member {
     sender: Sender,
     partner: Mutex<Option<JausId>>,
 }
 
-/// The step of the schedule that is under way, or the last one.
+/// The current or last step of the schedule.
 #[derive(Default)]
 struct Step {
     run: Option<Run>,
-    /// From the origin.
+    /// Relative to the origin.
     begin: Duration,
-    /// From the begin. Messages are sent until then.
+    /// Relative to `begin`. Messages are sent until then.
     length: Duration,
     tally: Tally,
     windows: Vec<Window>,
 }
 
-/// A component's messages that wait for an acknowledgement.
+/// Unacknowledged messages of a component.
 #[derive(Clone, Copy, Default)]
 struct Window {
     waiting: u32,
-    /// When the last acknowledgement came, from the origin.
+    /// Time of the last acknowledgement, relative to the origin.
     heard: Duration,
 }
 
 impl Components {
-    /// Each component gets a task of its own, which ends with its connection.
+    /// Starts a task per component, which ends with its connection.
     pub(super) fn new(ports: Vec<Port>) -> Arc<Self> {
         let members = ports.iter().map(|port| Member {
             sender: port.sender(),
@@ -87,14 +87,14 @@ impl Components {
         components
     }
 
-    /// Says whom each component sends to.
+    /// Sets the partner of each component.
     pub(super) fn pair(&self, partners: Vec<JausId>) {
         for (member, partner) in self.members.iter().zip(partners) {
             *locked(&member.partner) = Some(partner);
         }
     }
 
-    /// Runs one step: warm-up, the time that counts, and a rest for late acknowledgements.
+    /// Runs one step: warm-up, measurement, and time for late acknowledgements.
     pub(super) async fn measure(self: &Arc<Self>, run: Run) -> Tally {
         *self.step() = Step {
             run: Some(run),
@@ -135,7 +135,7 @@ impl Components {
         std::mem::take(&mut step.tally)
     }
 
-    /// Waits for messages of one component until its connection ends.
+    /// Receives the messages of one component until its connection ends.
     async fn receive(self: Arc<Self>, member: usize, mut port: Port) {
         while let Some(message) = port.recv().await {
             self.handle(member, &message);
@@ -151,7 +151,7 @@ impl Components {
                 let payload = [&ACKNOWLEDGEMENT.to_le_bytes(), head].concat();
                 let sender = &self.members[member].sender;
                 let answer = Outgoing::new(sender.id(), message.source, payload.into());
-                // One that is not sent counts where it is missed: as a lost message of the partner.
+                // An unsent acknowledgement counts as a lost message of the partner.
                 let _ = sender.send(answer);
             }
             (ACKNOWLEDGEMENT, Some(head)) => {
@@ -166,7 +166,7 @@ impl Components {
         }
     }
 
-    /// Counts an acknowledgement; a component that keeps a window sends the next message.
+    /// Counts an acknowledgement; a component with a window sends the next message.
     fn acknowledged(self: &Arc<Self>, member: usize, number: u32, sent: Duration) {
         let now = self.origin.elapsed();
         let mut step = self.step();
@@ -187,7 +187,7 @@ impl Components {
         }
     }
 
-    /// Fills the windows of components that wait for nothing, or in vain.
+    /// Fills the windows that are empty or have timed out.
     fn fill_windows(self: &Arc<Self>, most: u32) {
         let now = self.origin.elapsed();
         for member in 0..self.members.len() {
@@ -243,7 +243,7 @@ impl Components {
 }
 
 impl Step {
-    /// Whether a message that was sent then counts.
+    /// Whether a message sent at this time counts.
     fn counts(&self, sent: Duration) -> bool {
         sent >= self.begin + WARM_UP
     }
@@ -261,7 +261,7 @@ fn payload(run: Run, now: Duration) -> Bytes {
     payload.freeze()
 }
 
-/// No code that holds a lock here panics.
+/// Locks a mutex. No code panics while it holds a lock here.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

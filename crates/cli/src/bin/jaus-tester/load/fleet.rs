@@ -1,4 +1,4 @@
-//! The processes of a load: nodes, and components attached to them.
+//! Processes of a load test: nodes, and components attached to them.
 #![expect(
     clippy::disallowed_methods,
     clippy::disallowed_types,
@@ -18,13 +18,13 @@ use super::process::{Answer, NodeOrder, Order, Pace, Process, Run, Tally};
 use super::report::Row;
 use super::{LoadCommand, Rate, progress};
 
-/// How long a process may take beyond what it was asked to wait.
+/// Timeout of a process, beyond the requested duration.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// How long a step may wait for the backlog of an earlier one.
+/// Maximum time that a step waits for the backlog of an earlier one.
 const SETTLE: Duration = Duration::from_secs(10);
 
-/// All processes of a load. Dropped in this order: components leave before their nodes end.
+/// All processes of a load test. Dropped in this order: components end before their nodes.
 pub(super) struct Fleet {
     clients: Vec<Process>,
     nodes: Vec<Process>,
@@ -73,7 +73,7 @@ impl Fleet {
         for first in 0..processes {
             let of_process = (first..components).step_by(processes);
             let place = |component: usize| {
-                // Counted from 1; the command has checked that each node has numbers enough.
+                // Numbered from 1; the command has checked that each node has enough numbers.
                 let number = (component / nodes.len() + 1) as u8;
                 (nodes[component % nodes.len()].to_string(), number)
             };
@@ -139,7 +139,7 @@ impl Fleet {
         Ok(Row::new(rate, &tally, time, used))
     }
 
-    /// Waits until the processes have finished with what an earlier step left, if they are busy.
+    /// Waits until the processes have worked off the backlog of an earlier step.
     fn settle(&self) {
         let pause = Duration::from_millis(100);
         let mut before = self.processor_time();
@@ -156,7 +156,7 @@ impl Fleet {
         }
     }
 
-    /// Of all processes together.
+    /// Total of all processes.
     fn processor_time(&self) -> Option<Duration> {
         let processes = self.nodes.iter().chain(&self.clients);
         processes.map(Process::processor_time).sum()
@@ -167,16 +167,16 @@ fn unexpected(answer: &Answer) -> Failure {
     Failure::new(format!("a process gave another answer: {answer:?}"))
 }
 
-/// Free UDP ports of loopback, one for each node.
+/// Free UDP ports on loopback, one per node.
 fn free_addresses(nodes: u8) -> Result<Vec<SocketAddr>, Failure> {
     let bind = |_| UdpSocket::bind("127.0.0.1:0");
-    // All at the same time, so that they differ.
+    // All open at once, so that they differ.
     let sockets = (0..nodes).map(bind).collect::<Result<Vec<_>, _>>();
     let addresses = sockets.and_then(|all| all.iter().map(UdpSocket::local_addr).collect());
     addresses.map_err(|error| Failure::new(format!("no free ports on loopback: {error}")))
 }
 
-/// A directory for the sockets, which the nodes remove when they end.
+/// A directory for the sockets; the nodes remove it when they end.
 fn directory() -> Result<PathBuf, Failure> {
     let directory = std::env::temp_dir().join(format!("jaus-load-{}", std::process::id()));
     std::fs::create_dir_all(&directory).map_err(|error| Failure::file(&directory, &error))?;

@@ -5,14 +5,14 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-/// Each power of two of nanoseconds has this many buckets, as a power of two.
+/// Buckets per power of two of nanoseconds, as a power of two.
 const PRECISION: u32 = 6;
 
 /// Latencies in nanoseconds, in buckets at most 1/64 of their value wide. Its size does not depend
-/// on how many latencies were added.
+/// on the number of latencies.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Latencies {
-    /// How many lie in each bucket that is not empty.
+    /// Number of latencies in each nonempty bucket.
     buckets: BTreeMap<u32, u64>,
     count: u64,
     sum: u64,
@@ -41,12 +41,12 @@ impl Latencies {
         self.count
     }
 
-    /// Zero if there are none.
+    /// Zero if empty.
     pub(super) fn mean(&self) -> Duration {
         Duration::from_nanos(self.sum / self.count.max(1))
     }
 
-    /// The latency that a share of them, from 0 to 1, does not exceed; zero if there are none.
+    /// The latency that a share (0 to 1) of them does not exceed; zero if empty.
     pub(super) fn percentile(&self, share: f64) -> Duration {
         let rank = (self.count as f64 * share).ceil() as u64;
         let mut seen = 0;

@@ -1,5 +1,5 @@
-//! `jaus-tester load`: round trips of acknowledged messages between many components on several
-//! nodes, at rates that step up.
+//! `jaus-tester load`: measures round trips of acknowledged messages between many components on
+//! several nodes, at increasing rates.
 
 mod child;
 mod components;
@@ -25,7 +25,7 @@ pub(crate) use self::process::SUBCOMMAND;
 use self::process::{Acknowledger, Run};
 use self::report::{Report, Row};
 
-/// Components have the numbers 1 to 254 on a node.
+/// Highest component number on a node.
 const MOST_ON_NODE: u16 = 254;
 /// Connections of one process, within the usual limit of 1024 open files.
 const MOST_IN_PROCESS: u16 = 1000;
@@ -229,7 +229,7 @@ impl LoadCommand {
     }
 }
 
-/// Says on standard error what takes a while.
+/// Prints progress on standard error.
 fn progress(words: impl std::fmt::Display) {
     output::say_as("jaus-tester", words);
 }

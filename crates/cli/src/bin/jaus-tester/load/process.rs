@@ -1,6 +1,6 @@
-//! Child processes of the load: this program again, which takes orders on its standard input and
-//! answers each on its standard output, as lines of JSON. A child ends when its input does, also
-//! when the parent was killed.
+//! Child processes of the load test: this program again, which reads orders from standard input and
+//! answers on standard output, as lines of JSON. A child ends when its input closes, even if the
+//! parent was killed.
 #![expect(clippy::disallowed_methods, reason = "waits for processes")]
 
 use std::io::{BufRead, BufReader, Write};
@@ -18,57 +18,57 @@ use super::latencies::Latencies;
 
 /// The hidden subcommand that a child runs.
 pub(crate) const SUBCOMMAND: &str = "load-child";
-/// How long a child may take to end after its input was closed.
+/// Timeout of a child after its input was closed.
 const END: Duration = Duration::from_secs(3);
 
-/// What the parent wants of a child.
+/// Order from the parent to a child.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) enum Order {
     /// Run a node that serves component processes.
     Serve(NodeOrder),
-    /// Attach components, each by a connection of its own, to the nodes at these addresses.
+    /// Attach components, each with its own connection, to the nodes at these addresses.
     Attach(Vec<(String, u8)>),
-    /// Whom each of the attached components sends to.
+    /// Set the partner of each attached component.
     Partners(Vec<JausId>),
     /// Send, and measure.
     Measure(Run),
 }
 
-/// A node of the load. It finds the others by their addresses, without multicast, so that it
-/// disturbs no other node of this host.
+/// A node of the load test. It finds the others by address, without multicast, so that it disturbs
+/// no other node of this host.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct NodeOrder {
     pub(super) node: u8,
-    /// Where components attach.
+    /// Socket for component processes.
     pub(super) socket: PathBuf,
-    /// The UDP addresses of all nodes of the load; the first is node 1.
+    /// UDP addresses of all nodes of the load test; the first is node 1.
     pub(super) addresses: Vec<SocketAddr>,
-    /// How many components there are on all nodes.
+    /// Number of components on all nodes.
     pub(super) components: u16,
 }
 
-/// One step of the schedule, as one process runs it.
+/// One step of the schedule in one process.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Run {
-    /// Tells the messages of this step from late ones of an earlier step.
+    /// Distinguishes the messages of this step from late ones of earlier steps.
     pub(super) number: u32,
     /// Messages per second of this process.
     pub(super) pace: Pace,
-    /// How many messages a component sends at once, where the pace is a rate.
+    /// Messages that a component sends at once, if the pace is a rate.
     pub(super) burst: u32,
-    /// How long messages count. Those of the warm-up before that do not.
+    /// Duration of the measurement, after the warm-up.
     pub(super) time: Duration,
     /// Octets of a message.
     pub(super) size: usize,
     pub(super) acknowledged_by: Acknowledger,
 }
 
-/// When messages are sent.
+/// Schedule of the messages.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) enum Pace {
     /// This many per second, whether or not earlier ones are acknowledged.
     PerSecond(f64),
-    /// As fast as possible: each component keeps this many messages unacknowledged.
+    /// As fast as possible, with this many unacknowledged messages per component.
     Window(u32),
 }
 
@@ -91,16 +91,16 @@ pub(super) enum Answer {
     Failed(String),
 }
 
-/// What the components of one or several processes measured in one step.
+/// Results of one step, for the components of one or several processes.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Tally {
-    /// Messages acknowledged, those of the warm-up included.
+    /// Acknowledged messages, including the warm-up.
     pub(super) all: u64,
-    /// Messages sent that count.
+    /// Sent messages that count.
     pub(super) sent: u64,
-    /// Messages that the sender's connection refused.
+    /// Messages refused by the sender's connection.
     pub(super) refused: u64,
-    /// From sending to the acknowledgement, of each message that counts and was acknowledged.
+    /// Round trips of all acknowledged messages that count.
     pub(super) latencies: Latencies,
 }
 
@@ -112,30 +112,30 @@ impl Tally {
         self.latencies.merge(&other.latencies);
     }
 
-    /// Messages that count and were not acknowledged.
+    /// Unacknowledged messages that count.
     pub(super) fn lost(&self) -> u64 {
         self.sent.saturating_sub(self.latencies.count())
     }
 }
 
-/// A running child, as its parent sees it.
+/// Handle of a running child.
 pub(super) struct Process {
     name: String,
     child: Child,
-    /// `None` once it is closed, which ends the child.
+    /// `None` once closed, which ends the child.
     orders: Option<ChildStdin>,
     answers: Receiver<String>,
 }
 
 impl Process {
-    /// Starts a child, which `name` names in errors.
+    /// Starts a child; `name` identifies it in errors.
     pub(super) fn start(name: String) -> Result<Self, Failure> {
         let failed = |error| Failure::new(format!("cannot start the {name}: {error}"));
         let program = std::env::current_exe().map_err(failed)?;
         let mut command = Command::new(program);
         command.arg(SUBCOMMAND);
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
-        // Ctrl-C is for the parent; the child then sees the end of its input, and cleans up.
+        // Ctrl-C reaches only the parent; the child then sees the end of its input, and cleans up.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(failed)?;
@@ -155,7 +155,7 @@ impl Process {
         })
     }
 
-    /// Gives an order, without waiting for the answer.
+    /// Sends an order without waiting for the answer.
     pub(super) fn order(&mut self, order: &Order) -> Result<(), Failure> {
         let line = serde_json::to_string(order).map_err(Failure::of)?;
         let written = self
@@ -165,7 +165,7 @@ impl Process {
         written.then_some(()).ok_or_else(|| self.ended())
     }
 
-    /// Waits for the answer to the oldest order that is not answered.
+    /// Waits for the answer to the oldest pending order.
     pub(super) fn answer(&mut self, patience: Duration) -> Result<Answer, Failure> {
         let line = self
             .answers
@@ -186,7 +186,7 @@ impl Process {
         }
     }
 
-    /// Processor time that its main thread, which does all the work, has used. Only Linux says.
+    /// Processor time of its main thread, which does all the work. Linux only.
     pub(super) fn processor_time(&self) -> Option<Duration> {
         let path = format!("/proc/{}/schedstat", self.child.id());
         let text = std::fs::read_to_string(path).ok()?;
@@ -209,7 +209,7 @@ impl Drop for Process {
             }
             std::thread::sleep(step);
         }
-        // An error would mean that it has ended after all.
+        // An error means that it has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

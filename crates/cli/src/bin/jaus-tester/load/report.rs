@@ -1,4 +1,4 @@
-//! What a load measured: as a table, as JSON, and as a chart.
+//! Results of a load test: as a table, as JSON, and as a chart.
 
 use std::fmt;
 use std::path::Path;
@@ -11,19 +11,19 @@ use serde::{Deserialize, Serialize};
 use super::Rate;
 use super::process::Tally;
 
-/// The content of a file of `--json`.
+/// Content of a `--json` file.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Report {
-    /// What was measured, as the chart calls it.
+    /// Name of the measurement in the chart.
     pub(super) name: String,
     pub(super) components: u16,
-    /// Processes that the components are spread over.
+    /// Number of processes with components.
     pub(super) processes: u16,
-    /// Of a message.
+    /// Per message.
     pub(super) octets: u16,
     pub(super) window: u32,
     pub(super) burst: u32,
-    /// For each row.
+    /// Per row.
     pub(super) seconds: f64,
     pub(super) rows: Vec<Row>,
 }
@@ -31,9 +31,9 @@ pub(super) struct Report {
 /// One step of the schedule; times in milliseconds.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Row {
-    /// Messages per second; `None`: as many as possible.
+    /// Messages per second; `None` for as many as possible.
     pub(super) wanted: Option<u32>,
-    /// Messages per second that were acknowledged.
+    /// Acknowledged messages per second.
     pub(super) per_second: f64,
     pub(super) sent: u64,
     pub(super) lost: u64,
@@ -43,8 +43,8 @@ pub(super) struct Row {
     pub(super) p99: f64,
     pub(super) p999: f64,
     pub(super) max: f64,
-    /// Microseconds of processor time for each acknowledged message, of all processes; `None` where
-    /// the operating system does not say.
+    /// Microseconds of processor time per acknowledged message, in all processes; `None` if the
+    /// operating system does not report it.
     pub(super) processor: Option<f64>,
 }
 
@@ -112,7 +112,7 @@ impl Report {
         )
     }
 
-    /// Round trips over the rate that was reached.
+    /// Chart of round trips over the reached rate.
     pub(super) fn plot(&self, beside: Option<&Self>) -> Plot {
         let lines = std::iter::once(self).chain(beside).flat_map(Self::lines);
         Plot {
@@ -130,7 +130,7 @@ impl Report {
         let line = |what: &str, time: fn(&Row) -> f64| {
             let points = self.rows.iter().map(|row| (row.per_second, time(row)));
             let mut points: Vec<_> = points.collect();
-            // A step beyond what is possible may reach less than the one before it.
+            // An overloaded step may reach less than the one before it.
             points.sort_by(|one, other| one.0.total_cmp(&other.0));
             let name = format!("{} {what}", self.name);
             Line { name, points }

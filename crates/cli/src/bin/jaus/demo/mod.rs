@@ -1,5 +1,5 @@
-//! `jaus demo`: the whole vehicle and its operator in one process, which drives a mission and tells
-//! newcomers how.
+//! `jaus demo`: runs a whole vehicle and its operator in one process, drives a mission and explains
+//! it to newcomers.
 
 mod operator;
 mod story;
@@ -89,7 +89,7 @@ impl Demo {
         ))
     }
 
-    /// Brings everything up; gives the component that plays the operator.
+    /// Starts everything; returns the operator's component.
     async fn start(&self, system: &mut System, story: &mut Story) -> Result<Component, Failure> {
         let vehicle = system.node(VEHICLE, 1)?;
         start_part(
@@ -166,7 +166,7 @@ impl Demo {
             .map_err(Failure::of)
     }
 
-    /// With the debug view, unless another program has its port.
+    /// With the debug view, unless another program uses its port.
     fn communicator(&self) -> Communicator {
         Communicator {
             debug: (!self.headless).then_some(DEBUG_ADDRESS),
@@ -174,7 +174,7 @@ impl Demo {
         }
     }
 
-    /// What the operator does.
+    /// Plays the operator.
     async fn play(&self, component: Component, story: &mut Story) -> Result<Ending, Failure> {
         if self.stay {
             story.tell(
@@ -223,7 +223,7 @@ fn start_part(
     story.tell(Who::System, format_args!("starts {id}, the {name}"))
 }
 
-/// A flag's place: `6,5`.
+/// Parses a place: `6,5`.
 fn place(text: &str) -> Result<(f64, f64), String> {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|it| it.is_finite());
     let pair = text

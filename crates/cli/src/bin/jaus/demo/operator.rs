@@ -1,5 +1,5 @@
-//! The demo's own operator: a client like any other, which has the planner drive somewhere and
-//! watches. Whoever takes control on the page has the greater authority, and it lets go.
+//! The demo's operator: an ordinary client that sends the planner a destination and watches. It
+//! yields control to an operator on the page, who has a higher authority.
 
 use std::time::Duration;
 
@@ -15,14 +15,14 @@ use jaus_vehicle::messages::ground::{
 
 use super::story::{Story, Who};
 
-/// Below the page's, which is 200, so that a person can always take over.
+/// Below the page's authority, which is 200, so that a person can always take over.
 const AUTHORITY: u8 = 150;
-/// X, Y and yaw, by their bits in the presence vector of a query and its report.
+/// X, Y and yaw, as bits in the presence vector of a query and its report.
 const POSE: u16 = 0b100_0011;
-/// Between two lines about the way.
+/// Interval of progress lines.
 const LOOK: Duration = Duration::from_secs(2);
 
-/// How a mission ended.
+/// End of a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ending {
     /// At the destination.
@@ -41,7 +41,7 @@ impl<'s> Operator<'s> {
         Self { component, story }
     }
 
-    /// Has the vehicle driven to a place in its local frame, in metres, and waits for the end.
+    /// Has the vehicle drive to a place in its local frame, in metres, and waits for the end.
     pub(super) async fn drive(&mut self, (x, y): (f64, f64)) -> Result<Ending, Failure> {
         let planner = self.find(mission_planner::URN).await?;
         let sensor = self.find(local_pose_sensor::URN).await?;
@@ -72,7 +72,7 @@ impl<'s> Operator<'s> {
         self.component.find(urn).await.map_err(Failure::of)
     }
 
-    /// Tells the stages as they come, and where the vehicle is meanwhile.
+    /// Reports the stages and, in between, the vehicle's position.
     async fn watch(&mut self, planner: JausId, sensor: JausId) -> Result<Ending, Failure> {
         let component = self.component.clone();
         let mut missions = component
@@ -147,7 +147,7 @@ impl<'s> Operator<'s> {
         self.tell(Who::Planner, words)
     }
 
-    /// How many pieces the path has, in words.
+    /// The number of path segments, as text.
     async fn pieces(&self, planner: JausId) -> String {
         let report: Result<ReportPlannedPath, _> =
             self.component.query(planner, &QueryPlannedPath {}).await;
@@ -180,7 +180,7 @@ impl<'s> Operator<'s> {
         }
     }
 
-    /// Gives control back, unless somebody else has it by now.
+    /// Releases control, unless another client has taken it.
     async fn leave(&mut self, control: Control) {
         if control.is_held() {
             control.release().await;

@@ -1,4 +1,4 @@
-//! The narrator of the demo: one line for what happens, with the time and whose doing it is.
+//! Narrates the demo: one line per event, with time and actor.
 
 use std::fmt::Display;
 
@@ -6,7 +6,7 @@ use jaus_cli::failure::Failure;
 use jaus_cli::output::{Output, colours_wanted};
 use jaus_cli::runtime::Clock;
 
-/// Whose doings a line tells.
+/// The actor of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Who {
     System,
@@ -42,7 +42,7 @@ impl Story {
         }
     }
 
-    /// Says something beside the story.
+    /// Prints a line that is not part of the story.
     pub(super) fn line(&mut self, words: impl Display) -> Result<(), Failure> {
         self.output.line(words)
     }
@@ -58,7 +58,7 @@ impl Story {
             .line(format_args!("{}  {on}{name:8}{off}  {words}", self.clock))
     }
 
-    /// Seconds since the beginning.
+    /// Seconds since the start.
     pub(super) fn seconds(&self) -> f64 {
         self.clock.elapsed().as_secs_f64()
     }

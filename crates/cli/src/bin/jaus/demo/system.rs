@@ -1,5 +1,5 @@
-//! The whole G-Bat in one process: three nodes of the vehicle and the operator's, each part a task of
-//! its own, all on loopback. The parts are those that the programs `jaus-…` run.
+//! The whole G-Bat in one process: three vehicle nodes and the operator's, each part as a task, all
+//! on loopback. The parts are those of the programs `jaus-…`.
 
 use std::convert::Infallible;
 use std::path::PathBuf;
@@ -16,19 +16,19 @@ use tokio::task::JoinSet;
 pub(super) const OPERATOR: u16 = 42;
 /// The vehicle's subsystem.
 pub(super) const VEHICLE: u16 = 101;
-/// What the vehicle is called.
+/// Name of the vehicle.
 pub(super) const NAME: &str = "G-Bat";
 
-/// Nodes and the parts that run on them.
+/// Nodes with their parts.
 pub(super) struct System {
     nodes: Vec<Node>,
-    /// Where the knowledge store keeps its file as long as the demo runs.
+    /// File of the knowledge store, kept as long as the demo runs.
     scratch: Scratch,
     parts: JoinSet<(&'static str, PartError)>,
 }
 
 impl System {
-    /// Nobody yet.
+    /// An empty system.
     pub(super) fn new() -> Self {
         Self {
             nodes: Vec::new(),
@@ -39,7 +39,7 @@ impl System {
         }
     }
 
-    /// A knowledge store with the map that a vehicle is shown on.
+    /// A knowledge store with the map that the vehicle is shown on.
     pub(super) fn store(&self) -> KnowledgeStore {
         KnowledgeStore {
             file: self.scratch.0.clone(),
@@ -48,14 +48,14 @@ impl System {
         }
     }
 
-    /// Another node, on loopback.
+    /// Adds a node on loopback.
     pub(super) fn node(&mut self, subsystem: u16, number: u8) -> Result<Node, Failure> {
         let node = Node::start(Config::loopback(subsystem, number)).map_err(Failure::of)?;
         self.nodes.push(node.clone());
         Ok(node)
     }
 
-    /// Another part, under a component number of a node.
+    /// Adds a part under a component number of a node.
     pub(super) fn start(
         &mut self,
         node: &Node,
@@ -82,7 +82,7 @@ impl System {
         Ok(id)
     }
 
-    /// Waits until a part can not go on, which none should come to.
+    /// Waits for a part to fail.
     pub(super) async fn failure(&mut self) -> Failure {
         match self.parts.join_next().await {
             Some(Ok((name, error))) => Failure::new(format!("the {name} can not go on: {error}")),
@@ -91,7 +91,7 @@ impl System {
         }
     }
 
-    /// Ends all parts, then the nodes.
+    /// Stops all parts, then the nodes.
     pub(super) async fn stop(mut self) {
         self.parts.shutdown().await;
         for node in self.nodes {
@@ -100,12 +100,12 @@ impl System {
     }
 }
 
-/// A file that is removed in the end.
+/// A file that is removed at the end.
 struct Scratch(PathBuf);
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // It may never have been made.
+        // It may not exist.
         let _ = fs::remove_file(&self.0);
     }
 }

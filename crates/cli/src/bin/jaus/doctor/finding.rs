@@ -1,10 +1,10 @@
-//! What a check has found, in words and as JSON.
+//! Result of a check, as text and as JSON.
 
 use std::fmt::Display;
 
 use serde_json::{Value as Json, json};
 
-/// How bad it is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mark {
     Ok,
@@ -30,21 +30,21 @@ impl Mark {
     }
 }
 
-/// One thing that was looked at.
+/// One finding.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Finding {
     pub(super) mark: Mark,
-    /// What was looked at, in a word.
+    /// Name of the check, in one word.
     check: &'static str,
-    /// How it is.
+    /// Observed state.
     what: String,
-    /// What to do about it.
+    /// Remedy.
     advice: Option<String>,
 }
 
-/// Columns of a terminal that nobody has widened.
+/// Default width of a terminal, in columns.
 const WIDTH: usize = 80;
-/// Columns before the words: the mark and what was looked at.
+/// Columns before the text: mark and check.
 const INDENT: usize = 21;
 
 impl Finding {
@@ -69,13 +69,13 @@ impl Finding {
         }
     }
 
-    /// Adds what to do.
+    /// Adds a remedy.
     pub(super) fn advice(mut self, advice: impl Display) -> Self {
         self.advice = Some(advice.to_string());
         self
     }
 
-    /// The finding, over as many lines as it needs.
+    /// The finding as text, wrapped.
     pub(super) fn in_words(&self, colours: bool) -> String {
         let name = self.mark.name();
         let mark = match colours {
@@ -103,11 +103,11 @@ impl Finding {
     }
 }
 
-/// Breaks words into lines that begin behind so many columns.
+/// Wraps text into lines with this indentation.
 pub(super) fn wrapped(text: &str, indent: usize) -> String {
     let mut lines = String::new();
     let mut column = indent;
-    // What belongs together has a non-breaking space.
+    // Non-breaking spaces keep phrases together.
     for word in text.split_ascii_whitespace() {
         let length = word.chars().count();
         if column > indent && column + 1 + length > WIDTH {

@@ -1,4 +1,4 @@
-//! What can be seen of this host without going on the network: interfaces, buffers, clock.
+//! Checks of this host without network traffic: interfaces, buffers, clock.
 #![expect(
     clippy::disallowed_methods,
     reason = "it is the clock that is looked at"
@@ -12,7 +12,7 @@ use jaus::node::Config;
 
 use super::finding::Finding;
 
-/// The chosen interfaces, and what is to be said about them.
+/// The chosen interfaces, with findings.
 pub(super) fn interfaces(config: &Config) -> (Vec<Interface>, Vec<Finding>) {
     const CHECK: &str = "interface";
     let chosen = match config.interfaces.choose(config.ip) {
@@ -71,7 +71,7 @@ fn carries(config: &Config, interface: &Interface) -> Finding {
     .advice("name the nodes behind it with --peer ADDRESS (peers in a settings file)")
 }
 
-/// Whether the kernel keeps as much for us as we ask.
+/// Checks whether the kernel grants the requested buffer sizes.
 pub(super) fn buffers(config: &Config) -> Option<Finding> {
     const CHECK: &str = "buffers";
     const LIMIT: &str = "/proc/sys/net/core/rmem_max";
@@ -92,7 +92,7 @@ pub(super) fn buffers(config: &Config) -> Option<Finding> {
     )))
 }
 
-/// Watches whether the time of day runs as steadily as time does.
+/// Compares the time of day with the monotonic clock.
 pub(super) struct ClockWatch {
     started: Instant,
     told: SystemTime,
@@ -117,14 +117,14 @@ impl ClockWatch {
     }
 }
 
-/// `step` is by how many seconds the time of day went ahead of time itself.
+/// `step` is the lead of the time of day over the monotonic clock, in seconds.
 fn clock(since_1970: Duration, step: f64) -> Finding {
     const CHECK: &str = "clock";
     const NTP: &str = "let it follow a time server (`timedatectl set-ntp true`, chrony, or the \
                        vehicle's GNSS)";
-    /// 2025-01-01. This program is younger.
+    /// 2025-01-01, before this program was written.
     const PLAUSIBLE: Duration = Duration::from_secs(1_735_689_600);
-    /// More than any slewing does within a moment.
+    /// More than slewing changes within a moment.
     const STEP: f64 = 0.05;
     if since_1970 < PLAUSIBLE {
         return Finding::warning(

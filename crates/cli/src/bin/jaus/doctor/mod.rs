@@ -1,6 +1,6 @@
-//! `jaus doctor`: looks at everything that keeps nodes from finding each other, and says what to
-//! do. One file per check; a check gives [`Finding`]s. With `--peer` it examines one peer instead:
-//! see [`peer`].
+//! `jaus doctor`: checks everything that keeps nodes from finding each other, and suggests
+//! remedies. One file per check; a check returns [`Finding`]s. With `--peer` it examines one peer
+//! instead: see [`peer`].
 
 mod finding;
 mod host;
@@ -65,7 +65,7 @@ pub(crate) struct Doctor {
     network: Network,
 }
 
-/// How long to listen if nobody says.
+/// Default listening time.
 const LISTEN: Duration = Duration::from_secs(3);
 
 impl Doctor {
@@ -115,7 +115,7 @@ impl Doctor {
     }
 }
 
-/// What leads to the network: interfaces and ports, or Junior.
+/// Checks the paths to the network: interfaces and ports, or Junior.
 fn ways(config: &Config) -> Vec<Finding> {
     #[cfg(unix)]
     if let Some(folder) = &config.junior {
@@ -128,7 +128,7 @@ fn ways(config: &Config) -> Vec<Finding> {
     findings
 }
 
-/// What was found so far; printed as it is found, or at the end as JSON.
+/// Findings so far; printed at once, or at the end as JSON.
 struct Report {
     output: Output,
     colours: bool,

@@ -1,5 +1,4 @@
-//! What is learned by going on the network for a moment: whether multicast comes back, who is
-//! there, and whether two of them have one id.
+//! Checks on the network: whether multicast returns, which peers are present, and duplicate ids.
 
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
@@ -16,11 +15,11 @@ use jaus_cli::runtime;
 use super::finding::Finding;
 use super::ra::RaSystems;
 
-/// Peers that are named one by one.
+/// Maximum number of peers that are named one by one.
 const MOST: usize = 12;
 
-/// Runs a node with the settings, but an id and if need be a port of its own. `wanted` is the id
-/// that the node to come is to have.
+/// Runs a node with the settings, but with a temporary id and, if necessary, another port. `wanted`
+/// is the intended id of the node.
 pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration) -> Vec<Finding> {
     const CHECK: &str = "network";
     let node = match Node::start(config.clone().or_any_free_port()) {
@@ -56,7 +55,7 @@ pub(super) async fn look(config: Config, wanted: Option<JausId>, time: Duration)
     findings
 }
 
-/// Takes note of who is heard from more than one place.
+/// Records ids that are heard from more than one place.
 async fn watch(events: &mut Events, moved: &mut BTreeMap<JausId, BTreeSet<Path>>) {
     while let Some(event) = events.recv().await {
         if let Event::PeerMoved { id, from, to } = event {
@@ -65,7 +64,7 @@ async fn watch(events: &mut Events, moved: &mut BTreeMap<JausId, BTreeSet<Path>>
     }
 }
 
-/// Whether our own words to everybody were heard on the link that they left on.
+/// Checks whether our multicasts return on their own link.
 fn came_back(link: &LinkReport) -> Option<Finding> {
     const CHECK: &str = "multicast";
     let group = link.group?;
@@ -120,8 +119,8 @@ fn who(peers: &[Peer], directory: &Directory) -> Vec<Finding> {
     findings
 }
 
-/// One id, heard from several places: on one network that is a conflict, on several it may be one
-/// node that is on both.
+/// One id, heard from several places: a conflict on one network, possibly a single node on several
+/// networks.
 fn two_of(id: JausId, places: &BTreeSet<Path>) -> Finding {
     const CHECK: &str = "ids";
     let named: Vec<String> = places.iter().map(|path| path.peer.to_string()).collect();
@@ -136,7 +135,7 @@ fn two_of(id: JausId, places: &BTreeSet<Path>) -> Finding {
     )
 }
 
-/// Whether the id that a node is to have is somebody's already.
+/// Checks whether another node already uses the intended id.
 fn is_free(id: JausId, peers: &[Peer]) -> Finding {
     const CHECK: &str = "ids";
     let Some(peer) = peers.iter().find(|peer| peer.id == id) else {

@@ -1,4 +1,4 @@
-//! Whether the ports that a node wants can be had, and who is in the way.
+//! Checks whether the ports of a node are free, and which program occupies them.
 
 use std::net::{SocketAddr, TcpListener};
 #[cfg(unix)]
@@ -14,7 +14,7 @@ use super::finding::Finding;
 
 const CHECK: &str = "port";
 
-/// Opens what a node would open on the interface, and closes it again.
+/// Opens the sockets of a node on the interface, and closes them again.
 pub(super) fn check(config: &Config, interface: &Interface) -> Vec<Finding> {
     let settings = Settings {
         port: config.port,
@@ -30,7 +30,7 @@ pub(super) fn check(config: &Config, interface: &Interface) -> Vec<Finding> {
     let Err(Error::PortTaken { .. }) = &first else {
         return vec![judge(config, interface, first)];
     };
-    // The group may be out of reach too.
+    // The group may be unreachable too.
     let any = Settings {
         port: 0,
         ..settings
@@ -78,7 +78,7 @@ fn judge(config: &Config, interface: &Interface, opened: Result<UdpLink, Error>)
     }
 }
 
-/// The same for a client of Junior, which needs the node manager in the place of ports.
+/// The same for a client of Junior, which needs Junior's node manager instead of ports.
 #[cfg(unix)]
 pub(super) fn check_junior(folder: &Path) -> Finding {
     match junior::check(folder) {
@@ -90,7 +90,7 @@ pub(super) fn check_junior(folder: &Path) -> Finding {
     }
 }
 
-/// The same for the address where TCP connections are taken, if that is wanted.
+/// The same for the TCP listener address, if one is configured.
 pub(super) fn check_tcp(config: &Config) -> Option<Finding> {
     let listen: SocketAddr = config.tcp.listen?.to_string().parse().ok()?;
     Some(match TcpListener::bind(listen) {

@@ -1,5 +1,5 @@
-//! Who speaks the Reference Architecture, and is therefore seen by nobody who speaks AS5669A: such
-//! systems beat on a multicast group of their own.
+//! Detects systems of the Reference Architecture, which AS5669A nodes do not discover: their
+//! heartbeats go to a multicast group of their own.
 
 use std::collections::BTreeMap;
 use std::future::poll_fn;
@@ -15,20 +15,20 @@ use jaus::wire::ra::RaId;
 use super::finding::Finding;
 use super::peer::RA_GROUP;
 
-/// Subsystems that are named one by one.
+/// Maximum number of subsystems that are named one by one.
 const MOST: usize = 12;
 
-/// What is heard in the group of the Reference Architecture.
+/// Systems heard in the group of the Reference Architecture.
 pub(super) struct RaSystems {
     links: Vec<UdpLink>,
     slab: Slab,
-    /// For each subsystem, where it was heard.
+    /// Address of each subsystem.
     heard: BTreeMap<u8, SocketAddr>,
 }
 
 impl RaSystems {
-    /// Joins the group on each interface of the settings, unless they want none; where that cannot
-    /// be, nothing is heard.
+    /// Joins the group on each interface of the settings, unless multicast is off; ignores
+    /// interfaces where that fails.
     pub(super) fn open(config: &Config) -> Self {
         let settings = Settings {
             port: 0,
@@ -49,7 +49,7 @@ impl RaSystems {
         }
     }
 
-    /// Listens, without end.
+    /// Listens until cancelled.
     pub(super) async fn listen(&mut self) {
         loop {
             let (links, slab) = (&mut self.links, &mut self.slab);
@@ -70,7 +70,7 @@ impl RaSystems {
         }
     }
 
-    /// What was heard, in words.
+    /// The findings.
     pub(super) fn findings(&self) -> impl Iterator<Item = Finding> {
         self.heard.iter().map(|(subsystem, from)| {
             let what = format!(

@@ -1,4 +1,4 @@
-//! `jaus jsidl check`: what is wrong with definitions, where, and what to do about it.
+//! `jaus jsidl check`: reports mistakes in definitions, with location and remedy.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

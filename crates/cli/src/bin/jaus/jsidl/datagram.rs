@@ -1,4 +1,4 @@
-//! The rows of an explanation for what the transport puts around messages.
+//! Rows of an explanation for the transport headers around messages.
 
 use bytes::Bytes;
 use jaus::wire::ra::{self, RaId};
@@ -13,12 +13,12 @@ use jsidl::explain::{Explanation, Kind, Row};
 pub(super) struct Datagram {
     octets: Bytes,
     version: Version,
-    /// Each message with where its header begins and where it ends.
+    /// Each message with the offsets of its header and its end.
     frames: Vec<(usize, Frame, usize)>,
 }
 
 impl Datagram {
-    /// The datagram, if the octets are one.
+    /// Decodes the octets, if they are a datagram.
     pub(super) fn recognised(octets: &Bytes) -> Option<Self> {
         let mut frames = judp::frames(octets.clone()).ok()?;
         let version = frames.version();
@@ -53,8 +53,7 @@ impl Datagram {
         )
     }
 
-    /// All rows, and the messages among them that are explained; `explain` gives nothing for what
-    /// nothing is known of.
+    /// All rows, and the explained messages; `explain` returns `None` for unknown messages.
     pub(super) fn rows(
         &self,
         explain: impl Fn(&Frame) -> Result<Option<Explanation>, Failure>,
@@ -73,7 +72,7 @@ impl Datagram {
             if frame.flags.data() != DataControl::Single {
                 rows.unread(end - trailer(frame), PART);
             } else if frame.is_acknowledgement() {
-                // Nothing but a header.
+                // Only a header.
             } else if let Some(message) = explain(frame)? {
                 rows.message(&message, frame.version);
                 messages.push(message);
@@ -89,12 +88,12 @@ impl Datagram {
     }
 }
 
-/// What is said of a fragment.
+/// Note on a fragment.
 const PART: &str = "a part of a large message: put the parts together first";
-/// What is said of data whose layout nothing tells.
+/// Note on data with an unknown layout.
 const NOBODYS: &str = "unknown to the Reference Architecture; --service chooses another layout";
 
-/// Octets of a frame behind its message.
+/// Octets of a frame after its message.
 const fn trailer(frame: &Frame) -> usize {
     match frame.version {
         Version::As5669a => as5669a::TRAILER_LEN,
@@ -113,7 +112,7 @@ fn flags(flags: Flags) -> String {
     )
 }
 
-/// Rows that follow each other.
+/// Consecutive rows.
 struct Rows<'a> {
     octets: &'a [u8],
     position: usize,
@@ -121,7 +120,7 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// A row of the next octets, of which more can be said.
+    /// Adds a row of the next octets, and returns it for additions.
     fn take(&mut self, length: usize, field: &str) -> &mut Row {
         let end = (self.position + length).min(self.octets.len());
         let octets = self.octets.get(self.position..end).unwrap_or_default();
@@ -141,7 +140,7 @@ impl Rows<'_> {
         row
     }
 
-    /// The octets before `end`, if there are any left.
+    /// Adds a row of the unread octets before `end`, if any.
     fn unread(&mut self, end: usize, why: &str) {
         let length = end.saturating_sub(self.position);
         if length > 0 {
@@ -156,7 +155,7 @@ impl Rows<'_> {
             Version::As5669a => self.as5669a(frame),
             Version::As5669 => {
                 self.number(2, "header compression");
-                // The only number in there that is big-endian.
+                // The only big-endian number in the header.
                 let row = self.take(as5669::PREFIX_LEN - 2, "length");
                 row.note = Some("of header and data, big-endian".to_owned());
                 self.ra(frame);
@@ -180,7 +179,7 @@ impl Rows<'_> {
         self.addresses(frame);
     }
 
-    /// The header of the Reference Architecture, which AS5669 took over.
+    /// The header of the Reference Architecture, which AS5669 adopted.
     fn ra(&mut self, frame: &Frame) {
         self.number(2, "properties").note = Some(flags(frame.flags));
         let code = self.number(ra::CODE_LEN, "");
@@ -200,7 +199,7 @@ impl Rows<'_> {
         }
     }
 
-    /// The rows of the message that comes next; in the older headers its code stood before.
+    /// The rows of the next message; in the older headers its code comes earlier.
     fn message(&mut self, message: &Explanation, version: Version) {
         let before = match version {
             Version::As5669a => 0,

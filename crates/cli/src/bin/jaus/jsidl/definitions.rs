@@ -1,4 +1,4 @@
-//! Loading definitions for a subcommand, and printing what is wrong with them.
+//! Loads the definitions of a subcommand and prints findings.
 
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use jsidl::{Diagnostic, Diagnostics, Loaded, Loader, Style, catalogue};
 /// The name of standard input among paths.
 pub(crate) const STANDARD_INPUT: &str = "-";
 
-/// The definitions of these paths, which may refer to the built-in ones.
+/// Loads the definitions of these paths, which may refer to the built-in ones.
 pub(crate) fn load(paths: &[PathBuf]) -> Result<Loaded, Failure> {
     let mut loader = Loader::new();
     for path in paths {
@@ -36,8 +36,8 @@ pub(crate) fn standard_input() -> Result<String, Failure> {
     Ok(text)
 }
 
-/// What is found in the user's own files. Built-in definitions may suffer from them, but that is
-/// not what the user can mend.
+/// Findings in the user's own files. Consequences in built-in definitions are left out, as the user
+/// cannot fix them there.
 pub(crate) fn own_findings(loaded: &Loaded) -> Vec<&Diagnostic> {
     let findings = loaded.diagnostics.iter();
     findings
@@ -45,13 +45,13 @@ pub(crate) fn own_findings(loaded: &Loaded) -> Vec<&Diagnostic> {
         .collect()
 }
 
-/// The services of the user's own files.
+/// Services of the user's own files.
 pub(crate) fn own_services(loaded: &Loaded) -> impl Iterator<Item = &Arc<Service>> + Clone {
     let services = loaded.library.services();
     services.filter(|service| !catalogue::holds(&service.location))
 }
 
-/// Prints a finding on standard error. If nobody reads that, it is not said.
+/// Prints a finding on standard error. Errors are ignored.
 pub(crate) fn complain(diagnostics: &Diagnostics, finding: &Diagnostic) {
     let _ = writeln!(
         io::stderr().lock(),
@@ -60,7 +60,7 @@ pub(crate) fn complain(diagnostics: &Diagnostics, finding: &Diagnostic) {
     );
 }
 
-/// How excerpts look on this standard output or terminal.
+/// Format of excerpts on this terminal.
 pub(crate) fn style() -> Style {
     Style {
         colours: colours_wanted(&io::stdout()),

@@ -1,4 +1,4 @@
-//! `jaus jsidl diff`: what changed between two sets of definitions, and whether the wire is affected.
+//! `jaus jsidl diff`: compares two sets of definitions and reports effects on the wire.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(u8::from(wire > 0)))
 }
 
-/// The definitions of a side. What has errors is not there to be compared, so there may be none.
+/// Loads a side. Definitions with errors cannot be compared and are an error.
 fn sound(path: &Path) -> Result<Loaded, Failure> {
     let loaded = load(&[path.to_owned()])?;
     let findings = own_findings(&loaded);
@@ -76,7 +76,7 @@ fn sound(path: &Path) -> Result<Loaded, Failure> {
     )))
 }
 
-/// The changes of each service under its name.
+/// Prints the changes of each service under its name.
 fn print(output: &mut Output, changes: &[Change]) -> Result<(), Failure> {
     let mut service = None;
     for change in changes {

@@ -1,4 +1,4 @@
-//! `jaus jsidl docs`: definitions as linked pages.
+//! `jaus jsidl docs`: writes definitions as linked pages.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

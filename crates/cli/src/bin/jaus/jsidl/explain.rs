@@ -1,4 +1,4 @@
-//! `jaus jsidl explain`: the octets of a message or datagram, one by one.
+//! `jaus jsidl explain`: explains the octets of a message or datagram, one by one.
 
 use std::cell::LazyCell;
 use std::fs::File;
@@ -19,7 +19,7 @@ use super::datagram::Datagram;
 use super::ra::ReferenceArchitecture;
 use super::sources::{self, Sources};
 
-/// More octets are not read: a datagram has at most 65,507, a large message seldom more than this.
+/// Maximum number of octets: a datagram has at most 65,507, a large message rarely more than this.
 const MOST: u64 = 4 << 20;
 
 /// Explain a message octet by octet: an annotated hex dump
@@ -87,13 +87,13 @@ fn wrong(name: &str, error: &Unexplained) -> Failure {
 struct Explainer {
     library: Library,
     ra: LazyCell<ReferenceArchitecture>,
-    /// Whether what may be of the Reference Architecture is to be taken for it.
+    /// Whether ambiguous messages are taken for the Reference Architecture.
     by_ra: bool,
     service: Option<ServiceName>,
 }
 
 impl Explainer {
-    /// A bare message: whether all of it could be read, and what to print.
+    /// Explains a bare message: whether it was completely readable, and the output.
     fn message(&self, octets: &Bytes, json: bool) -> Result<(bool, String), Failure> {
         let explained = if self.by_ra {
             self.explain_as_ra(octets)
@@ -101,7 +101,7 @@ impl Explainer {
             self.explain(octets)
         };
         let explanation = explained.map_err(|error| {
-            // What begins like a datagram is more likely a damaged one than an unknown message.
+            // An input that begins like a datagram is rather a damaged one than an unknown message.
             let error = match damaged(octets) {
                 Some(damage) => format!("{error}; as a JUDP datagram: {damage}"),
                 None => error.to_string(),
@@ -126,7 +126,7 @@ impl Explainer {
         Ok((complete, text))
     }
 
-    /// What is said of a message that cannot be read, if the Reference Architecture has it.
+    /// A hint for an unreadable message, if the Reference Architecture defines it.
     fn hint(&self, octets: &Bytes) -> Option<&'static str> {
         let of_ra = !self.by_ra && self.explain_as_ra(octets).is_ok_and(|it| it.stop.is_none());
         of_ra.then_some(
@@ -161,8 +161,8 @@ impl Explainer {
         Ok((complete, text))
     }
 
-    /// The message of a frame, by the definitions that its header and its source speak for; nothing
-    /// if these do not know it, and no others are asked for.
+    /// Explains a frame's message by the definitions that its header and source indicate; `None` if
+    /// these do not know it, and no others are requested.
     fn framed(&self, frame: &Frame) -> Result<Option<Explanation>, Unexplained> {
         let older = frame.version != Version::As5669a;
         let as_ra = (older && self.by_ra || RaId::in_header(frame.version, frame.source).is_some())
@@ -191,7 +191,7 @@ impl Explainer {
     }
 }
 
-/// Why octets that begin like a datagram are none. Of the two current transports, the octet behind
+/// Why octets that begin like a datagram are none. In the two current transports, the octet after
 /// the version is always 0.
 fn damaged(octets: &Bytes) -> Option<String> {
     if octets.get(1) != Some(&0) {
@@ -209,7 +209,7 @@ fn title(explanation: &Explanation) -> String {
     )
 }
 
-/// Where reading stopped, and who else defines such a message.
+/// Where decoding stopped, and other services that define the code.
 fn remarks(explanation: &Explanation) -> String {
     let mut text = String::new();
     if let Some(stop) = &explanation.stop {
@@ -228,7 +228,7 @@ fn remarks(explanation: &Explanation) -> String {
     text
 }
 
-/// The octets of a file, of standard input, or those that are written out.
+/// Reads octets from files, standard input or the command line.
 fn octets(input: &[String]) -> Result<Bytes, Failure> {
     let content = match input {
         [only] if only == "-" => read(io::stdin(), Path::new("standard input"))?,
@@ -242,7 +242,7 @@ fn octets(input: &[String]) -> Result<Bytes, Failure> {
             return Ok(octets.into());
         }
     };
-    // Octets that happen to be text of digits only are no message that anybody has seen.
+    // Octets that happen to be digits only are no known message.
     let text = std::str::from_utf8(&content).ok();
     let octets = text.and_then(|text| from_hex(text).ok());
     Ok(octets.unwrap_or(content).into())
@@ -264,7 +264,7 @@ fn read(input: impl Read, path: &Path) -> Result<Vec<u8>, Failure> {
     Ok(content)
 }
 
-/// Digits as people copy them: with blanks, commas, colons or `0x` between octets.
+/// Digits with blanks, commas, colons or `0x` between octets.
 fn from_hex(text: &str) -> Result<Vec<u8>, Failure> {
     let plain = text.replace("0x", " ").replace([',', ':'], " ");
     let octets = jaus_view::from_hex(&plain).map_err(|error| {

@@ -1,4 +1,4 @@
-//! `jaus jsidl fmt`: lays definitions out.
+//! `jaus jsidl fmt`: formats definitions.
 
 use std::fs::{self, File};
 use std::io::Write;
@@ -12,7 +12,7 @@ use jsidl::{Diagnostics, format};
 
 use super::definitions::{STANDARD_INPUT, complain, counted, standard_input};
 
-/// How the namespaces of the language begin.
+/// Prefix of the JSIDL namespaces.
 const NAMESPACE: &str = "urn:jaus:jsidl:";
 
 /// Lay service definitions out: indentation, order of attributes, line width
@@ -85,7 +85,7 @@ impl Run {
         Ok(())
     }
 
-    /// A file that was `found` in a directory and is no definition is passed over.
+    /// Formats a file. One that was `found` in a directory and is no definition is skipped.
     fn file(&mut self, path: &Path, found: bool) -> Result<(), Failure> {
         let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
         match format::format(path, &text) {
@@ -132,9 +132,9 @@ impl Run {
     }
 }
 
-/// Puts a text in the place of a file: a reader sees the old one or the new one, whole.
+/// Replaces a file atomically: a reader sees the old or the new text.
 fn replace(path: &Path, text: &str) -> std::io::Result<()> {
-    // A link stays a link.
+    // Replace the target of a link.
     let path = fs::canonicalize(path)?;
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(std::format!(".{}.tmp", std::process::id()));

@@ -1,4 +1,4 @@
-//! `jaus jsidl lua`: a Wireshark dissector for everything loaded.
+//! `jaus jsidl lua`: writes a Wireshark dissector for all loaded definitions.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -74,7 +74,7 @@ fn with_reference_architecture(mut library: Library) -> Library {
     library
 }
 
-/// The file that is meant: a directory, or what is not there and has no extension, gets a file.
+/// The output file: a directory, or a missing path without extension, gets a file inside.
 fn file(output: &Path) -> PathBuf {
     let is_directory = output.is_dir() || (!output.exists() && output.extension().is_none());
     if is_directory {

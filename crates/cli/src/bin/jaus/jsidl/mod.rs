@@ -1,4 +1,4 @@
-//! `jaus jsidl`: work on service definitions, one file per subcommand.
+//! `jaus jsidl`: works on service definitions, one file per subcommand.
 
 mod check;
 mod datagram;

@@ -1,5 +1,5 @@
-//! Explaining messages of the Reference Architecture: by its own definitions, and with its peers'
-//! habits forgiven, as everywhere else.
+//! Explains messages of the Reference Architecture by its own definitions, with the tolerance for
+//! peers' deviations that decoding has elsewhere.
 
 use bytes::Bytes;
 use jaus_ra::messages;
@@ -21,7 +21,7 @@ impl ReferenceArchitecture {
         }
     }
 
-    /// Explains a whole message, which begins with its code.
+    /// Explains a whole message, beginning with its code.
     pub(super) fn explain(
         &self,
         octets: &Bytes,
@@ -36,7 +36,7 @@ impl ReferenceArchitecture {
     }
 }
 
-/// The octets as they would be without what is forgiven; unchanged if there is more wrong with them.
+/// Corrects tolerated deviations; returns the octets unchanged if there are other errors.
 fn mended(octets: &Bytes) -> Bytes {
     let code = octets.first_chunk().map(|&code| u16::from_le_bytes(code));
     let info = code.and_then(|code| messages::registry().by_code(code).next());
@@ -51,7 +51,7 @@ fn mended(octets: &Bytes) -> Bytes {
     }
 }
 
-/// Puts the octets into a row that came in place of the mended ones, and says so.
+/// Restores the received octets in a row, with a note.
 fn restore(row: &mut Row, came: &[u8]) {
     let length = row.octets.len();
     let start = row.offset.min(came.len());

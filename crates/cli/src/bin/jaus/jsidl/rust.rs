@@ -1,4 +1,4 @@
-//! `jaus jsidl rust`: typed messages for services of a user's own.
+//! `jaus jsidl rust`: writes typed messages of a user's services.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -66,7 +66,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A name that can be that of a module.
+/// Parses a module name.
 fn module(name: &str) -> Result<String, String> {
     let starts_well = name.starts_with(|c: char| c.is_ascii_lowercase() || c == '_');
     let goes_on_well = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';

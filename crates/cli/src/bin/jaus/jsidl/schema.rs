@@ -1,4 +1,4 @@
-//! `jaus jsidl schema`: the JSON view of messages as JSON Schema.
+//! `jaus jsidl schema`: writes the JSON view of messages as JSON Schema.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

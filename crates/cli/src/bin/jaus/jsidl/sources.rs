@@ -1,4 +1,4 @@
-//! The definitions that something is to be made from, and the files that are made.
+//! Input definitions of generators, and their output files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,10 +9,10 @@ use jsidl::{Library, Loaded, Severity, catalogue};
 
 use super::definitions::{self, counted};
 
-/// What was loaded, with what is wrong in it said on standard error.
+/// Loaded definitions; findings are printed on standard error.
 pub(super) struct Sources {
     pub(super) loaded: Loaded,
-    /// Whether the user's own files are without errors.
+    /// Whether the user's own files have no errors.
     pub(super) sound: bool,
 }
 
@@ -29,7 +29,7 @@ pub(super) fn load(paths: &[PathBuf]) -> Result<Sources, Failure> {
     Ok(Sources { loaded, sound })
 }
 
-/// The services of the user's own files alone.
+/// Services of the user's own files.
 pub(super) fn own(loaded: &Loaded) -> Library {
     let mut own = Library::default();
     for service in definitions::own_services(loaded) {
@@ -38,7 +38,7 @@ pub(super) fn own(loaded: &Loaded) -> Library {
     own
 }
 
-/// Writes a file, and makes the directories that lead to it.
+/// Writes a file and creates its directories.
 pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
     if let Some(parent) = path
         .parent()
@@ -59,7 +59,7 @@ pub(super) fn summary(library: &Library) -> String {
     )
 }
 
-/// Which services something is made of: the user's own, or all if no paths are given.
+/// The selected services: the user's own, or all if no paths are given.
 pub(super) fn wanted<P>(
     library: &Library,
     paths: &[P],

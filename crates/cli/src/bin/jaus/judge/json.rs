@@ -1,4 +1,4 @@
-//! The run as JSON lines, one for each step and one for the end.
+//! Writes the run as JSON lines, one per step and one for the end.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use super::report::conclusion;
 use super::subject::Subject;
 use super::verdict::{ObservedMessage, Proceeding, StepResult, Tally};
 
-/// A step as a line.
+/// A line for a step.
 #[derive(Serialize)]
 struct Step<'a> {
     step: String,
@@ -42,7 +42,7 @@ struct Message<'a> {
     line: Line<'a>,
 }
 
-/// The end as a line.
+/// The last line.
 #[derive(Serialize)]
 struct End<'a> {
     subject: String,
@@ -59,7 +59,7 @@ struct End<'a> {
     conclusion: String,
 }
 
-/// A step's line, without its end.
+/// The line of a step, without a line break.
 pub(super) fn step(dictionary: &Dictionary, result: &StepResult) -> String {
     let proceedings = result.proceedings.iter();
     let step = Step {
@@ -110,7 +110,7 @@ fn message<'a>(dictionary: &'a Dictionary, said: &ObservedMessage) -> Message<'a
 }
 
 fn to_line(value: &impl Serialize) -> String {
-    // Serializing into memory fails only for maps without text keys; there are none.
+    // Serialisation into memory fails only for maps without text keys; there are none.
     serde_json::to_string(value).unwrap_or_default()
 }
 

@@ -1,5 +1,4 @@
-//! The judge's five components on the network: they speak, they listen, and they answer what every
-//! component is asked.
+//! The judge's five components on the network: they send, receive, and answer the usual queries.
 #![expect(clippy::disallowed_methods, reason = "the judge works in real time")]
 
 use std::collections::BTreeSet;
@@ -23,7 +22,7 @@ use super::recording::Recording;
 use super::step::{Form, Reach, Speaker};
 use super::verdict::ObservedMessage;
 
-/// What the judge calls itself.
+/// Name of the judge.
 const NAME: &str = "jaus judge";
 
 /// The five components, on two nodes.
@@ -33,12 +32,12 @@ pub(super) struct JudgeNodes {
     ports: [Port; 5],
     subject: JausId,
     form: Form,
-    /// The questions that the subject has put to the judge by itself.
+    /// Queries that the subject has sent to the judge.
     asked: BTreeSet<u16>,
     recording: Option<Recording>,
 }
 
-/// Something that the subject said.
+/// A message from the subject.
 #[derive(Debug)]
 pub(super) struct Heard {
     pub(super) to: Speaker,
@@ -52,14 +51,14 @@ impl Heard {
     }
 }
 
-/// The code at the head of a message.
+/// The code at the start of a message.
 pub(super) fn code_of(octets: &Bytes) -> Option<u16> {
     octets.first_chunk().map(|&code| u16::from_le_bytes(code))
 }
 
 impl JudgeNodes {
     /// Starts the judge's nodes: `id` is the main component's, `config` its node's. The other four
-    /// have a node beside it, on a port of its own.
+    /// components are on a second node, on a port of its own.
     pub(super) fn start(
         id: JausId,
         config: Config,
@@ -67,7 +66,7 @@ impl JudgeNodes {
         recording: Option<Recording>,
     ) -> Result<Self, Failure> {
         let mut other = config.clone();
-        // The last node number has no next one.
+        // The highest node number has no successor.
         other.node = if config.node < JausId::ANY_NODE - 1 {
             config.node + 1
         } else {
@@ -95,22 +94,22 @@ impl JudgeNodes {
         })
     }
 
-    /// The ids of the five, in the order of [`Speaker::ALL`].
+    /// The ids of the five components, in the order of [`Speaker::ALL`].
     pub(super) fn ids(&self) -> [JausId; 5] {
         self.ports.each_ref().map(Port::id)
     }
 
-    /// How requests travel from now on.
+    /// Sets the form of all further requests.
     pub(super) const fn use_form(&mut self, form: Form) {
         self.form = form;
     }
 
-    /// Whether the subject has put this question to the judge.
+    /// Whether the subject has sent this query to the judge.
     pub(super) fn was_asked(&self, query: u16) -> bool {
         self.asked.contains(&query)
     }
 
-    /// Says something to the subject, on behalf of the step that is named.
+    /// Sends a message to the subject, on behalf of the named step.
     pub(super) fn say(
         &mut self,
         from: Speaker,
@@ -143,8 +142,8 @@ impl JudgeNodes {
         Ok(said)
     }
 
-    /// Waits until the deadline for something that the subject says. Its questions are answered
-    /// here, and not passed on.
+    /// Waits for a message of the subject until the deadline. Its queries are answered here and not
+    /// returned.
     pub(super) async fn hear(
         &mut self,
         deadline: Instant,
@@ -174,13 +173,13 @@ impl JudgeNodes {
         }
     }
 
-    /// Takes what has come already, which is too late for the request that it answers.
+    /// Discards messages that arrived already: they are too late for their request.
     pub(super) async fn clear(&mut self, step: &str) -> Result<(), Failure> {
         while self.hear(Instant::now(), step).await?.is_some() {}
         Ok(())
     }
 
-    /// The next message to any of the five.
+    /// The next message to any of the five components.
     async fn receive(&mut self) -> Result<(Speaker, Received), Failure> {
         let ports = &mut self.ports;
         let next = std::future::poll_fn(|cx| {
@@ -195,7 +194,7 @@ impl JudgeNodes {
         next.ok_or_else(|| Failure::new("the judge's node has stopped"))
     }
 
-    /// Answers a question that any component may be asked. Whether it was a question at all.
+    /// Answers a query that every component may receive. Returns whether it was one.
     fn answer(&mut self, to: Speaker, received: &Received) -> Result<bool, Failure> {
         let Some(code) = code_of(&received.payload) else {
             return Ok(false);
@@ -219,7 +218,7 @@ impl JudgeNodes {
         Ok(true)
     }
 
-    /// Leaves the network. Whether the recording is on disk is told as well.
+    /// Leaves the network. Returns an error if the recording is not on disk.
     pub(super) async fn end(self) -> Result<(), Failure> {
         let Self {
             nodes,
@@ -235,7 +234,7 @@ impl JudgeNodes {
     }
 }
 
-/// What the judge says about itself.
+/// The judge's identification.
 fn identification(query: &Bytes) -> Option<Bytes> {
     let query = QueryIdentification::decode(query).ok()?;
     let report = ReportIdentification {
@@ -246,5 +245,5 @@ fn identification(query: &Bytes) -> Option<Bytes> {
     report.encode().ok()
 }
 
-/// How long the nodes are given to know each other's addresses at the beginning.
+/// Time for the nodes to learn each other's addresses at the start.
 pub(super) const SETTLING: Duration = Duration::from_millis(200);

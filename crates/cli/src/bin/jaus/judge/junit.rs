@@ -1,4 +1,4 @@
-//! The run as JUnit XML: a suite for each form, a case for each step.
+//! Writes the run as JUnit XML: a suite per form, a case per step.
 
 use jaus_cli::junit::{self, Case, CaseResult, Suite};
 
@@ -7,7 +7,7 @@ use super::step::Form;
 use super::subject::Subject;
 use super::verdict::{StepResult, Verdict};
 
-/// The whole file.
+/// The whole document.
 pub(super) fn document(report: &Report<'_>, subject: &Subject, results: &[StepResult]) -> String {
     let suites = [Form::Multicast, Form::Unicast].map(|form| {
         let of_form = results.iter().filter(|result| result.form == form);

@@ -1,18 +1,18 @@
-//! What a run remembers from one exchange to the next, and of whom.
+//! State of a run across exchanges, and the judge's components.
 
 use std::collections::BTreeMap;
 
 use jaus::address::JausId;
 use serde_json::Value as Json;
 
-/// One of the five components that the judge speaks with.
+/// One of the judge's five components.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Speaker {
-    /// 42.1.1: asks, subscribes and drives.
+    /// 42.1.1: queries, subscribes and drives.
     Main,
     /// 42.2.1: takes control first.
     First,
-    /// 42.2.2: wants control with too little authority.
+    /// 42.2.2: requests control with too little authority.
     Second,
     /// 42.2.3: takes control from the first.
     Third,
@@ -34,30 +34,30 @@ impl Speaker {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Stream {
     pub(super) id: u8,
-    /// The code of the report that it carries.
+    /// The code of the report in its events.
     pub(super) report: u16,
 }
 
-/// What earlier answers told, for later questions and checks.
+/// Values from earlier answers, for later queries and checks.
 #[derive(Debug)]
 pub(super) struct Memory {
-    /// Who is judged.
+    /// The component under test.
     pub(super) subject: JausId,
     /// The judge's own ids, in the order of [`Speaker::ALL`].
     pub(super) judge_nodes: [JausId; 5],
-    /// The event stream of the steps on events.
+    /// The event stream of the event steps.
     pub(super) event: Option<u8>,
-    /// All event streams that were confirmed and not cancelled, the oldest first.
+    /// All confirmed and not cancelled event streams, the oldest first.
     pub(super) streams: Vec<Stream>,
-    /// The position that was reported before a command that must be ignored.
+    /// The reported position before a command that must be ignored.
     pub(super) position: Option<[f64; 2]>,
-    /// The time stamp of the last report that had one, in milliseconds of the day.
+    /// The time stamp of the last report with one, in milliseconds of the day.
     pub(super) time: Option<u32>,
-    /// What the service that is walked through reported last, by code.
+    /// The last reports of the service under test, by code.
     pub(super) reports: BTreeMap<u16, Json>,
-    /// The last velocity along X, in metres a second.
+    /// The last velocity along X, in m/s.
     pub(super) speed: Option<f64>,
-    /// How many waypoints of the drive have been reached, in their order.
+    /// Number of waypoints reached, in order.
     pub(super) reached: usize,
 }
 
@@ -81,13 +81,13 @@ impl Memory {
         self.judge_nodes[speaker as usize]
     }
 
-    /// The event stream that an earlier step created.
+    /// The event stream of an earlier step.
     pub(super) fn event(&self) -> Result<u8, String> {
         self.event
             .ok_or_else(|| "there is no event: its creation (step B4) was not confirmed".to_owned())
     }
 
-    /// Takes an event stream down as cancelled.
+    /// Notes the cancellation of an event stream.
     pub(super) fn forget_stream(&mut self, id: u8) {
         self.streams.retain(|stream| stream.id != id);
     }

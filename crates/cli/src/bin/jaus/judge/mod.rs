@@ -1,5 +1,5 @@
-//! `jaus judge`: puts a component through the acceptance tests of the public JAUS contests, and
-//! says in words what is wrong.
+//! `jaus judge`: runs the acceptance tests of the public JAUS contests against a component, and
+//! explains failures.
 
 mod json;
 mod judge_nodes;
@@ -125,7 +125,7 @@ pub(crate) struct Judge {
     network: Network,
 }
 
-/// Steps of one part, from one to another: `B14-B19`, `A1`.
+/// A range of steps of one part: `B14-B19`, `A1`.
 #[derive(Debug, Clone, Copy)]
 struct Span {
     first: Name,
@@ -153,7 +153,7 @@ impl FromStr for Span {
     }
 }
 
-/// A number of seconds, with or without an s behind it.
+/// A number of seconds, with an optional s.
 fn seconds(text: &str) -> Result<Duration, String> {
     runtime::seconds(text.strip_suffix('s').unwrap_or(text))
 }
@@ -171,7 +171,7 @@ impl Judge {
         runtime::run(self.judge(address))
     }
 
-    /// The steps that are to be carried out.
+    /// The selected steps.
     fn steps(&self, subject: Option<&Subject>) -> Vec<Step> {
         if !self.service.is_empty() {
             let version = |urn: &str| subject.and_then(|subject| subject.version(urn));
@@ -183,7 +183,7 @@ impl Judge {
         script::selected(script::steps(), chosen)
     }
 
-    /// What the steps are taken from, in words.
+    /// Origin of the steps, as text.
     fn against(&self) -> String {
         if self.service.is_empty() {
             "the contests' script".to_owned()
@@ -241,7 +241,7 @@ impl Judge {
         Ok(Outcome::complete_if(conforms && finished))
     }
 
-    /// All steps in all forms.
+    /// Runs all steps in all forms.
     async fn carry_out(
         &self,
         runner: &mut Runner,

@@ -1,4 +1,4 @@
-//! Everything that a run is written to: the report or JSON lines on standard output, and files.
+//! Outputs of a run: the report or JSON lines on standard output, and files.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, IsTerminal, Write};
@@ -15,19 +15,19 @@ use super::subject::Subject;
 use super::verdict::{StepResult, Tally};
 use super::{Judge, json, junit};
 
-/// The files and streams that a run is written to.
+/// All output files and streams of a run.
 pub(super) struct Outputs<'d> {
     dictionary: &'d Dictionary,
     report: Report<'d>,
     output: Output,
-    /// Whether the report is wanted; else standard output has JSON lines.
+    /// Whether standard output has the report; otherwise it has JSON lines.
     readable: bool,
-    /// Whether a person watches.
+    /// Whether standard output is a terminal.
     watched: bool,
     everything: bool,
     json: Option<(PathBuf, BufWriter<File>)>,
     junit: Option<PathBuf>,
-    /// What the subject is judged by.
+    /// Origin of the steps.
     against: String,
     clock: Clock,
     tally: Tally,
@@ -70,7 +70,7 @@ impl<'d> Outputs<'d> {
         self.lines(&[String::new(), heading])
     }
 
-    /// Tells who watches which step takes its time.
+    /// Shows a person at the terminal which step is running.
     pub(super) fn step_begins(&mut self, step: &Step) -> Result<(), Failure> {
         if !self.watched {
             return Ok(());
@@ -81,7 +81,7 @@ impl<'d> Outputs<'d> {
 
     pub(super) fn step_ends(&mut self, result: StepResult) -> Result<(), Failure> {
         if self.watched {
-            // To the beginning of the line, which is wiped out.
+            // Clears the line.
             self.output.part("\r\x1b[K")?;
         }
         self.tally.count(&result);
@@ -92,7 +92,7 @@ impl<'d> Outputs<'d> {
         Ok(())
     }
 
-    /// Writes the end of everything. Whether the subject conforms.
+    /// Finishes all outputs. Returns whether the subject conforms.
     pub(super) fn end(mut self, subject: &Subject) -> Result<bool, Failure> {
         let took = self.clock.elapsed();
         let end = self.report.end(subject, &self.tally, &self.against, took);
@@ -103,7 +103,7 @@ impl<'d> Outputs<'d> {
             flushed.map_err(|error| Failure::file(path, &error))?;
         }
         if let Some(path) = &self.junit {
-            // A build server shows no colours.
+            // Build servers show no colours.
             let report = Report::new(self.dictionary, false);
             let document = junit::document(&report, subject, &self.results);
             fs::write(path, document).map_err(|error| Failure::file(path, &error))?;

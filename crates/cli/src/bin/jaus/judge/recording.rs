@@ -1,6 +1,6 @@
-//! The run as a capture file. Packets are written as they were said and heard by the judge's
-//! components, with the step that they belong to as a comment; the sequence numbers in them are
-//! counted here, because they are the transport's own.
+//! Records the run as a capture file. Packets are written as the judge's components sent and
+//! received them, with their step as a comment; their sequence numbers are generated here, because
+//! the real ones are internal to the transport.
 #![expect(clippy::disallowed_methods, reason = "a recording has the time of day")]
 
 use std::fs::File;
@@ -16,12 +16,12 @@ use jaus::wire::{Flags, Frame, judp};
 use jaus_cli::failure::Failure;
 use jaus_view::{CaptureWriter, InterfaceNumber, LinkType, Timestamp};
 
-/// Routers that a recorded packet may pass, for want of a better number.
+/// Assumed TTL of recorded packets.
 const TTL: u8 = 16;
-/// Stands for an address that is not known: nobody's.
+/// Stands for an unknown address.
 const UNKNOWN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::UNSPECIFIED), 0);
 
-/// The file that a run is written to.
+/// The capture file of a run.
 pub(super) struct Recording {
     path: PathBuf,
     writer: CaptureWriter<BufWriter<File>>,
@@ -30,7 +30,7 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// Creates the file, over one that is there.
+    /// Creates the file, replacing an existing one.
     pub(super) fn create(path: &Path) -> Result<Self, Failure> {
         let failed = |error: io::Error| Failure::file(path, &error);
         let file = File::create(path).map_err(failed)?;
@@ -47,7 +47,7 @@ impl Recording {
         })
     }
 
-    /// Writes down what one of the judge's components is about to say.
+    /// Records a message that one of the judge's components is about to send.
     pub(super) fn sent(
         &mut self,
         node: &Node,
@@ -69,7 +69,7 @@ impl Recording {
         self.write(source, destination, frame, step)
     }
 
-    /// Writes down what the subject said.
+    /// Records a message of the subject.
     pub(super) fn received(
         &mut self,
         node: &Node,
@@ -96,7 +96,7 @@ impl Recording {
     ) -> Result<(), Failure> {
         frame.sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);
-        // What is longer than a datagram is not of the script, and not written.
+        // The script has no message longer than a datagram; longer ones are not recorded.
         let Ok(datagram) = judp::encode(&frame) else {
             return Ok(());
         };
@@ -116,14 +116,14 @@ impl Recording {
         written.map_err(|error| Failure::file(&self.path, &error))
     }
 
-    /// Sees to it that everything is on disk.
+    /// Flushes everything to disk.
     pub(super) fn end(mut self) -> Result<(), Failure> {
         let flushed = self.writer.flush();
         flushed.map_err(|error| Failure::file(&self.path, &error))
     }
 }
 
-/// An IPv4 address, or nobody's.
+/// An IPv4 address, or the unspecified one.
 const fn octets(address: IpAddr) -> [u8; 4] {
     match address {
         IpAddr::V4(address) => address.octets(),
@@ -132,7 +132,7 @@ const fn octets(address: IpAddr) -> [u8; 4] {
 }
 
 fn now() -> Timestamp {
-    // A clock before 1970 is nobody's.
+    // A clock before 1970 is treated as 1970.
     let time = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default();

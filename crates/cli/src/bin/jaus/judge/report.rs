@@ -1,4 +1,4 @@
-//! The report that people read while the run goes on, and its end.
+//! The readable report of a run, printed step by step, and its conclusion.
 
 use std::time::Duration;
 
@@ -9,16 +9,16 @@ use super::step::Form;
 use super::subject::Subject;
 use super::verdict::{ObservedMessage, Proceeding, StepResult, Tally, Verdict};
 
-/// Octets of a message that are shown at most, as text; lists of services can be long.
+/// Maximum characters of a message's text; lists of services can be long.
 const LONGEST: usize = 400;
 
-/// Writes in words and, on a terminal, in colours.
+/// Formats the report, with colours on a terminal.
 pub(super) struct Report<'d> {
     dictionary: &'d Dictionary,
     colours: bool,
 }
 
-/// The colours, as terminals want them told.
+/// Colours as terminal codes.
 const GREEN: &str = "32";
 const RED: &str = "31";
 const GREY: &str = "90";
@@ -31,7 +31,7 @@ impl<'d> Report<'d> {
         }
     }
 
-    /// Who is judged.
+    /// The component under test.
     pub(super) fn subject(&self, subject: &Subject) -> Vec<String> {
         let name = subject.name.as_ref();
         let name = name.map_or(String::new(), |name| format!(" \"{name}\""));
@@ -48,7 +48,7 @@ impl<'d> Report<'d> {
         lines
     }
 
-    /// What stands above the steps of a form.
+    /// The heading of a form.
     pub(super) fn form(&self, form: Form) -> String {
         match form {
             Form::Multicast => "by multicast, to all components of the node".to_owned(),
@@ -56,7 +56,7 @@ impl<'d> Report<'d> {
         }
     }
 
-    /// One step: a line, and what was said if it went wrong or if all is wanted.
+    /// One step: a line, and its messages if it failed or if all are wanted.
     pub(super) fn step(&self, result: &StepResult, everything: bool) -> Vec<String> {
         let verdict = match result.verdict {
             Verdict::Passed => self.coloured(GREEN, "passed "),
@@ -120,7 +120,7 @@ impl<'d> Report<'d> {
         format!("{from} -> {to}  {}", in_words(self.dictionary, octets))
     }
 
-    /// How it went, and what that means.
+    /// The results and their meaning.
     pub(super) fn end(
         &self,
         subject: &Subject,
@@ -159,7 +159,7 @@ impl<'d> Report<'d> {
 
 const INDENT: &str = "           ";
 
-/// What a run means, in one sentence that promises no more than was tested.
+/// The meaning of a run, in one sentence that promises no more than was tested.
 pub(super) fn conclusion(subject: &Subject, tally: &Tally, against: &str) -> String {
     let id = subject.id;
     let steps = |number| {
@@ -184,7 +184,7 @@ pub(super) fn conclusion(subject: &Subject, tally: &Tally, against: &str) -> Str
     format!("{id} conforms to {against} as tested: {passed} passed{skipped}")
 }
 
-/// A message as its name and its fields.
+/// The name and fields of a message.
 pub(super) fn in_words(dictionary: &Dictionary, octets: &Bytes) -> String {
     let line = dictionary.line(octets);
     let name = line.message.unwrap_or("unknown message");

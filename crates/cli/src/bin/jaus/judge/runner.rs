@@ -1,4 +1,4 @@
-//! Carries out steps: says what they say, waits for what must come, and decides.
+//! Runs steps: sends messages, waits for the required answers, and decides.
 #![expect(clippy::disallowed_methods, reason = "the judge works in real time")]
 
 use std::time::Duration;
@@ -20,17 +20,17 @@ use super::subject::Subject;
 use super::verdict::{ObservedMessage, Proceeding, StepResult, Verdict};
 use super::watch::Observation;
 
-/// Carries out one step after the other.
+/// Runs one step after the other.
 pub(super) struct Runner {
     judge_nodes: JudgeNodes,
     memory: Memory,
-    /// How long an answer may take.
+    /// Timeout of an answer.
     limit: Duration,
-    /// What is going on, as the recording calls it.
+    /// The current step, for the recording.
     step: String,
 }
 
-/// What an act came to: the check, or that the judge itself cannot go on.
+/// Result of an act: the check, or a failure of the judge itself.
 type Came = Result<Check, Failure>;
 
 impl Runner {
@@ -44,13 +44,13 @@ impl Runner {
         }
     }
 
-    /// Says everything in this form from now on, and forgets what was before.
+    /// Starts a form: resets the state and uses the form for all further messages.
     pub(super) fn begin(&mut self, form: Form) {
         self.judge_nodes.use_form(form);
         self.memory = Memory::new(self.memory.subject, self.judge_nodes.ids());
     }
 
-    /// Carries out a step.
+    /// Runs a step.
     pub(super) async fn carry_out(
         &mut self,
         step: &Step,
@@ -115,13 +115,13 @@ impl Runner {
             }
         }
         for exchange in &step.afterwards {
-            // Whatever comes of it; the step has been decided.
+            // The result does not matter; the step is already decided.
             let _ = self.exchange(exchange, &mut Vec::new()).await?;
         }
         Ok(check)
     }
 
-    /// Says something, and waits for all that must come.
+    /// Sends a message, and waits for all required answers.
     async fn exchange(&mut self, exchange: &Exchange, proceedings: &mut Vec<Proceeding>) -> Came {
         self.judge_nodes.clear(&self.step).await?;
         let octets = match (exchange.content)(&self.memory) {
@@ -143,7 +143,7 @@ impl Runner {
         let deadline = start + patience;
         let mut missing: Vec<&Expectation> = exchange.expects.iter().collect();
         let mut check = Ok(());
-        // Why the latest part of an answer is not the one that is looked for.
+        // Why the latest part of an answer is wrong.
         let mut wrong = None;
         while check.is_ok() && !missing.is_empty() {
             let Some(heard) = self.judge_nodes.hear(deadline, &self.step).await? else {
@@ -156,7 +156,7 @@ impl Runner {
             };
             let is_it = |one: &&Expectation| heard.code() == Some(one.code) && heard.to == one.to;
             let found = missing.iter().position(is_it);
-            // Events run beside everything else.
+            // Events arrive independently of the exchange.
             if found.is_some() || heard.code() != Some(Event::CODE) {
                 proceeding.came.push(self.said(&heard));
             }
@@ -174,7 +174,7 @@ impl Runner {
         Ok(check)
     }
 
-    /// Says something, and sees to it that nothing comes of it.
+    /// Sends a message, and requires that it has no effect.
     async fn be_ignored(
         &mut self,
         exchange: &Exchange,
@@ -200,7 +200,7 @@ impl Runner {
         Ok(check)
     }
 
-    /// Waits until the subject has put a question to the judge.
+    /// Waits for a query of the subject to the judge.
     async fn be_asked(
         &mut self,
         code: u16,
@@ -224,7 +224,7 @@ impl Runner {
         )))
     }
 
-    /// Listens to event streams.
+    /// Observes event streams.
     async fn watch(
         &mut self,
         observation: Result<Observation, String>,
@@ -249,7 +249,7 @@ impl Runner {
         Ok(observation.check())
     }
 
-    /// Repeats exchanges until something is reached.
+    /// Repeats exchanges until a condition is reached.
     async fn until(&mut self, until: &Until, proceedings: &mut Vec<Proceeding>) -> Came {
         let start = Instant::now();
         let mut next = start;
@@ -275,7 +275,7 @@ impl Runner {
         Ok(check.map_err(|reason| format!("{reason}, within {} s", until.at_most.as_secs_f64())))
     }
 
-    /// Repeats exchanges for a time, in which something must hold.
+    /// Repeats exchanges for a time, during which a condition must hold.
     async fn throughout(
         &mut self,
         throughout: &Throughout,
@@ -306,7 +306,7 @@ impl Runner {
         Ok(check.map_err(|reason| format!("{reason} after {lasted:.1} s of commands")))
     }
 
-    /// Leaves the subject as it was found: no events, no emergency, nobody in control.
+    /// Restores the subject's initial state: no events, no emergency, no controller.
     pub(super) async fn tidy(&mut self) -> Result<(), Failure> {
         self.step = "tidying up".to_owned();
         let streams = std::mem::take(&mut self.memory.streams);
@@ -337,9 +337,9 @@ impl Runner {
         said.map(drop)
     }
 
-    /// Lets time pass; questions of the subject are answered meanwhile.
+    /// Waits, and answers the subject's queries meanwhile.
     async fn listen_until(&mut self, deadline: Instant) -> Result<(), Failure> {
-        // What comes is of no interest; the next exchange begins with a clear desk anyway.
+        // The messages do not matter; the next exchange clears the queue anyway.
         while let Some(heard) = self.judge_nodes.hear(deadline, &self.step).await? {
             drop(heard);
         }
@@ -347,7 +347,7 @@ impl Runner {
         Ok(())
     }
 
-    /// Ends the judge's nodes.
+    /// Stops the judge's nodes.
     pub(super) async fn end(self) -> Result<(), Failure> {
         self.judge_nodes.end().await
     }
@@ -369,7 +369,7 @@ impl Runner {
         format!("{name} ({code:04X}h) to {to}{colon}{words}")
     }
 
-    /// Why nothing that came will do.
+    /// Explains why no received message is acceptable.
     fn silence(&self, missing: &Expectation, proceeding: &Proceeding) -> String {
         let (name, to) = (missing.name, self.memory.id(missing.to));
         let limit = self.limit.as_secs_f64();
@@ -386,9 +386,9 @@ impl Runner {
     }
 }
 
-/// How long something is waited for that need not come.
+/// Timeout of an optional answer.
 const OPTIONAL: Duration = Duration::from_millis(300);
-/// How long the last commands are given to arrive.
+/// Time for the last commands to arrive.
 const TIDYING: Duration = Duration::from_millis(100);
 
 /// The name of a message, or its code.

@@ -1,7 +1,7 @@
-//! What a step is made of: the vocabulary in which the script is written.
+//! Types for the steps of the script.
 //!
-//! A step is data: who says what, what must come back, and in which words a wrong answer is told.
-//! Nothing here sends or waits; the [runner](super::runner) does.
+//! A step is data: the sender and content of a message, the required answers, and the wording of a
+//! failure. Nothing here sends or waits; the [runner](super::runner) does.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -14,16 +14,16 @@ use jaus::codec::Message;
 use super::memory::Memory;
 pub(super) use super::memory::{Speaker, Stream};
 
-/// Where the steps come from.
+/// Origin of steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
     /// The six tasks of the challenges of 2010 to 2013.
     A,
     /// The interface tasks of the challenges since 2014.
     B,
-    /// What the judges look at besides answers: safety.
+    /// Safety, which the judges check besides answers.
     C,
-    /// One service's definition.
+    /// A service's definition.
     S,
 }
 
@@ -63,10 +63,10 @@ impl FromStr for Name {
     }
 }
 
-/// How a request travels.
+/// Addressing of requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Form {
-    /// As a global broadcast to all components of the subject's node, as the contests' tool asks.
+    /// As a global broadcast to all components of the subject's node, as the contests' tool does.
     Multicast,
     /// To the subject alone.
     Unicast,
@@ -81,53 +81,53 @@ impl Form {
     }
 }
 
-/// What a check says: all is well, or what is wrong, in words.
+/// Result of a check: success, or an explanation of the failure.
 pub(super) type Check = Result<(), String>;
 
 /// One step of the script.
 pub(super) struct Step {
     pub(super) name: Name,
     pub(super) title: Cow<'static, str>,
-    /// URNs of the services without which the step says nothing.
+    /// URNs of the services that the step requires.
     pub(super) needs: Vec<&'static str>,
-    /// The steps of the same part that must have run before, because they leave the subject as
-    /// this one expects it.
+    /// The steps of the same part that must run before, because they set the state that this one
+    /// expects.
     pub(super) rests_on: &'static [u8],
-    /// Whether the contests' tool asks this by unicast only.
+    /// Whether the contests' tool sends this by unicast only.
     pub(super) by_unicast_only: bool,
     pub(super) acts: Vec<Act>,
-    /// What is said at the end, however the step went; answers to it are not judged.
+    /// Messages sent at the end, whatever the result; answers to them are not judged.
     pub(super) afterwards: Vec<Exchange>,
 }
 
-/// A part of a step. The first that goes wrong ends the step.
+/// A part of a step. The first failure ends the step.
 pub(super) enum Act {
-    /// Something is said, and answered.
+    /// A message with its answers.
     Exchange(Exchange),
-    /// The subject puts a question to the judge by itself.
+    /// A query that the subject must send to the judge.
     Asked {
         code: u16,
         name: &'static str,
         within: Duration,
     },
-    /// Event streams run at their rate.
+    /// Event streams must run at their rate.
     Watch(Watch),
-    /// Event streams have ended: nothing comes for this time.
+    /// Event streams have ended: no event may arrive for this time.
     Silence { streams: Streams, lasting: Duration },
-    /// Something is said that must be ignored: for this time nothing comes but events.
+    /// A message that must be ignored: for this time nothing but events may arrive.
     Ignored {
         exchange: Exchange,
         lasting: Duration,
     },
-    /// Time for the subject.
+    /// Waits for the subject.
     Pause(Duration),
-    /// The exchanges are repeated until the check says that the end is reached.
+    /// Repeats the exchanges until the check reports the end.
     Until(Until),
-    /// The exchanges are repeated for a time, in which the check must never fail.
+    /// Repeats the exchanges for a time, during which the check must never fail.
     Throughout(Throughout),
 }
 
-/// What is said, to whom it is up to answer, and how.
+/// A message with its receiver and the required answers.
 pub(super) struct Exchange {
     pub(super) from: Speaker,
     pub(super) content: Content,
@@ -135,71 +135,71 @@ pub(super) struct Exchange {
     pub(super) expects: Vec<Expectation>,
 }
 
-/// Makes a message; the reason why it cannot be made is one to fail the step.
+/// Creates a message; an error fails the step.
 pub(super) type Content = Box<dyn Fn(&Memory) -> Result<Bytes, String>>;
 
-/// Looks at the octets of a message, and notes what later steps need.
+/// Checks the octets of a message, and stores values for later steps.
 pub(super) type Look = Box<dyn Fn(&Bytes, &mut Memory) -> Check>;
 
-/// Whom a message is for, in the multicast form.
+/// Destination of a message in the multicast form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reach {
     /// All components of the subject's node.
     Node,
-    /// Everybody.
+    /// All components.
     Everyone,
-    /// The subject's component alone, in both forms.
+    /// Only the subject's component, in both forms.
     Component,
 }
 
-/// A message that must come.
+/// A required message.
 pub(super) struct Expectation {
     pub(super) to: Speaker,
     pub(super) code: u16,
     pub(super) name: &'static str,
-    /// What it must say, in words.
+    /// Its required content, as text.
     pub(super) words: Cow<'static, str>,
     pub(super) check: Look,
-    /// Whether the step goes on if it does not come, which then is waited for less long.
+    /// Whether the step continues without it; the timeout is then shorter.
     pub(super) is_optional: bool,
-    /// Whether the answer may come in several messages, of which one must be right.
+    /// Whether the answer may span several messages, of which one must be right.
     pub(super) in_parts: bool,
 }
 
-/// Which event streams are meant: their ids and the codes of the reports in them, as remembered.
+/// Selects event streams: their ids and report codes, from the memory.
 pub(super) type Streams = fn(&Memory) -> Result<Vec<Stream>, String>;
 
-/// Periodic events to the main speaker, watched for a while.
+/// Periodic events to the main speaker, observed for a while.
 pub(super) struct Watch {
     pub(super) streams: Streams,
     pub(super) period: Duration,
-    /// How many events of each stream are to be seen.
+    /// Number of events to observe in each stream.
     pub(super) events: usize,
 }
 
-/// Something that takes its time, such as a drive.
+/// An action that takes time, such as a drive.
 pub(super) struct Until {
-    /// What is to be reached, in words.
+    /// The end condition, as text.
     pub(super) words: &'static str,
     pub(super) exchanges: Vec<Exchange>,
-    /// Looked at after each round: whether it is reached, or what is still wanting, in words.
+    /// Checked after each round: success, or what is missing, as text.
     pub(super) reached: fn(&Memory) -> Check,
     pub(super) every: Duration,
     pub(super) at_most: Duration,
 }
 
-/// Something that must not happen, however long it is provoked.
+/// A condition that must hold despite provocation.
 pub(super) struct Throughout {
-    /// What must hold, in words.
+    /// The condition, as text.
     pub(super) words: &'static str,
     pub(super) exchanges: Vec<Exchange>,
-    /// Looked at after each round.
+    /// Checked after each round.
     pub(super) holds: fn(&Memory) -> Check,
     pub(super) every: Duration,
     pub(super) lasting: Duration,
 }
 
-/// Begins a step.
+/// Creates a step.
 pub(super) fn step(part: Part, number: u8, title: impl Into<Cow<'static, str>>) -> Step {
     Step {
         name: Name { part, number },
@@ -228,12 +228,12 @@ impl Step {
         self
     }
 
-    /// Says something that is not answered.
+    /// Adds a message without an answer.
     pub(super) fn tell(self, from: Speaker, message: impl Message) -> Self {
         self.act(Act::Exchange(Exchange::new(from, message)))
     }
 
-    /// Says something that must be answered.
+    /// Adds a message with a required answer.
     pub(super) fn ask<R: Message>(
         self,
         from: Speaker,
@@ -246,7 +246,7 @@ impl Step {
         ))
     }
 
-    /// The last exchange must also bring this, to another speaker.
+    /// Requires an additional message to another speaker from the last exchange.
     pub(super) fn also<R: Message>(
         mut self,
         to: Speaker,
@@ -265,14 +265,14 @@ impl Step {
         self
     }
 
-    /// Adds something that is not answered, to be said at the end in any case, before everything
-    /// else that is.
+    /// Adds a message without an answer, sent at the end in any case, before all others of that
+    /// kind.
     pub(super) fn finally(mut self, exchange: Exchange) -> Self {
         self.afterwards.insert(0, exchange);
         self
     }
 
-    /// Adds something that is answered, to be said at the end in any case.
+    /// Adds a message with an answer, sent at the end in any case.
     pub(super) fn afterwards<R: Message>(mut self, from: Speaker, message: impl Message) -> Self {
         let exchange = Exchange::new(from, message);
         let exchange = exchange.expect(from, "", |_: &R, _| Ok(()));
@@ -282,12 +282,12 @@ impl Step {
 }
 
 impl Exchange {
-    /// Says a message that is always the same.
+    /// A fixed message.
     pub(super) fn new(from: Speaker, message: impl Message) -> Self {
         Self::with(from, move |_| Ok(message.clone()))
     }
 
-    /// Says a message that depends on what came before.
+    /// A message that depends on earlier answers.
     pub(super) fn with<M: Message>(
         from: Speaker,
         message: impl Fn(&Memory) -> Result<M, String> + 'static,
@@ -302,7 +302,7 @@ impl Exchange {
         }
     }
 
-    /// Says these octets.
+    /// A message of these octets.
     pub(super) fn octets(from: Speaker, octets: Bytes) -> Self {
         Self {
             from,
@@ -327,7 +327,7 @@ impl Exchange {
         self
     }
 
-    /// The answer may come in several messages: lists can be long.
+    /// The answer may span several messages: lists can be long.
     pub(super) fn in_parts(mut self) -> Self {
         if let Some(expectation) = self.expects.last_mut() {
             expectation.in_parts = true;
@@ -363,13 +363,13 @@ impl Expectation {
         }
     }
 
-    /// Whether a message is as it must be; the reason begins with the message's name.
+    /// Checks a message; the reason of a failure begins with the message's name.
     pub(super) fn look_at(&self, octets: &Bytes, memory: &mut Memory) -> Check {
         (self.check)(octets, memory).map_err(|reason| format!("{}: {reason}", self.name))
     }
 }
 
-/// Whether a value is as it must be.
+/// Requires a value.
 #[expect(
     clippy::needless_pass_by_value,
     reason = "numbers and words made for the comparison"
@@ -382,7 +382,7 @@ pub(super) fn equal<T: PartialEq + fmt::Display>(what: &str, is: T, must_be: T) 
     }
 }
 
-/// Whether a measured value is as it must be, but for `slack`.
+/// Requires a measured value within `slack`.
 pub(super) fn near(what: &str, is: f64, must_be: f64, slack: f64) -> Check {
     if (is - must_be).abs() <= slack {
         Ok(())
@@ -391,7 +391,7 @@ pub(super) fn near(what: &str, is: f64, must_be: f64, slack: f64) -> Check {
     }
 }
 
-/// Whether something is there.
+/// Requires a value to be present.
 pub(super) fn present<T>(what: &str, value: Option<T>) -> Result<T, String> {
     value.ok_or_else(|| format!("{what} is missing"))
 }

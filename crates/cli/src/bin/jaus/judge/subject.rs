@@ -1,4 +1,4 @@
-//! Whom is judged: whether it is there, and what it offers.
+//! The component under test: presence and offered services.
 #![expect(clippy::disallowed_methods, reason = "the judge works in real time")]
 
 use std::collections::BTreeMap;
@@ -19,23 +19,22 @@ use tokio::time::Instant;
 use super::judge_nodes::{JudgeNodes, SETTLING, code_of};
 use super::step::{Reach, Speaker};
 
-/// How often each question is put, because the first datagrams may be lost while addresses are
-/// learned.
+/// Attempts of each query, because the first datagrams may be lost while addresses are learned.
 const TRIES: u32 = 3;
-/// What the recording calls this.
+/// Step name in the recording.
 const STEP: &str = "before the steps";
 
-/// The component that is judged.
+/// The component under test.
 #[derive(Debug)]
 pub(super) struct Subject {
     pub(super) id: JausId,
     pub(super) name: Option<String>,
-    /// URNs with major and minor version; `None` if it does not say.
+    /// URNs with major and minor version; `None` if not reported.
     pub(super) services: Option<BTreeMap<String, (u8, u8)>>,
 }
 
 impl Subject {
-    /// Finds out about the subject. `None` if it answers nothing at all.
+    /// Queries the subject. `None` if it does not answer at all.
     pub(super) async fn meet(
         judge_nodes: &mut JudgeNodes,
         id: JausId,
@@ -51,7 +50,7 @@ impl Subject {
             Some(report.identification.to_string_lossy().into_owned())
         });
         let mut is_there = report.is_some();
-        // Everybody asks, so that the address is known on both nodes.
+        // All five send, so that both nodes learn the address.
         for speaker in Speaker::ALL {
             let answer = if is_there {
                 ask(judge_nodes, speaker, &identify, code, SETTLING).await?
@@ -68,12 +67,12 @@ impl Subject {
         Ok(is_there.then_some(Self { id, name, services }))
     }
 
-    /// The version in which it offers a service.
+    /// The version of an offered service.
     pub(super) fn version(&self, urn: &str) -> Option<(u8, u8)> {
         self.services.as_ref()?.get(urn).copied()
     }
 
-    /// The first of these services that it does not offer.
+    /// The first of these services that is not offered.
     pub(super) fn lacks(&self, urns: &[&'static str]) -> Option<&'static str> {
         let services = self.services.as_ref()?;
         let mut urns = urns.iter().copied();
@@ -127,7 +126,7 @@ fn query_services(subject: JausId) -> QueryServices {
     }
 }
 
-/// The services of the subject's component. Some peers list it under the number that means all.
+/// Services of the subject's component. Some peers list it under the wildcard number.
 fn services(octets: &Bytes, subject: JausId) -> Option<BTreeMap<String, (u8, u8)>> {
     let report = ReportServices::decode(octets).ok()?;
     let nodes = report.node_list.iter();

@@ -1,4 +1,4 @@
-//! What a run finds: one result for each step, with everything that was said.
+//! Results of a run: one per step, with all messages.
 
 use std::time::Duration;
 
@@ -7,13 +7,13 @@ use jaus::address::JausId;
 
 use super::step::{Form, Name};
 
-/// What became of a step.
+/// Result of a step.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Verdict {
     Passed,
-    /// With the reason in words.
+    /// With the reason as text.
     Failed(String),
-    /// With the reason in words, such as a service that the subject does not offer.
+    /// With the reason as text, such as a missing service.
     Skipped(String),
 }
 
@@ -26,7 +26,7 @@ impl Verdict {
         }
     }
 
-    /// Why it failed or was skipped.
+    /// The reason of a failure or a skip.
     pub(super) fn reason(&self) -> Option<&str> {
         match self {
             Self::Passed => None,
@@ -35,7 +35,7 @@ impl Verdict {
     }
 }
 
-/// A step that was carried out, or skipped.
+/// A step with its result.
 #[derive(Debug)]
 pub(super) struct StepResult {
     pub(super) name: Name,
@@ -43,7 +43,7 @@ pub(super) struct StepResult {
     pub(super) form: Form,
     pub(super) verdict: Verdict,
     pub(super) took: Duration,
-    /// What was said and heard, in order, up to the first thing that was wrong.
+    /// Messages in order, up to the first failure.
     pub(super) proceedings: Vec<Proceeding>,
 }
 
@@ -51,12 +51,12 @@ pub(super) struct StepResult {
 #[derive(Debug)]
 pub(super) struct Proceeding {
     pub(super) sent: Option<ObservedMessage>,
-    /// What had to come, in words; empty if nothing had to.
+    /// The required messages, as text; empty if none.
     pub(super) expected: Vec<String>,
     pub(super) came: Vec<ObservedMessage>,
-    /// What was measured, in words.
+    /// The measurement, as text.
     pub(super) measured: Option<String>,
-    /// From the request to the last of the answers that had to come.
+    /// From the request to the last required answer.
     pub(super) latency: Option<Duration>,
 }
 
@@ -68,7 +68,7 @@ pub(super) struct ObservedMessage {
     pub(super) octets: Bytes,
 }
 
-/// How a whole run ended, in numbers.
+/// Results of a whole run, in numbers.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     pub(super) passed: usize,
@@ -92,12 +92,12 @@ impl Tally {
         self.passed + self.failed + self.skipped
     }
 
-    /// Whether the subject may be said to conform, as tested: something was, and nothing failed.
+    /// Whether the subject conforms, as tested: at least one step passed and none failed.
     pub(super) const fn conforms(&self) -> bool {
         self.failed == 0 && self.passed > 0
     }
 
-    /// The median and the greatest of the times that answers took.
+    /// The median and the maximum of the answer times.
     pub(super) fn latency(&self) -> Option<(Duration, Duration)> {
         let mut sorted = self.latencies.clone();
         sorted.sort_unstable();

@@ -1,4 +1,4 @@
-//! Event streams as they arrive: whether they run at their rate, in order, or not at all.
+//! Observes event streams: their rate, order and silence.
 
 use std::time::Duration;
 
@@ -10,21 +10,21 @@ use tokio::time::Instant;
 use super::judge_nodes::code_of;
 use super::step::{Check, Stream, Watch};
 
-/// How far the mean of a stream's intervals may be from its period.
+/// Tolerance of a stream's mean interval, relative to its period.
 const MEAN_SLACK: f64 = 0.1;
-/// How far a single interval may be from the period: much can delay one message.
+/// Tolerance of a single interval: one message may be delayed by many causes.
 const INTERVAL_SLACK: f64 = 0.5;
 
-/// Some event streams, observed for a while.
+/// Event streams under observation.
 pub(super) struct Observation {
     streams: Vec<Observed>,
     purpose: Purpose,
 }
 
 enum Purpose {
-    /// So many events of each stream are to come at this rate.
+    /// A number of events of each stream must arrive at this rate.
     Running { period: Duration, events: usize },
-    /// Nothing is to come for this time.
+    /// No event may arrive for this time.
     Silent { lasting: Duration },
 }
 
@@ -36,7 +36,7 @@ struct Observed {
 struct Arrival {
     at: Instant,
     sequence: u8,
-    /// The code of the report in the event.
+    /// The code of the report in its events.
     report: Option<u16>,
 }
 
@@ -61,7 +61,7 @@ impl Observation {
         }
     }
 
-    /// How long to listen at most.
+    /// Maximum duration of the observation.
     pub(super) fn at_most(&self, limit: Duration) -> Duration {
         match self.purpose {
             Purpose::Running { period, events } => period * (events as u32) + limit,
@@ -69,8 +69,8 @@ impl Observation {
         }
     }
 
-    /// Takes down an event, if it is of one of the streams. Events are told apart by the report
-    /// too, because some peers give the same id to several streams.
+    /// Records an event of one of the streams. Events are identified by their report too, because
+    /// some peers give one id to several streams.
     pub(super) fn note(&mut self, at: Instant, octets: &Bytes) {
         let Ok(event) = Event::decode(octets) else {
             return;
@@ -94,10 +94,10 @@ impl Observation {
         }
     }
 
-    /// Whether there is nothing left to wait for.
+    /// Whether the observation is complete.
     pub(super) fn is_complete(&self) -> bool {
         match self.purpose {
-            // The first event may come at once, and says nothing about the rate.
+            // The first event may arrive at once, and is no evidence of the rate.
             Purpose::Running { events, .. } => {
                 self.streams.iter().all(|one| one.arrivals.len() > events)
             }
@@ -105,7 +105,7 @@ impl Observation {
         }
     }
 
-    /// What must come.
+    /// The requirement, as text.
     pub(super) fn in_words(&self) -> String {
         match self.purpose {
             Purpose::Running { period, .. } => format!(
@@ -118,7 +118,7 @@ impl Observation {
         }
     }
 
-    /// What came, in numbers.
+    /// The measurement, in numbers.
     pub(super) fn measured(&self) -> String {
         let streams = self.streams.iter().map(|one| {
             let (id, events) = (one.stream.id, one.arrivals.len());
@@ -186,7 +186,7 @@ impl Observed {
         ))
     }
 
-    /// Seconds from one event to the next, without the first, which may come at any time.
+    /// Intervals in seconds, without the first, which may be of any length.
     fn intervals(&self) -> impl Iterator<Item = f64> + '_ {
         let rest = self.arrivals.get(1..).unwrap_or_default();
         rest.windows(2)
@@ -198,7 +198,7 @@ impl Observed {
         (count > 0).then(|| self.intervals().sum::<f64>() / count as f64)
     }
 
-    /// How far the worst interval is from the mean.
+    /// Deviation of the worst interval from the mean.
     fn jitter(&self) -> Option<Duration> {
         let mean = self.mean()?;
         let off = self.intervals().map(|interval| (interval - mean).abs());

@@ -1,4 +1,4 @@
-//! `jaus monitor`: a table of peers, links and drops that stays up to date.
+//! `jaus monitor`: shows a live table of peers, links and drops.
 
 mod sample;
 mod table;
@@ -87,8 +87,7 @@ enum Sort {
     Heard,
 }
 
-/// Peers that are probed in one interval, so that probing costs a network little however many
-/// there are.
+/// Maximum number of peers probed per interval, to limit the network load.
 const PROBES: usize = 20;
 
 impl Monitor {
@@ -161,11 +160,11 @@ impl Monitor {
     }
 }
 
-/// Asks peers for a heartbeat and an acknowledgement, by which the node measures round trips.
+/// Sends peers a query that wants an acknowledgement, so that the node measures round trips.
 struct Probe {
     sender: Sender,
     question: Bytes,
-    /// Who was asked last.
+    /// The last probed peer.
     latest: Option<JausId>,
 }
 
@@ -178,7 +177,7 @@ impl Probe {
         })
     }
 
-    /// Asks the next ones, all in their turn.
+    /// Probes the next peers in turn.
     fn ask(&mut self, sample: &Sample, own: JausId) {
         let ids: Vec<JausId> = sample.ids().filter(|&id| id != own).collect();
         let begin = ids.partition_point(|&id| Some(id) <= self.latest);

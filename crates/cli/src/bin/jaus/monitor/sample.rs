@@ -1,4 +1,4 @@
-//! What a node has counted at one moment, and what has happened between two.
+//! Counters of a node at one moment, and the changes between two.
 #![expect(clippy::disallowed_methods, reason = "rates are per second")]
 
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use jaus::node::{LinkReport, Node};
 use serde_json::{Value as Json, json};
 use tokio::time::Instant;
 
-/// A node's numbers at one moment.
+/// Counters of a node at one moment.
 pub(super) struct Sample {
     time: Instant,
     peers: BTreeMap<JausId, Peer>,
@@ -19,7 +19,7 @@ pub(super) struct Sample {
     drops: BTreeMap<Counter, u64>,
 }
 
-/// What to show: everything per second.
+/// Displayed values, all per second.
 pub(super) struct View {
     pub(super) peers: Vec<PeerRow>,
     pub(super) links: Vec<LinkRow>,
@@ -77,7 +77,7 @@ impl Sample {
         self.peers.keys().copied()
     }
 
-    /// What has happened since `before`, without what concerns `own`.
+    /// The changes since `before`, without those of `own`.
     pub(super) fn since(&self, before: &Self, directory: &Directory, own: JausId) -> View {
         let seconds = (self.time - before.time).as_secs_f64();
         let others = self.peers.values().filter(|peer| peer.id != own);
@@ -153,7 +153,7 @@ fn link_row(link: &LinkReport, before: &Sample, seconds: f64) -> LinkRow {
     }
 }
 
-/// How much was counted in a second. Whoever was not there before began with nothing.
+/// Rate per second. A missing earlier value counts as 0.
 fn rate(now: u64, before: Option<u64>, seconds: f64) -> f64 {
     let counted = now.saturating_sub(before.unwrap_or(0)) as f64;
     if seconds > 0.0 {
@@ -205,7 +205,7 @@ impl View {
     }
 }
 
-/// To three decimals: what is beyond is noise.
+/// Rounds to three decimals: the rest is noise.
 fn rounded(number: f64) -> f64 {
     (number * 1e3).round() / 1e3
 }

@@ -1,4 +1,4 @@
-//! The table, in place on a terminal or line after line elsewhere.
+//! The monitor's table, in place on a terminal or line by line elsewhere.
 
 use std::io::{IsTerminal, stdout};
 
@@ -8,18 +8,18 @@ use super::sample::{DropRow, LinkRow, PeerRow, View};
 use jaus_cli::failure::Failure;
 use jaus_cli::output::Output;
 
-/// Rows where nobody said how many, and no terminal ends.
+/// Maximum number of rows without a limit and without a terminal.
 const MOST: usize = 1000;
-/// The terminal that is thought of when none tells its size.
+/// Assumed terminal size, if none is reported.
 const USUAL: (usize, usize) = (80, 24);
-/// The alternate screen, without a cursor; and back.
+/// Escape sequences: the alternate screen without a cursor, and back.
 const OPEN: &str = "\x1b[?1049h\x1b[?25l";
 const CLOSE: &str = "\x1b[?25h\x1b[?1049l";
 const HOME: &str = "\x1b[H";
 const REST_OF_LINE: &str = "\x1b[K";
 const REST_OF_SCREEN: &str = "\x1b[J";
 
-/// Where tables go.
+/// Output of the tables.
 pub(super) struct Screen {
     output: Output,
     style: Style,
@@ -63,7 +63,7 @@ impl Screen {
             Style::Live => {
                 let (width, height) = size();
                 let (links, drops) = (view.links.len(), view.drops.len());
-                // Headings, blank lines and the last row, on which the cursor waits.
+                // Headings, blank lines and the last row with the cursor.
                 let others = 6 + links + drops;
                 let room = height.saturating_sub(others).max(1);
                 let mut screen = String::from(if first { OPEN } else { "" });
@@ -81,10 +81,10 @@ impl Screen {
         }
     }
 
-    /// Gives the terminal back as it was.
+    /// Restores the terminal.
     pub(super) fn close(&mut self) {
         if self.style == Style::Live && self.shown {
-            // Nobody is left to be told if that fails.
+            // A failure at this point cannot be reported.
             let _ = self.output.part(CLOSE);
         }
     }
@@ -184,8 +184,8 @@ fn short(number: f64) -> String {
     format!("{number:.0}G")
 }
 
-/// The beginning of a text that is too long, with a sign of that; control characters, which would
-/// wreak havoc on a terminal, are left out: peers choose their names.
+/// Shortens a text and marks the cut; drops control characters, which peers could use in names to
+/// disturb a terminal.
 fn clipped(text: &str, width: usize) -> String {
     let mut visible = text.chars().filter(|c| !c.is_control());
     let mut clipped: String = visible.by_ref().take(width).collect();

@@ -1,4 +1,4 @@
-//! Which IP packets are JAUS: by port, or by what is in them.
+//! Selects the IP packets that are JAUS, by port or by content.
 
 use std::collections::VecDeque;
 use std::net::IpAddr;
@@ -7,15 +7,15 @@ use bytes::Bytes;
 use etherparse::{LaxNetSlice, LaxSlicedPacket, TransportSlice, ip_number};
 use jaus::wire::judp;
 
-/// Fragmented packets whose later fragments are waited for.
+/// Maximum number of packets with pending fragments.
 const FRAGMENTED: usize = 64;
 
-/// What the fragments of one IP packet have in common.
+/// Common key of an IP packet's fragments.
 type Whole = (IpAddr, IpAddr, u32);
 
 pub(super) struct Filter {
     ports: Vec<u16>,
-    /// Those whose first fragment was wanted, latest last.
+    /// Packets whose first fragment was selected, latest last.
     fragmented: VecDeque<Whole>,
 }
 
@@ -27,7 +27,7 @@ impl Filter {
         }
     }
 
-    /// Whether an IP packet, or a fragment of one, is to be recorded.
+    /// Whether to record an IP packet or fragment.
     pub(super) fn wants(&mut self, packet: &[u8]) -> bool {
         let Ok(sliced) = LaxSlicedPacket::from_ip(packet) else {
             return false;
@@ -39,7 +39,7 @@ impl Filter {
         if !is_first {
             return self.fragmented.contains(&whole);
         }
-        // Only the first fragment has the ports, and the beginning of the content.
+        // Only the first fragment has the ports and the start of the content.
         let wanted = self.first_is_jaus(&sliced);
         if wanted {
             if self.fragmented.len() == FRAGMENTED {
@@ -78,14 +78,14 @@ impl Filter {
     }
 }
 
-/// Whether a datagram is JAUS by its content, wherever it goes: nodes may have any port.
+/// Whether a datagram is JAUS by its content, on any port: nodes may use other ports.
 fn is_judp(payload: &[u8]) -> bool {
     let frames = judp::frames(Bytes::copy_from_slice(payload));
     let first = frames.ok().and_then(|mut frames| frames.next());
     matches!(first, Some(Ok(frame)) if frame.is_plausible())
 }
 
-/// Which packet this is a fragment of, and whether it is its first; `None` for a whole one.
+/// The key of a fragment, and whether it is the first; `None` for a whole packet.
 fn fragment(packet: &LaxSlicedPacket<'_>) -> Option<(Whole, bool)> {
     match packet.net.as_ref()? {
         LaxNetSlice::Ipv4(ipv4) => {
@@ -98,7 +98,7 @@ fn fragment(packet: &LaxSlicedPacket<'_>) -> Option<(Whole, bool)> {
             let is_first = header.fragments_offset().value() == 0;
             ipv4.is_payload_fragmented().then_some((whole, is_first))
         }
-        // IPv6 is fragmented by its sender only, and JAUS packets fit its smallest frame.
+        // Only the sender fragments IPv6, and JAUS packets fit its smallest MTU.
         _ => None,
     }
 }
@@ -118,7 +118,7 @@ mod tests {
         packet
     }
 
-    /// 42.1.1 asks 101.1.1 for its heartbeat.
+    /// 42.1.1 queries the heartbeat of 101.1.1.
     const DATAGRAM: &[u8] = b"\x02\x00\x10\x00\x01\x01\x01\x65\x00\x01\x01\x2A\x00\x02\x22\x07\x00";
 
     #[test]

@@ -1,4 +1,4 @@
-//! What goes to the multicast group, for whoever may not open packet sockets.
+//! Records the multicast group, without the right to open packet sockets.
 
 use std::future::poll_fn;
 use std::task::Poll;
@@ -10,7 +10,7 @@ use jaus_view::udp_packet;
 
 use super::Packet;
 
-/// A listener on each interface. They say nothing.
+/// A passive listener on each interface.
 pub(super) struct Listeners {
     links: Vec<UdpLink>,
     slab: Slab,
@@ -35,7 +35,7 @@ impl Listeners {
         })
     }
 
-    /// Waits for a datagram, and puts the headers around it that it must have had.
+    /// Waits for a datagram, and reconstructs its headers.
     pub(super) async fn next(&mut self) -> Vec<Packet> {
         let (links, slab) = (&mut self.links, &mut self.slab);
         let (on, source, datagram) = poll_fn(|cx| {

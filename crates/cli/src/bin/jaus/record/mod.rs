@@ -1,4 +1,4 @@
-//! `jaus record`: writes what JAUS peers say to each other into a capture file.
+//! `jaus record`: records the traffic of JAUS peers into a capture file.
 #![expect(
     clippy::disallowed_methods,
     reason = "a recording has the time of day, and a pace"
@@ -71,13 +71,13 @@ pub(crate) struct Record {
     quiet: bool,
 }
 
-/// An IP packet that was heard.
+/// A captured IP packet.
 struct Packet {
     interface: String,
     octets: Bytes,
 }
 
-/// Where packets come from.
+/// Source of packets.
 enum Source {
     #[cfg(target_os = "linux")]
     Packets(packets::PacketSocket),
@@ -163,7 +163,7 @@ impl Record {
     }
 }
 
-/// The file, and what is in it.
+/// The file with its counters.
 struct Recording {
     file: PathBuf,
     writer: CaptureWriter<BufWriter<File>>,
@@ -200,7 +200,7 @@ impl Recording {
         })
     }
 
-    /// Writes a packet down, if it is one of those that are wanted.
+    /// Writes a packet, if it is selected.
     fn take(&mut self, packet: &Packet) -> Result<(), Failure> {
         if !self.filter.wants(&packet.octets) {
             return Ok(());
@@ -232,9 +232,9 @@ impl Recording {
     }
 }
 
-/// The time of day, as the kernel's clock has it.
+/// The kernel's time of day.
 fn now() -> Timestamp {
-    // A clock before 1970 is nobody's.
+    // A clock before 1970 is treated as 1970.
     let time = SystemTime::now()
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default();

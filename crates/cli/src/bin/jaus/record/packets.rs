@@ -1,4 +1,4 @@
-//! All IP packets of this host, by a packet socket (Linux).
+//! Captures all IP packets of this host with a packet socket (Linux).
 #![expect(
     clippy::disallowed_types,
     reason = "what is recorded is what passes by, on no link of ours"
@@ -21,18 +21,18 @@ use tokio::net::UdpSocket;
 
 use super::Packet;
 
-/// Packets taken before others have their turn.
+/// Packets per turn.
 const BATCH: usize = 64;
-/// No IP packet is longer.
+/// Maximum length of an IP packet.
 const LONGEST: usize = 65_536;
-/// The kernel's mark of a packet that this host sends (`PACKET_OUTGOING`). On loopback it comes
-/// back a moment later, and is seen then.
+/// The kernel's mark of an outgoing packet (`PACKET_OUTGOING`). On loopback it returns a moment
+/// later, and is recorded then.
 const OUTGOING: u8 = 4;
 
 pub(super) struct PacketSocket {
-    /// Not a UDP socket at all, but the runtime only needs to know when it can be read.
+    /// Not a UDP socket, but the runtime only needs to poll its readiness.
     socket: UdpSocket,
-    /// By their numbers; those that were not chosen are not in it.
+    /// By interface number; only the chosen ones.
     interfaces: BTreeMap<usize, Interface>,
     buffer: Vec<u8>,
 }
@@ -43,7 +43,7 @@ struct Interface {
 }
 
 pub(super) enum OpenError {
-    /// The process lacks the right.
+    /// The process lacks the permission.
     NotAllowed,
     Other(Failure),
 }
@@ -55,7 +55,7 @@ impl From<Failure> for OpenError {
 }
 
 impl PacketSocket {
-    /// Opens a socket for the interfaces of these names and addresses, or for all.
+    /// Opens a socket for the interfaces with these names and addresses, or for all.
     pub(super) fn open(wanted: &[String]) -> Result<Self, OpenError> {
         let present = interface::list().map_err(Failure::of)?;
         let is = |one: &interface::Interface, name: &String| {
@@ -100,7 +100,7 @@ impl PacketSocket {
         })
     }
 
-    /// Waits for packets, and takes those of the chosen interfaces.
+    /// Waits for packets of the chosen interfaces.
     pub(super) async fn next(&mut self) -> Result<Vec<Packet>, Failure> {
         let failed = |error: io::Error| Failure::new(format!("the packet socket failed: {error}"));
         self.socket.readable().await.map_err(failed)?;
@@ -110,7 +110,7 @@ impl PacketSocket {
                 Ok(packet) => packets.extend(packet),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                // An interface that goes down says so once.
+                // An interface that goes down reports it once.
                 Err(error) if error.raw_os_error() == Some(Errno::ENETDOWN as i32) => {}
                 Err(error) => return Err(failed(error)),
             }
@@ -118,7 +118,7 @@ impl PacketSocket {
         Ok(packets)
     }
 
-    /// Takes a packet from the socket; `None` if it is of no interest.
+    /// Takes a packet from the socket; `None` if it is filtered out.
     fn take(&mut self) -> io::Result<Option<Packet>> {
         let (socket, buffer) = (&self.socket, &mut self.buffer);
         let (length, from) = socket.try_io(Interest::READABLE, || {

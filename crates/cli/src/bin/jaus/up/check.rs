@@ -1,4 +1,4 @@
-//! `jaus up --check`: says what would be started, and has our own programs look at their flags.
+//! `jaus up --check`: prints what would be started, and has our own programs check their flags.
 
 use std::io;
 use std::path::Path;
@@ -9,7 +9,7 @@ use jaus_cli::output::Output;
 
 use super::system::{Part, System};
 
-/// Says what would be started, or what is wrong with the flags.
+/// Prints what would be started, or the mistakes in the flags.
 pub(super) fn check(file: &Path, system: &System) -> Result<Outcome, Failure> {
     let wrong = system.parts.iter().filter_map(|part| {
         let mistake = mistake_in_flags(part)?;
@@ -42,13 +42,13 @@ pub(super) fn check(file: &Path, system: &System) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// One part, many parts.
+/// "part" or "parts".
 pub(super) const fn parts_in_words(count: usize) -> &'static str {
     if count == 1 { "part" } else { "parts" }
 }
 
-/// What one of our own programs has against its flags: it reads them before it comes to `--help`,
-/// and then ends. Programs of others may do anything, and are not asked.
+/// The mistake that one of our own programs finds in its flags: it parses them before `--help`, and
+/// then ends. Other programs may have side effects and are not run.
 fn mistake_in_flags(part: &Part) -> Option<String> {
     let name = part.program.file_name()?.to_str()?;
     if name != "jaus" && !name.starts_with("jaus-") {
@@ -71,7 +71,7 @@ fn cannot_run(error: &io::Error) -> String {
     format!("its program cannot be started: {error}")
 }
 
-/// A complaint about flags without the usage that follows.
+/// The error message on flags, without the usage text.
 fn in_one_line(complaint: &str) -> String {
     let lines = complaint.lines().map(str::trim);
     let told = lines
@@ -82,7 +82,7 @@ fn in_one_line(complaint: &str) -> String {
     told.strip_prefix("error: ").unwrap_or(&told).to_owned()
 }
 
-/// The command as one would type it.
+/// The command line as a user would type it.
 fn command_line(part: &Part) -> String {
     let program = part.program.display().to_string();
     let words = std::iter::once(&program).chain(&part.arguments);

@@ -1,7 +1,7 @@
-//! One running process: how it is started, heard, signalled, and found to have ended.
+//! A running process: start, output, signals, and exit.
 //!
-//! It leads a process group of its own, so that what it starts in turn ends with it, and Ctrl-C
-//! reaches `jaus up` alone. Between the fork and the program stands [`leash`](super::leash).
+//! It leads its own process group, so that its descendants end with it, and Ctrl-C reaches only
+//! `jaus up`. [`leash`](super::leash) runs between the fork and the program.
 
 use std::fs;
 use std::io::{self, PipeReader};
@@ -30,10 +30,10 @@ pub(super) struct Child {
 }
 
 impl Child {
-    /// Starts a part, whose output is said by its prefixed_console.
+    /// Starts a part; its output goes to the prefixed console.
     ///
     /// # Errors
-    /// What the operating system has against it.
+    /// An error of the operating system.
     pub(super) fn start(part: &Part, prefixed_console: PrefixedConsole) -> io::Result<Self> {
         if let Some(directory) = &part.directory {
             fs::create_dir_all(directory)?;
@@ -63,15 +63,15 @@ impl Child {
         })
     }
 
-    /// The number of the process, and of its group.
+    /// The process id, which is also its group.
     pub(super) const fn id(&self) -> Pid {
         self.group
     }
 
-    /// Sends a signal to the process and all that it has started.
+    /// Signals the process and all its descendants in the group.
     pub(super) fn signal(&self, signal: Signal) {
-        // The process is not reaped, so its number is nobody else's; an error means that it, or
-        // what is left of it, has ended.
+        // The process is not reaped, so its number is not reused; an error means that it and its
+        // group have ended.
         if let Err(error) = killpg(self.group, signal)
             && error != Errno::ESRCH
         {
@@ -79,7 +79,7 @@ impl Child {
         }
     }
 
-    /// Whether the process has ended. Its number stays its own until it is [reaped](Self::reap).
+    /// Whether the process has ended. Its number is not reused until it is [reaped](Self::reap).
     pub(super) fn has_ended(&self) -> bool {
         let look = WaitPidFlag::WEXITED | WaitPidFlag::WNOHANG | WaitPidFlag::WNOWAIT;
         !matches!(
@@ -88,8 +88,7 @@ impl Child {
         )
     }
 
-    /// Takes leave of a process that has ended: what it has started is ended too, and what it has
-    /// said is said.
+    /// Reaps a process that has ended: kills the rest of its group and prints its remaining output.
     pub(super) async fn reap(mut self) -> Exit {
         self.signal(Signal::SIGKILL);
         let exit = match self.process.wait() {
@@ -100,7 +99,7 @@ impl Child {
             },
             Err(_) => Exit::NotStarted,
         };
-        // A process that has left the group may keep the pipe open for ever.
+        // A process that has left the group may keep the pipe open forever.
         #[expect(clippy::disallowed_methods, reason = "last words, in real time")]
         let _ = tokio::time::timeout(LAST_WORDS, self.listening).await;
         exit
@@ -109,7 +108,7 @@ impl Child {
 
 const LAST_WORDS: std::time::Duration = std::time::Duration::from_millis(200);
 
-/// Has every line that comes out of a pipe said.
+/// Prints every line of a pipe.
 #[expect(
     clippy::disallowed_methods,
     reason = "the command owns its tasks, and this one ends with the pipe"
@@ -127,14 +126,14 @@ fn listen(reader: PipeReader, prefixed_console: PrefixedConsole) -> io::Result<J
     }))
 }
 
-/// Octets that become lines.
+/// Splits octets into lines.
 #[derive(Default)]
 struct Lines {
     begun: Vec<u8>,
 }
 
 impl Lines {
-    /// A longer line is broken.
+    /// Longer lines are split.
     const LONGEST: usize = 4096;
 
     fn take(&mut self, octets: &[u8], prefixed_console: &PrefixedConsole) {

@@ -1,5 +1,5 @@
-//! What people see of a system: a line for each line of a part, with the part's name in front. A
-//! terminal that does not read holds nobody up: lines are lost then, and counted.
+//! Console of a system: each line of a part, prefixed with the part's name. A terminal that does
+//! not read blocks nothing: lines are dropped and counted.
 
 use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
@@ -11,14 +11,14 @@ use jaus_cli::failure::Failure;
 use jaus_cli::output;
 use tokio::sync::watch;
 
-/// Lines that may wait for a slow terminal.
+/// Maximum number of lines queued for a slow terminal.
 const WAITING: usize = 4096;
-/// How long it may take to print what is left at the end.
+/// Time limit for the remaining lines at the end.
 const FAREWELL: Duration = Duration::from_secs(1);
-/// Colours for the names, by their numbers (ECMA-48): neither red, nor black or white.
+/// Colours of the names, by their numbers (ECMA-48): neither red, nor black or white.
 const COLOURS: [u8; 10] = [36, 33, 32, 35, 34, 96, 93, 92, 95, 94];
 
-/// The way to the terminal. Cheap to clone.
+/// Sender of lines to the terminal. Cheap to clone.
 #[derive(Clone)]
 pub(super) struct Console {
     lines: SyncSender<String>,
@@ -27,12 +27,12 @@ pub(super) struct Console {
     width: usize,
 }
 
-/// The thread that prints.
+/// The printing thread.
 pub(super) struct Printer {
     closed: watch::Receiver<bool>,
 }
 
-/// One who speaks.
+/// A console that prefixes lines with a name.
 #[derive(Clone)]
 pub(super) struct PrefixedConsole {
     console: Console,
@@ -40,17 +40,17 @@ pub(super) struct PrefixedConsole {
 }
 
 impl Console {
-    /// Begins to print for speakers whose names are at most so long.
+    /// Starts the printing thread; `width` is the longest name.
     ///
     /// # Errors
-    /// If the system has no thread for it.
+    /// The system cannot start a thread.
     pub(super) fn start(width: usize) -> Result<(Self, Printer), Failure> {
         let (lines, waiting) = sync_channel(WAITING);
         let lost = Arc::new(AtomicU64::new(0));
         let (close, closed) = watch::channel(false);
         let counter = lost.clone();
         let print = move || {
-            // An error means that nobody reads any more, and then nothing is left to do.
+            // An error means that the output is closed, and nothing is left to do.
             let _ = print(&waiting, &counter);
             close.send_replace(true);
         };
@@ -67,7 +67,7 @@ impl Console {
         Ok((console, Printer { closed }))
     }
 
-    /// Somebody who may speak; the number chooses a colour. Without one it is `jaus up` itself.
+    /// A console for this name; the number selects a colour. Without one it is `jaus up` itself.
     pub(super) fn prefixed_console(&self, name: &str, number: Option<usize>) -> PrefixedConsole {
         let width = self.width;
         let plain = format!("{name:width$} | ");
@@ -93,14 +93,14 @@ impl Console {
 }
 
 impl PrefixedConsole {
-    /// Says a line; control characters in it are made visible.
+    /// Prints a line; makes control characters visible.
     pub(super) fn say(&self, line: &str) {
         let visible: String = line.chars().map(visible).collect();
         self.console.line(format!("{}{visible}\n", self.prefix));
     }
 }
 
-/// What may drive a terminal is shown instead.
+/// Replaces control characters with visible ones.
 fn visible(c: char) -> char {
     match c {
         '\t' => ' ',
@@ -110,13 +110,13 @@ fn visible(c: char) -> char {
 }
 
 impl Printer {
-    /// Waits until nobody reads any more.
+    /// Waits until the output is closed.
     pub(super) async fn closed(&mut self) {
         // An error is the end of the printer, too.
         let _ = self.closed.wait_for(|closed| *closed).await;
     }
 
-    /// Waits until all is printed, for a moment at most. Everybody who can speak must be gone.
+    /// Waits briefly until all lines are printed. All consoles must be dropped.
     #[expect(clippy::disallowed_methods, reason = "a farewell in real time")]
     pub(super) async fn finish(mut self) {
         let _ = tokio::time::timeout(FAREWELL, self.closed()).await;

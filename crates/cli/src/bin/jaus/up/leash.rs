@@ -1,5 +1,5 @@
-//! The last moment before a part's program begins: `jaus` asks the kernel to be ended when
-//! `jaus up` dies, whatever it dies of, and then becomes the program, which inherits that.
+//! Last step before a part's program: `jaus` has the kernel end it when `jaus up` dies for any
+//! reason, and then executes the program, which inherits this.
 
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
@@ -11,16 +11,16 @@ use nix::sys::prctl;
 use nix::sys::signal::Signal;
 use nix::unistd::getppid;
 
-/// Ourselves, also when our file has been replaced meanwhile.
+/// Our own program, even if its file has been replaced.
 pub(super) const PROGRAM: &str = "/proc/self/exe";
 
-/// The arguments before the part's program.
+/// Arguments before the part's program.
 pub(super) fn arguments() -> [String; 3] {
     let parent = std::process::id().to_string();
     [NAME.to_owned(), parent, "--".to_owned()]
 }
 
-/// The subcommand's name.
+/// Name of the subcommand.
 pub(crate) const NAME: &str = "up-leash";
 
 /// Become another program that ends with its parent (for `jaus up` itself)
@@ -36,16 +36,16 @@ pub(crate) struct Leash {
 
 impl Leash {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        // Politely: a part has things to stop and to write.
+        // SIGTERM, so that a part can stop its devices and save data.
         prctl::set_pdeathsig(Signal::SIGTERM).map_err(Failure::of)?;
         if getppid().as_raw() != self.parent {
-            // It died before the kernel knew of our wish.
+            // The parent died before the kernel had our request.
             return Ok(Outcome::Incomplete);
         }
         let Some((program, arguments)) = self.command.split_first() else {
             return Err(Failure::new("there is no program to become"));
         };
-        // Only an error comes back from this.
+        // Returns only on an error.
         let error = Command::new(program).args(arguments).exec();
         jaus_cli::output::say(format_args!("{}: {error}", program.display()));
         Ok(Outcome::Incomplete)

@@ -1,4 +1,4 @@
-//! `jaus up`: a whole system as processes of one machine.
+//! `jaus up`: runs a whole system as processes of one machine.
 
 mod check;
 mod child;

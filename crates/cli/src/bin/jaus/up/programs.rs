@@ -1,18 +1,18 @@
-//! Where programs are: beside `jaus` itself, then in the search path; and how paths are written.
+//! Finds programs beside `jaus` itself, then in the search path; expands paths.
 
 use std::borrow::Cow;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-/// The folders in which programs are looked for, in this order.
+/// Folders with programs, in search order.
 #[derive(Debug, Clone)]
 pub(super) struct Programs {
     folders: Vec<PathBuf>,
 }
 
 impl Programs {
-    /// Beside the running program, then in `PATH`.
+    /// The running program's folder, then `PATH`.
     pub(super) fn usual() -> Self {
         let own = std::env::current_exe().ok();
         let beside = own.and_then(|own| own.parent().map(Path::to_owned));
@@ -26,8 +26,8 @@ impl Programs {
         }
     }
 
-    /// The file of a program; what is wrong if there is none. A name with a slash is a path, seen
-    /// from `base`.
+    /// Finds the file of a program, or returns the mistake. A name with a slash is a path relative
+    /// to `base`.
     pub(super) fn find(&self, name: &str, base: &Path) -> Result<PathBuf, String> {
         if name.contains('/') {
             let path = base.join(home(name));
@@ -64,13 +64,13 @@ impl Programs {
     }
 }
 
-/// Whether it is a file that somebody may run.
+/// Whether it is an executable file.
 fn is_program(path: &Path) -> bool {
     let runs = |it: fs::Metadata| it.is_file() && it.permissions().mode() & 0o111 != 0;
     fs::metadata(path).is_ok_and(runs)
 }
 
-/// A path in which `~/` stands for the user's own folder.
+/// Expands a leading `~/` to the user's home folder.
 pub(super) fn home(path: &str) -> Cow<'_, Path> {
     let own = path.strip_prefix("~/").zip(std::env::home_dir());
     match own {

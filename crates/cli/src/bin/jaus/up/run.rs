@@ -1,4 +1,4 @@
-//! A running system: carries out what the supervisor decides, and tells it what has happened.
+//! Runs a system: executes the supervisor's orders and reports events to it.
 #![expect(
     clippy::disallowed_methods,
     reason = "here the supervisor gets its clock and its processes"
@@ -18,7 +18,7 @@ use super::system::{OURSELVES, System};
 use super::warden::Guard;
 use super::{Up, check};
 
-/// Runs a system to its end.
+/// Runs a system until it ends.
 pub(super) async fn run(flags: &Up, system: System) -> Result<Outcome, Failure> {
     let names = system.parts.iter().map(|part| part.name.len());
     let width = names.max().unwrap_or_default().max(OURSELVES.len());
@@ -55,7 +55,7 @@ fn listen(kind: SignalKind) -> Result<tokio::signal::unix::Signal, Failure> {
     signal(kind).map_err(|error| Failure::new(format!("cannot listen for signals: {error}")))
 }
 
-/// The wish that all should end, in its forms.
+/// Shutdown requests: signals and a time limit.
 struct Wishes {
     signals: [tokio::signal::unix::Signal; 3],
     limit: Option<Instant>,
@@ -95,7 +95,7 @@ struct Running<'f> {
     flags: &'f Up,
     system: System,
     supervisor: Supervisor,
-    /// A place for each part.
+    /// One slot per part.
     children: Vec<Option<Child>>,
     voices: Vec<PrefixedConsole>,
     own: PrefixedConsole,
@@ -136,7 +136,7 @@ impl<'f> Running<'f> {
         self.system.parts.get(part).map_or("", |it| &it.name)
     }
 
-    /// Does all that is due.
+    /// Executes all due orders.
     fn settle(&mut self) {
         self.supervisor.handle_timeout(Instant::now());
         while let Some(order) = self.supervisor.poll_order() {
@@ -187,7 +187,7 @@ impl<'f> Running<'f> {
         }
     }
 
-    /// Takes leave of the processes that have ended, and of a warden that has.
+    /// Reaps processes that have ended, and replaces a warden that has.
     async fn reap(&mut self) {
         for part in 0..self.children.len() {
             let place = self.children.get_mut(part);
@@ -214,7 +214,7 @@ impl<'f> Running<'f> {
         }
     }
 
-    /// Ends all; at the second request without asking.
+    /// Stops all parts; at the second request kills them.
     fn stop(&mut self) {
         let now = Instant::now();
         if std::mem::replace(&mut self.stopping, true) {
@@ -241,7 +241,7 @@ impl<'f> Running<'f> {
         }
     }
 
-    /// The end, when nothing runs any more.
+    /// The outcome when all parts have ended.
     fn end(self) -> Outcome {
         let well = self.supervisor.went_well();
         if self.stopping {

@@ -1,5 +1,4 @@
-//! How the system is, for other programs: a JSON file that is replaced as a whole with every
-//! change.
+//! System status for other programs: a JSON file that is replaced atomically at every change.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,11 +8,11 @@ use serde_json::{Value as Json, json};
 use super::supervisor::{Exit, State};
 use super::system::Part;
 
-/// The file, and what stands in it.
+/// The status file with its content.
 pub(super) struct StatusFile {
     path: PathBuf,
     written: Json,
-    /// Whether the last change could not be written.
+    /// Whether the last update failed.
     failed: bool,
 }
 
@@ -26,7 +25,7 @@ impl StatusFile {
         }
     }
 
-    /// Writes how the parts are, if that is news. Says once why it cannot.
+    /// Writes the status of the parts if it has changed. Reports a failure once.
     pub(super) fn update(&mut self, parts: &[Json]) -> Option<String> {
         let status = json!({ "supervisor": std::process::id(), "parts": parts });
         if status == self.written {
@@ -44,7 +43,7 @@ impl StatusFile {
     }
 }
 
-/// Puts a file in the place of another, so that readers see the old or the new one.
+/// Replaces a file atomically: readers see the old or the new one.
 fn replace(path: &Path, text: &str) -> std::io::Result<()> {
     let mut new = path.as_os_str().to_owned();
     new.push(".new");
@@ -52,7 +51,7 @@ fn replace(path: &Path, text: &str) -> std::io::Result<()> {
     fs::rename(&new, path)
 }
 
-/// One part.
+/// Status of one part.
 pub(super) fn of_part(
     part: &Part,
     state: State,
@@ -78,7 +77,7 @@ pub(super) fn of_part(
     })
 }
 
-/// How a process came to its end.
+/// Describes the exit of a process.
 pub(super) fn in_words(exit: Exit) -> String {
     use nix::sys::signal::Signal;
     match exit {

@@ -1,67 +1,67 @@
-//! What is started, started again, given up and stopped, and when: the decisions of `jaus up`,
-//! without a process and without a clock. Parts are known by their place in the system.
+//! Supervisor of `jaus up`: decides when parts start, restart, stop and are given up, without
+//! processes and without a clock. Parts are identified by their index in the system.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use super::system::Restart;
 
-/// How long a part must have run to count as one that works.
+/// Running time after which a part counts as working.
 pub(super) const SETTLED: Duration = Duration::from_secs(10);
-/// The pause before a part is started again …
+/// First pause before a restart …
 const FIRST_PAUSE: Duration = Duration::from_millis(500);
-/// … which doubles with each time that it did not settle, up to this.
+/// … which doubles with each unsettled run, up to this.
 const LONGEST_PAUSE: Duration = Duration::from_secs(30);
-/// The exit status of a program that could not begin, because its flags or settings are wrong.
+/// Exit status of a program that could not start, because of its flags or settings.
 const CANNOT_BEGIN: i32 = 2;
 
-/// How a process came to its end.
+/// Exit of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Exit {
     Status(i32),
     /// By the signal with this number.
     Signal(i32),
-    /// It never began.
+    /// It was never started.
     NotStarted,
 }
 
-/// What the owner must do.
+/// Order to the owner of the processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Order {
     Start(usize),
     /// Ask it to end.
     Terminate(usize),
-    /// Do not ask.
+    /// Kill it.
     Kill(usize),
 }
 
-/// What people should know.
+/// News for the user.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum News {
-    /// It has ended, and is started again after a pause.
+    /// It has ended and will restart after a pause.
     Restarts {
         part: usize,
         exit: Exit,
         ran: Duration,
         pause: Duration,
     },
-    /// It has ended, and stays so.
+    /// It has ended and stays stopped.
     Ended { part: usize, exit: Exit },
-    /// It says that it cannot begin, and starting it again would not help.
+    /// It cannot start, and a restart would not help.
     GaveUp { part: usize },
-    /// It did not end when it was asked to, and is killed.
+    /// It did not end in time, and is killed.
     Killed { part: usize },
-    /// It did not even end then.
+    /// It did not end even after the kill.
     Stuck { part: usize },
 }
 
-/// How it stands with a part.
+/// State of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum State {
     Waiting {
         until: Instant,
     },
-    /// It is to be started, and the owner has not told yet whether that went well.
+    /// It is being started; the result is still open.
     Starting,
     Running {
         since: Instant,
@@ -70,7 +70,7 @@ pub(super) enum State {
         until: Instant,
         killed: bool,
     },
-    /// It has ended, as it may.
+    /// It has ended as intended.
     Ended,
     GivenUp,
     Stopped,
@@ -91,7 +91,7 @@ struct Part {
     restart: Restart,
     state: State,
     starts: u32,
-    /// How often in a row it has ended before it had settled.
+    /// Number of consecutive runs that ended before they settled.
     failures: u32,
     /// Whether it has ever settled.
     proven: bool,
@@ -99,7 +99,7 @@ struct Part {
 }
 
 impl Supervisor {
-    /// Parts that are all due at once, and how long one may take to end.
+    /// All parts are due at once; `grace` is the time limit to end.
     pub(super) fn new(
         now: Instant,
         parts: impl IntoIterator<Item = Restart>,
@@ -122,7 +122,7 @@ impl Supervisor {
         }
     }
 
-    /// The process of a part has begun.
+    /// Notes the start of a part's process.
     pub(super) fn handle_started(&mut self, now: Instant, part: usize) {
         let Some(it) = self.parts.get_mut(part) else {
             return;
@@ -131,7 +131,7 @@ impl Supervisor {
         it.state = State::Running { since: now };
     }
 
-    /// The process of a part has ended, or never began.
+    /// Handles the exit of a part's process, or its failed start.
     pub(super) fn handle_exit(&mut self, now: Instant, part: usize, exit: Exit) {
         let stopping = self.stopping;
         let Some(it) = self.parts.get_mut(part) else {
@@ -146,7 +146,7 @@ impl Supervisor {
         self.news.push_back(news);
     }
 
-    /// Everything is to end: the last part first, each when the one after it has ended.
+    /// Stops all parts: the last one first, each after its successor has ended.
     pub(super) fn stop(&mut self, now: Instant) {
         if self.stopping {
             return;
@@ -162,7 +162,7 @@ impl Supervisor {
         self.stop_next(now);
     }
 
-    /// Everything is to end, and at once.
+    /// Kills all parts at once.
     pub(super) fn hurry(&mut self, now: Instant) {
         self.stop(now);
         let until = now + self.grace;
@@ -177,7 +177,7 @@ impl Supervisor {
         }
     }
 
-    /// The time of [`poll_timeout`](Self::poll_timeout) has come.
+    /// Runs due timers.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         for (part, it) in self.parts.iter_mut().enumerate() {
             match it.state {
@@ -223,13 +223,13 @@ impl Supervisor {
         self.news.pop_front()
     }
 
-    /// Whether nothing runs any more and nothing will.
+    /// Whether all parts have ended for good.
     pub(super) fn is_over(&self) -> bool {
         let over = |it: &Part| matches!(it.state, State::Ended | State::GivenUp | State::Stopped);
         self.parts.iter().all(over)
     }
 
-    /// Whether every part has done what it was to do, as far as is known.
+    /// Whether every part succeeded, as far as known.
     pub(super) fn went_well(&self) -> bool {
         let well = |it: &Part| match it.state {
             State::Ended => it.last == Some(Exit::Status(0)),
@@ -239,14 +239,14 @@ impl Supervisor {
         self.parts.iter().all(well)
     }
 
-    /// How it stands with a part: its state, how often it was started, and how it ended last.
+    /// State of a part, its number of starts, and its last exit.
     pub(super) fn look(&self, part: usize) -> Option<(State, u32, Option<Exit>)> {
         let it = self.parts.get(part)?;
         Some((it.state, it.starts, it.last))
     }
 
-    /// Asks the last part that still runs to end, unless one is being asked. One that had to be
-    /// killed holds nobody up.
+    /// Stops the last running part, unless one is being stopped. A part that had to be killed does
+    /// not block the others.
     fn stop_next(&mut self, now: Instant) {
         let asked = |it: &Part| matches!(it.state, State::Stopping { killed: false, .. });
         if self.parts.iter().any(asked) {
@@ -267,7 +267,7 @@ impl Supervisor {
 }
 
 impl Part {
-    /// What becomes of it after its process has ended.
+    /// Decides the next state after an exit.
     fn decide(&mut self, now: Instant, part: usize, exit: Exit) -> News {
         let ran = match self.state {
             State::Running { since } => now.saturating_duration_since(since),
@@ -286,8 +286,8 @@ impl Part {
             self.state = State::Ended;
             return News::Ended { part, exit };
         }
-        // Flags with which it has worked before are not wrong: then something else is in the way,
-        // such as a port that is not free yet.
+        // A part that has worked with these flags has another problem, such as a port that is not
+        // free yet.
         if exit == Exit::Status(CANNOT_BEGIN) && !self.proven {
             self.state = State::GivenUp;
             return News::GaveUp { part };

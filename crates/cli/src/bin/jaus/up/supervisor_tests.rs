@@ -1,10 +1,10 @@
-//! The decisions of `jaus up`, in virtual time.
+//! Tests of the supervisor, in virtual time.
 
 use super::*;
 
 const GRACE: Duration = Duration::from_secs(5);
 
-/// A supervisor whose processes do what the test says, and the clock.
+/// A supervisor with simulated processes and clock.
 struct Bench {
     now: Instant,
     supervisor: Supervisor,
@@ -23,7 +23,7 @@ impl Bench {
         }
     }
 
-    /// All parts run.
+    /// All parts are running.
     fn running(parts: &[Restart]) -> Self {
         let mut bench = Self::new(parts);
         let all: Vec<Order> = (0..parts.len()).map(Order::Start).collect();
@@ -34,7 +34,7 @@ impl Bench {
         bench
     }
 
-    /// What is due now.
+    /// The due orders.
     fn orders(&mut self) -> Vec<Order> {
         self.supervisor.handle_timeout(self.now);
         std::iter::from_fn(|| self.supervisor.poll_order()).collect()
@@ -44,7 +44,7 @@ impl Bench {
         std::iter::from_fn(|| self.supervisor.poll_news()).collect()
     }
 
-    /// Lets time pass up to the next thing to do.
+    /// Advances time to the next timer.
     fn wait(&mut self) -> Duration {
         let due = self.supervisor.poll_timeout().expect("something is due");
         let waited = due.saturating_duration_since(self.now);
@@ -56,7 +56,7 @@ impl Bench {
         self.supervisor.handle_exit(self.now, part, exit);
     }
 
-    /// The part starts, runs for a while and fails; how long it then waits.
+    /// Starts the part, lets it run and fail; returns the pause that follows.
     fn fails_after(&mut self, ran: Duration) -> Duration {
         assert_eq!(self.orders(), [Order::Start(0)]);
         self.supervisor.handle_started(self.now, 0);
@@ -196,7 +196,7 @@ fn what_waits_to_be_started_again_is_not_started_once_all_is_to_end() {
     assert_eq!(bench.orders(), [Order::Terminate(0)]);
     bench.exit(0, Exit::Status(0));
     assert!(bench.supervisor.is_over() && bench.orders().is_empty());
-    // Nor what was due in the same moment.
+    // Nor does a part start that was due at the same moment.
     let mut bench = Bench::new(&[Restart::Always]);
     bench.supervisor.handle_timeout(bench.now);
     bench.supervisor.stop(bench.now);

@@ -1,5 +1,4 @@
-//! The file that says what a system is: TOML, read so that every mistake in it is told at once,
-//! each with its line and what would be right.
+//! Reads the system file (TOML), and reports all its mistakes at once, each with line and remedy.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -13,27 +12,27 @@ use toml::de::{DeTable, DeValue};
 
 use super::programs::{Programs, home};
 
-/// What runs on this machine, in the order of the file.
+/// Parts of this machine, in the order of the file.
 #[derive(Debug)]
 pub(super) struct System {
     pub(super) parts: Vec<Part>,
 }
 
-/// One program that runs.
+/// A program to run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Part {
     pub(super) name: String,
     pub(super) program: PathBuf,
     pub(super) arguments: Vec<String>,
     pub(super) environment: Vec<(String, String)>,
-    /// Where it runs; made when it does not exist.
+    /// Working directory; created if missing.
     pub(super) directory: Option<PathBuf>,
     pub(super) restart: Restart,
-    /// The line of the file on which it begins.
+    /// The first line of the part in the file.
     pub(super) line: usize,
 }
 
-/// Whether a part that has ended is started again.
+/// Whether a part restarts after it has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Restart {
     #[default]
@@ -42,9 +41,9 @@ pub(super) enum Restart {
     Never,
 }
 
-/// The keys of the file …
+/// Keys of the file …
 const SECTIONS: [&str; 2] = ["all", "parts"];
-/// … those of a part …
+/// … of a part …
 const PART: [&str; 6] = [
     "program",
     "arguments",
@@ -53,18 +52,18 @@ const PART: [&str; 6] = [
     "directory",
     "restart",
 ];
-/// … and of what holds for all of them.
+/// … and of the defaults of all parts.
 const ALL: [&str; 4] = ["flags", "environment", "directory", "restart"];
-/// More parts than this are no system of one machine.
+/// Maximum number of parts on one machine.
 const MOST_PARTS: usize = 256;
-/// The name under which `jaus up` itself speaks.
+/// Console name of `jaus up` itself.
 pub(super) const OURSELVES: &str = "up";
 
 impl System {
-    /// Reads a file, and finds the programs.
+    /// Reads a file and finds the programs.
     ///
     /// # Errors
-    /// All that is wrong with it.
+    /// All mistakes in the file.
     pub(super) fn read(path: &Path, programs: &Programs) -> Result<Self, Failure> {
         let text = fs::read_to_string(path).map_err(|error| Failure::file(path, &error))?;
         let base = path.parent().unwrap_or(Path::new(""));
@@ -77,7 +76,7 @@ impl System {
         })
     }
 
-    /// Reads a text, whose relative paths are seen from `base`.
+    /// Parses a text; relative paths start at `base`.
     fn parse(text: &str, base: &Path, programs: &Programs) -> Result<Self, Vec<Mistake>> {
         let table = DeTable::parse(text).map_err(|error| vec![Mistake::of(&error, text)])?;
         let mut reader = Reader {
@@ -93,10 +92,10 @@ impl System {
         }
     }
 
-    /// Only the parts with these names.
+    /// Selects the parts with these names.
     ///
     /// # Errors
-    /// If there is no part with one of the names.
+    /// A name without a part.
     pub(super) fn only(mut self, names: &[String]) -> Result<Self, Failure> {
         for name in names {
             if self.parts.iter().any(|part| part.name == *name) {
@@ -117,17 +116,17 @@ impl System {
     }
 }
 
-/// Settings that stand in `[all]` and in a part.
+/// Settings of `[all]` and of a part.
 #[derive(Debug, Clone, Default)]
 struct Common {
-    /// By name, as they stand on the command line.
+    /// By name, as on the command line.
     flags: BTreeMap<String, Vec<String>>,
     environment: BTreeMap<String, String>,
     directory: Option<PathBuf>,
     restart: Restart,
 }
 
-/// Goes through a file and collects what is wrong.
+/// Reads a file and collects mistakes.
 struct Reader<'t> {
     text: &'t str,
     base: &'t Path,
@@ -194,7 +193,7 @@ impl Reader<'_> {
             arguments = self.texts(value);
         }
         arguments.extend(common.flags.into_values().flatten());
-        // A part is called what its program is called without our prefix, or says what it runs.
+        // The program defaults to the part's name with our prefix.
         let (place, program) = match entry.get("program") {
             Some(value) => (value.span(), self.string(value)?),
             None => (place, format!("jaus-{name}")),
@@ -264,7 +263,7 @@ impl Reader<'_> {
 
     fn string(&mut self, value: &Value<'_>) -> Option<String> {
         match value.get_ref().as_str() {
-            // The operating system would not take it.
+            // The operating system does not accept NUL.
             Some(text) if !text.contains('\0') => Some(text.to_owned()),
             _ => {
                 self.wrong(value.span(), "write a text in double quotes");
@@ -319,7 +318,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Two parts of one id would be one component to everybody else.
+    /// Two parts with one id would collide on the network.
     fn check_id(&mut self, name: &str, entry: &DeTable<'_>, ids: &mut BTreeMap<String, String>) {
         let flags = entry.get("flags").and_then(|it| it.get_ref().as_table());
         let Some(id) = flags.and_then(|flags| flags.get("id")) else {

@@ -1,8 +1,8 @@
-//! What a system's file may say, and what is said about mistakes in it.
+//! Tests of the system file and its error messages.
 
 use super::*;
 
-/// Programs that every system has that runs tests.
+/// Programs that exist on every test system.
 fn programs() -> Programs {
     Programs::within(["/bin".into(), "/usr/bin".into()])
 }
@@ -97,7 +97,7 @@ fn a_program_that_is_not_there_is_told_with_where_it_was_looked_for() {
     }
     let said = only_mistake("[parts.a]\nprogram = \"./planner\"");
     assert!(said.contains("/etc/jaus/./planner"), "{said}");
-    // What nobody may run is no program.
+    // A file without execute permission is no program.
     let said = only_mistake("[parts.a]\nprogram = \"/etc/passwd\"");
     assert!(said.contains("/etc/passwd"), "{said}");
 }

@@ -1,8 +1,8 @@
-//! A process that outlives `jaus up` for a moment if that is killed: it knows the process group of
-//! every part, and ends what is left when the pipe from `jaus up` breaks.
+//! Warden process that briefly outlives a killed `jaus up`: it knows the process group of every
+//! part, and ends what is left when the pipe from `jaus up` breaks.
 //!
-//! The kernel has told the parts themselves by then ([`leash`](super::leash)); the warden sees to
-//! what they have started, and to what does not end when it is asked to.
+//! The kernel has signalled the parts themselves by then ([`leash`](super::leash)); the warden ends
+//! their descendants, and parts that ignore the signal.
 
 use std::collections::BTreeSet;
 use std::io::{self, BufRead, PipeWriter, Write};
@@ -18,7 +18,7 @@ use nix::unistd::Pid;
 
 use super::leash;
 
-/// The subcommand's name.
+/// Name of the subcommand.
 pub(crate) const NAME: &str = "up-warden";
 
 /// End process groups when standard input ends (for `jaus up` itself)
@@ -29,12 +29,12 @@ pub(crate) struct Warden {
     grace: Duration,
 }
 
-/// Between two looks at what is left.
+/// Interval of checks for remaining processes.
 const LOOK: Duration = Duration::from_millis(50);
 
 impl Warden {
     pub(crate) fn run(&self) -> Result<Outcome, Failure> {
-        // Who ends `jaus up` with a signal to everybody around must not end us first.
+        // A signal to the whole group that ends `jaus up` must not end the warden first.
         let deaf = SigSet::from_iter([Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP]);
         deaf.thread_block().map_err(Failure::of)?;
         let mut groups = BTreeSet::new();
@@ -54,12 +54,12 @@ impl Warden {
     }
 }
 
-/// Reads `+1234` or `-1234`.
+/// Parses `+1234` or `-1234`.
 fn note(groups: &mut BTreeSet<i32>, line: &str) {
     let Ok(number) = line.parse::<i32>() else {
         return;
     };
-    // 0 would be our own group, and 1 everybody.
+    // 0 would be our own group, and 1 all processes.
     match number {
         2.. => _ = groups.insert(number),
         _ => _ = groups.remove(&number.saturating_neg()),
@@ -77,17 +77,17 @@ fn exists(group: i32) -> bool {
     killpg(Pid::from_raw(group), None).is_ok()
 }
 
-/// The warden, as `jaus up` sees it.
+/// Handle of the warden in `jaus up`.
 pub(super) struct Guard {
     process: Child,
     pipe: PipeWriter,
 }
 
 impl Guard {
-    /// Starts one.
+    /// Starts a warden.
     ///
     /// # Errors
-    /// What the operating system has against it.
+    /// An error of the operating system.
     pub(super) fn start(grace: Duration) -> io::Result<Self> {
         let (reader, pipe) = io::pipe()?;
         let process = Command::new(leash::PROGRAM)
@@ -96,37 +96,37 @@ impl Guard {
             .stdin(reader)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
-            // Ctrl-C is not for it.
+            // Ctrl-C must not reach it.
             .process_group(0)
             .spawn()?;
         Ok(Self { process, pipe })
     }
 
-    /// Tells it of a group that begins.
+    /// Registers a started group.
     pub(super) fn guard(&mut self, group: Pid) {
         self.tell(format_args!("+{group}\n"));
     }
 
-    /// Tells it of a group that has ended.
+    /// Removes a group that has ended.
     pub(super) fn release(&mut self, group: Pid) {
         self.tell(format_args!("-{group}\n"));
     }
 
     fn tell(&mut self, line: std::fmt::Arguments<'_>) {
-        // A warden that has ended is noticed, and replaced by one that is told of all.
+        // The owner notices a dead warden and replaces it by one that knows all groups.
         let _ = self.pipe.write_all(line.to_string().as_bytes());
     }
 
-    /// Whether it is there no more.
+    /// Whether it has ended.
     pub(super) fn has_ended(&mut self) -> bool {
         !matches!(self.process.try_wait(), Ok(None))
     }
 
-    /// Sends it home.
+    /// Dismisses the warden.
     pub(super) fn dismiss(self) {
         let Self { mut process, pipe } = self;
         drop(pipe);
-        // It ends by itself, because nothing is left to guard.
+        // It exits by itself, because no group is left.
         let _ = process.wait();
     }
 }

@@ -1,4 +1,4 @@
-//! Reading messages back: captures, lines of JSON, and the directories of logs.
+//! Reads messages from captures, lines of JSON, and log directories.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -10,7 +10,7 @@ use jaus_view::{Capture, Dictionary, Entry, Filter, MessageStream, Network};
 
 use super::{Printer, lost_in};
 
-/// Longer lines of JSON than this are nobody's messages.
+/// Maximum length of a line of JSON.
 const LONGEST: u64 = 64 << 20;
 
 pub(super) fn watch(
@@ -34,7 +34,7 @@ pub(super) fn watch(
         let mut file = BufReader::new(File::open(path).map_err(failed)?);
         let begin = file.fill_buf().map_err(failed)?;
         complete &= match begin.first() {
-            // A log of which nothing came to the disk before the power went.
+            // An empty log: the power failed before the first write.
             None => true,
             Some(b'{') => read_lines(path, file, &stream, printer)?,
             Some(_) => read_capture(path, file, &mut stream, printer)?,
@@ -49,7 +49,7 @@ pub(super) fn watch(
     Ok(Outcome::complete_if(complete))
 }
 
-/// The files of a log in their order, which is that of their names.
+/// The files of a log, ordered by name.
 fn logs_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     let failed = |error| Failure::file(directory, &error);
     let mut files = Vec::new();
@@ -70,7 +70,7 @@ fn logs_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(files)
 }
 
-/// Whether all of it could be read.
+/// Returns whether all of it was readable.
 fn read_capture(
     path: &Path,
     file: impl Read,
@@ -105,7 +105,7 @@ fn read_capture(
     Ok(complete)
 }
 
-/// Whether all of them could be read.
+/// Returns whether all lines were readable.
 fn read_lines(
     path: &Path,
     mut file: impl BufRead,
@@ -137,7 +137,7 @@ fn read_lines(
     }
 }
 
-/// What was lost is told whatever the filter says.
+/// Losses are reported whatever the filter.
 fn tell_lost(line: &str, printer: &mut Printer) -> Result<(), Failure> {
     let object = serde_json::from_str(line).ok();
     match object.map(Entry::of_object).as_ref().and_then(lost_in) {

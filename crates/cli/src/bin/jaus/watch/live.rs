@@ -1,4 +1,4 @@
-//! Looking on through the debug view of a running node.
+//! Follows messages through the debug view of a running node.
 
 use std::time::Duration;
 
@@ -48,7 +48,7 @@ pub(super) fn watch(
     })
 }
 
-/// The address of the messages, with the filter in it.
+/// The URL of the message stream, with the filter.
 fn url(address: &str, filter: &Filter) -> String {
     let place = address.trim_end_matches('/');
     let place = place.strip_suffix("/messages").unwrap_or(place);

@@ -1,4 +1,4 @@
-//! `jaus watch`: what passes a node, live or from its log, one line a message.
+//! `jaus watch`: prints the messages of a node, live or from its log, one per line.
 
 mod files;
 mod live;
@@ -147,7 +147,7 @@ impl Watch {
     }
 }
 
-/// What becomes of messages.
+/// Prints or counts messages.
 struct Printer {
     output: Output,
     form: Form,
@@ -171,7 +171,7 @@ impl Printer {
         }
     }
 
-    /// Tells what is missing here.
+    /// Reports lost messages.
     fn lost(&mut self, count: u64) -> Result<(), Failure> {
         match &mut self.form {
             Form::Words { .. } => self
@@ -185,7 +185,7 @@ impl Printer {
         }
     }
 
-    /// An object that was written for people: a message, or how many were lost.
+    /// Prints an object written for people: a message, or a number of lost ones.
     fn object(&mut self, entry: &Entry) -> Result<(), Failure> {
         match lost_in(entry) {
             Some(count) => self.lost(count),
@@ -194,7 +194,7 @@ impl Printer {
     }
 }
 
-/// How many were lost, if that is what an object tells.
+/// The number of lost messages, if the object reports one.
 fn lost_in(entry: &Entry) -> Option<u64> {
     entry.json().get("lost")?.as_u64()
 }

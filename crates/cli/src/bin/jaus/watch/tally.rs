@@ -1,10 +1,10 @@
-//! How many messages there were of each kind, from whom, and how often.
+//! Counts messages by kind and sender, with their rates.
 
 use std::collections::BTreeMap;
 
 use jaus_view::{Entry, Timestamp};
 
-/// Kinds that are told apart; an attacker may invent more.
+/// Maximum number of kinds, as an attacker may invent more.
 const MOST: usize = 4096;
 
 /// Counts by sender and message.

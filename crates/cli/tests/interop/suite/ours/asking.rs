@@ -1,4 +1,4 @@
-//! Subscriptions that only listen.
+//! Subscriptions that only receive.
 
 use jaus::component::When;
 use jaus::messages::mobility::{QueryVelocityState, ReportVelocityState};

@@ -1,4 +1,4 @@
-//! Control, and what needs it.
+//! Control, and actions that require it.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Messages of any size, there and back.
+//! Echo of messages of any size.
 
 use std::time::Duration;
 

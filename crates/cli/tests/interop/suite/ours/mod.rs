@@ -1,5 +1,5 @@
-//! What this project's side does that the tool `jaus` has no command for: roles in which this
-//! binary is started again, over the library's public interface. `ours.toml` names them.
+//! Actions of this project's side for which the tool `jaus` has no command: roles in which this
+//! binary is restarted, over the library's public API. `ours.toml` lists them.
 
 mod asking;
 mod driving;

@@ -1,5 +1,5 @@
-//! A scripted client: it finds, asks, subscribes, controls and drives, each in the steps that are
-//! seen in captures.
+//! A scripted client: it discovers, queries, subscribes, controls and drives, in the steps seen in
+//! captures.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! The messages that scripted peers say and understand, octet by octet.
+//! Messages of scripted peers, octet by octet.
 
 use jaus::address::JausId;
 

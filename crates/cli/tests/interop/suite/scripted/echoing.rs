@@ -1,4 +1,4 @@
-//! Test messages of any size, there and back, by a scripted peer.
+//! Echo of test messages of any size by a scripted peer.
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,5 @@
-//! Events in the manner of JAUS++: the numbers begin anew with each kind of query, the first report
-//! comes twice, and the same wish of the same client is the same event.
+//! Events with the behaviour of JAUS++: ids start again for each kind of query, the first report
+//! arrives twice, and a repeated request of a client gives the same event.
 
 use std::time::{Duration, Instant};
 

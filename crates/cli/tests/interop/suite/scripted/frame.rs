@@ -1,5 +1,5 @@
-//! AS5669A frames in UDP datagrams, written and read without a line of this project's own: what
-//! both sides of a test share cannot be shown to be right by it.
+//! AS5669A frames in UDP datagrams, encoded and decoded without this project's code: a test cannot
+//! verify code that both of its sides share.
 
 use jaus::address::JausId;
 

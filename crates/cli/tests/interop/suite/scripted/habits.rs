@@ -1,4 +1,4 @@
-//! In what known peers differ from each other, as the captures of them show it.
+//! Differences between known peers, as seen in captures.
 
 /// How a peer speaks.
 #[derive(Debug, Clone, Copy)]

@@ -1,5 +1,5 @@
-//! Peers that are played: each speaks with the habits that captures show of a known one, over
-//! framing and message bodies of its own, and does only what its part needs.
+//! Scripted peers: each has the habits of a known peer, as seen in captures, with its own framing
+//! and message encoding, and does only what its role requires.
 
 mod asking;
 mod body;

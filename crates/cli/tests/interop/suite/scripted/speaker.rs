@@ -1,4 +1,4 @@
-//! A scripted peer's transport: its socket, its numbers, its fragments, whom it knows where.
+//! Transport of a scripted peer: its socket, sequence numbers, fragments and known addresses.
 
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4, UdpSocket};

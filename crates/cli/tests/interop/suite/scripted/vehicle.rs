@@ -1,5 +1,5 @@
-//! A scripted vehicle in the manner of JAUS++: it can be found, asked, subscribed to, controlled and
-//! pushed, and does a few things as no standard has them.
+//! A scripted vehicle with the behaviour of JAUS++: it can be discovered, queried, subscribed to,
+//! controlled and driven, and deviates from the standard in a few points.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! The list of JAUS clients, as an RA driver gets it.
+//! The list of JAUS clients at an RA driver.
 
 use std::collections::BTreeMap;
 
@@ -7,18 +7,18 @@ use proptest::prelude::*;
 use super::super::list::{Course, Refused};
 use super::*;
 
-/// An RA driver: what it holds by number, in which order it was set, and its speeds.
+/// An RA driver: its places by number, their order of arrival, and its speeds.
 #[derive(Debug, Default)]
 struct Driver {
     held: BTreeMap<u16, Bytes>,
     order: Vec<u16>,
-    /// All that came, in order.
+    /// All received messages, in order.
     came: Vec<Bytes>,
     speeds: Vec<f64>,
     mute: bool,
-    /// Whether it keeps what it had under a number, and tells that alone.
+    /// Whether it keeps the first place of a number, and reports only that.
     keeps: bool,
-    /// Whether it has several under a number, and tells all of them, as OpenJAUS's does.
+    /// Whether it stores several places under a number and reports all, as OpenJAUS does.
     appends: bool,
 }
 
@@ -27,10 +27,10 @@ struct World {
     now: Instant,
     course: Course,
     driver: Driver,
-    /// The codes of what clients were answered.
+    /// Codes of the answers to clients.
     answers: Vec<u16>,
     refused: Vec<Refused>,
-    /// Loses every so many-th message; 0 loses none.
+    /// Loses every n-th message; 0 loses none.
     loses: u32,
     sent: u32,
 }
@@ -135,13 +135,13 @@ impl World {
         self.command(&delete(u16::MAX));
         for chunk in recs.collect::<Vec<_>>().chunks(200) {
             let mut chunk = chunk.to_vec();
-            // The next one comes with the next message.
+            // The next element follows in the next message.
             chunk.last_mut().unwrap().next_uid = 0;
             self.command(&set(chunk));
         }
     }
 
-    /// The data of these places with the numbers from 0 on.
+    /// The data of these places, numbered from 0.
     fn expected(&self, places: &[u16]) -> BTreeMap<u16, Bytes> {
         let kind = self.places;
         let data = |(number, &place)| (number, kind.to_ra(&element(kind, place), number).unwrap());
@@ -338,7 +338,7 @@ proptest! {
         for list in &lists {
             world.set_list(list);
             let uid = from.min(list.len() as u16);
-            // Commands to stop may be lost like any other.
+            // Stop commands may be lost like any other.
             world.loses = loses;
             world.command(&execute(Some(uid), 2.0));
             world.loses = 0;

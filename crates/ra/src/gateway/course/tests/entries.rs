@@ -1,4 +1,4 @@
-//! The places of an RA client, as a JAUS driver's list has them.
+//! Places of an RA client in a JAUS driver's list.
 
 use proptest::prelude::*;
 
@@ -16,9 +16,9 @@ struct World {
     now: Instant,
     entries: Entries,
     list: ElementList,
-    /// At which element the driver is.
+    /// The active element of the driver.
     active: u16,
-    /// Whether it is ready: else it begins no list.
+    /// Whether it is ready: otherwise it executes no list.
     ready: bool,
     executed: Vec<(Option<u16>, f64)>,
     refused: Vec<Refused>,
@@ -84,7 +84,7 @@ impl World {
         }
     }
 
-    /// A message at the driver, and its answer.
+    /// Delivers a message to the driver, and its answer.
     fn arrive(&mut self, payload: &Bytes) {
         self.sent += 1;
         let is_lost = self.loses > 0 && self.sent.is_multiple_of(self.loses);
@@ -121,7 +121,7 @@ impl World {
         }
     }
 
-    /// The elements of the list, and what they hold.
+    /// The elements of the list with their content.
     fn held(&self) -> Vec<(u16, Element)> {
         let uids = self.list.uids();
         let data = |uid| (uid, self.list.get(uid).unwrap().element_data.clone());
@@ -199,7 +199,7 @@ fn a_list_that_was_driven_is_not_driven_again_but_goes_on_with_what_was_added() 
     world.set(2, 12);
     world.speed(2.0);
     assert_eq!(world.executed.last().unwrap().0, Some(3));
-    // A new way, from its first place on.
+    // A new path, from its first place on.
     world.active = 0;
     world.set(0, 20);
     world.speed(2.0);

@@ -1,9 +1,9 @@
-//! Control of one RA component on behalf of JAUS clients.
+//! Control lease of one RA component on behalf of JAUS clients.
 //!
-//! Towards the RA component there is one client, the gateway. The lease decides which JAUS client it
-//! stands for, by the rules of Access Control: the first client that asks, and after that one with a
-//! greater authority. A client gets control only after the RA component has confirmed it. Control ends
-//! when the client releases it, does not renew it in time, or is dead; the RA component is then
+//! The RA component sees one client, the gateway. The lease decides which JAUS client the gateway
+//! acts for, by the rules of Access Control: the first requester, later one with a higher
+//! authority. A client gets control only after the RA component has confirmed it. Control ends when
+//! the client releases it, does not renew it in time, or is dead; the RA component is then
 //! [stopped and released](release).
 
 mod release;
@@ -28,11 +28,11 @@ use jaus::service::Controller;
 /// The terms of a lease.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Terms {
-    /// How long the RA component may take to answer a request.
+    /// Timeout of the RA component's answer to a request.
     pub(super) patience: Duration,
-    /// The most authority that the gateway claims.
+    /// Maximum authority that the gateway claims.
     pub(super) authority: u8,
-    /// Control ends this long after the last Request Control, with a quarter's grace; never, if zero.
+    /// Timeout of control after the last Request Control, plus a quarter as grace; none if zero.
     pub(super) timeout: Duration,
 }
 
@@ -41,10 +41,10 @@ pub(super) struct Terms {
 pub(super) struct Lease {
     state: State,
     terms: Terms,
-    /// Whether the next rejection is about a hold of ours that a request of ours with more authority
-    /// has ended: OpenJAUS rejects whom it takes control from, and then confirms.
+    /// Whether the next rejection concerns our own earlier control, outranked by our request with a
+    /// higher authority: OpenJAUS rejects the previous controller, and then confirms.
     outranked_ourselves: bool,
-    /// Whether the gateway stops, and gives control to no client any more.
+    /// Whether the gateway is stopping and grants no further control.
     is_closed: bool,
     release: Release,
     said: Effects,
@@ -53,7 +53,7 @@ pub(super) struct Lease {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Free,
-    /// The RA component has been asked.
+    /// The RA component was sent a request.
     Asking {
         client: Controller,
         next: Instant,
@@ -61,30 +61,30 @@ enum State {
     },
     Held {
         client: Controller,
-        /// When the RA component was asked last: renewals are passed on now and then.
+        /// Time of the last request to the RA component: renewals are forwarded at intervals.
         asked: Instant,
-        /// When the client asked last.
+        /// Time of the client's last request.
         renewed: Instant,
     },
 }
 
-/// What is to be told, to clients and to the RA component.
+/// Messages to clients and to the RA component.
 #[derive(Debug, Default)]
 pub(super) struct Effects {
     pub(super) to_clients: Vec<(JausId, Bytes)>,
     pub(super) to_ra: Vec<(u16, Bytes)>,
-    /// Whether a client has been given control.
+    /// Whether a client was granted control.
     pub(super) granted: bool,
 }
 
 impl Lease {
-    /// Requests that are not answered are repeated after this time.
+    /// Interval of repeated requests without an answer.
     const RETRY: Duration = Duration::from_millis(300);
-    /// Renewals of clients are passed on as seldom as this.
+    /// Minimum interval of forwarded renewals.
     const RENEWAL: Duration = Duration::from_secs(5);
 
-    /// A lease that no client holds. `own` is the gateway among RA systems; `halt` stops the RA
-    /// component, if it is a driver.
+    /// A lease without a client. `own` is the gateway's RA id; `halt` stops the RA component, if it
+    /// is a driver.
     pub(super) fn new(own: RaId, ra: RaId, halt: Option<Halt>, terms: Terms) -> Self {
         Self {
             state: State::Free,
@@ -96,19 +96,19 @@ impl Lease {
         }
     }
 
-    /// Releases what an earlier gateway with our id has left held.
+    /// Releases control left over from an earlier gateway with our id.
     pub(super) fn reclaim(&mut self, now: Instant) {
         self.release.reclaim(now);
         self.follow_release();
     }
 
-    /// Whether the RA component is being reclaimed: it is not available until that is done.
+    /// Whether the RA component is being reclaimed, and so not available yet.
     pub(super) const fn is_reclaiming(&self) -> bool {
         self.release.is_reclaiming()
     }
 
-    /// Releases the RA component again, because it still takes us for its controller though no client
-    /// has control.
+    /// Releases the RA component again, because it still considers us its controller although no
+    /// client has control.
     pub(super) fn release_again(&mut self, now: Instant) {
         if self.state == State::Free && self.release.is_done() {
             self.release.begin(now, Standby::Spare);
@@ -129,17 +129,17 @@ impl Lease {
         self.controller().is_some_and(|it| it.id == client)
     }
 
-    /// Whether the RA component may think that we control it.
+    /// Whether the RA component may consider us its controller.
     pub(super) const fn is_engaged(&self) -> bool {
         !matches!(self.state, State::Free)
     }
 
-    /// What is to be told since this was asked last.
+    /// Takes the queued messages.
     pub(super) fn take_said(&mut self) -> Effects {
         std::mem::take(&mut self.said)
     }
 
-    /// A client asks for control.
+    /// Handles a control request of a client.
     pub(super) fn request(&mut self, now: Instant, id: JausId, authority: u8) {
         let client = Controller {
             id,
@@ -187,7 +187,7 @@ impl Lease {
         }
     }
 
-    /// A client releases control.
+    /// Handles a release by a client.
     pub(super) fn release(&mut self, now: Instant, client: JausId) {
         match self.state {
             State::Held { client: it, .. } | State::Asking { client: it, .. }
@@ -196,13 +196,13 @@ impl Lease {
                 self.let_go(now);
                 self.reject(client, Rejection::CONTROL_RELEASED);
             }
-            // A client that asks again, because the answer was lost, gets it again.
+            // A client repeats its release when the answer was lost; answer again.
             State::Free => self.reject(client, Rejection::CONTROL_RELEASED),
             State::Held { .. } | State::Asking { .. } => {}
         }
     }
 
-    /// A client is dead.
+    /// Removes a dead client.
     pub(super) fn forget(&mut self, now: Instant, client: JausId) {
         match self.state {
             State::Held { client: it, .. } | State::Asking { client: it, .. }
@@ -214,7 +214,7 @@ impl Lease {
         }
     }
 
-    /// The RA component has answered a request: 0 is yes.
+    /// Handles the RA component's answer to a request: 0 grants control.
     pub(super) fn handle_confirm(&mut self, now: Instant, code: u8) {
         if self.state == State::Free && self.release.handle_confirm(now, code) {
             return self.follow_release();
@@ -239,19 +239,19 @@ impl Lease {
                 self.reject(client.id, Rejection::NOT_AVAILABLE);
             }
             (State::Held { .. }, 0) => {}
-            // It thinks that we control it.
+            // It considers us its controller.
             (State::Free, 0) => self.let_go(now),
             (State::Free, _) => {}
         }
     }
 
-    /// The RA component has reported who controls it.
+    /// Handles a report of the RA component's controller.
     pub(super) fn handle_controller(&mut self, now: Instant, controller: RaId) {
         self.release.handle_report(now, controller);
         self.follow_release();
     }
 
-    /// The RA component refuses control, or takes it back: somebody has a greater authority.
+    /// Handles a rejection: the RA component refuses or revokes control, for a higher authority.
     pub(super) fn handle_reject(&mut self) {
         if std::mem::take(&mut self.outranked_ourselves) {
             return;
@@ -266,14 +266,14 @@ impl Lease {
         }
     }
 
-    /// Ends what has lasted too long. To be called before messages that have waited are handled.
+    /// Ends expired control and requests. Call it before queued messages are handled.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         self.release.handle_timeout(now);
         self.follow_release();
         match self.state {
             State::Free => {}
             State::Asking { client, until, .. } if now >= until => {
-                // Its answer may be what was lost.
+                // Its answer may have been lost.
                 self.let_go(now);
                 self.confirm(client.id, Confirmation::NOT_AVAILABLE);
             }
@@ -309,7 +309,7 @@ impl Lease {
         own.into_iter().chain(self.release.poll_timeout()).min()
     }
 
-    /// When control ends that was renewed then.
+    /// Expiry of control that was last renewed at `renewed`.
     fn ends(&self, renewed: Instant) -> Option<Instant> {
         let timeout = self.terms.timeout;
         (!timeout.is_zero()).then(|| renewed + timeout + timeout / 4)
@@ -317,7 +317,7 @@ impl Lease {
 
     fn ask(&mut self, now: Instant, client: Controller) {
         let until = now + self.terms.patience;
-        // A release that is not known to have arrived leaves us in control, and the component then
+        // Until the release is known to have arrived, we are still in control, and the component
         // rejects us before it confirms.
         self.outranked_ourselves |= !self.release.is_done();
         self.release.cancel();
@@ -341,13 +341,13 @@ impl Lease {
         self.follow_release();
     }
 
-    /// Whether the RA component has been released, as far as is known.
+    /// Whether the RA component is released, as far as known.
     pub(super) fn is_released(&self) -> bool {
         !self.is_engaged() && self.release.is_done()
     }
 
-    /// Ends the lease because the gateway stops or the RA component is gone. The round is sent twice,
-    /// for there may be no time to repeat it.
+    /// Ends the lease because the gateway stops or the RA component is gone. The round is sent
+    /// twice, as there may be no time to repeat it.
     pub(super) fn end(&mut self, now: Instant) {
         self.is_closed = true;
         let controller = self.controller();

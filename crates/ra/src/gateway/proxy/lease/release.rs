@@ -1,16 +1,16 @@
-//! Release of an RA component: it is stopped first, then released, until it is known to be free.
+//! Release of an RA component: it is stopped, then released, until it is known to be free.
 //!
-//! RA components keep their last command: OpenJAUS's primitive driver drives on with the last effort
-//! as soon as its controller reports ready, its waypoint driver with the last speed. A gateway that
-//! was killed therefore leaves components behind that obey its successor, which has the same id. So
-//! each driver is reclaimed when it appears, before any JAUS client gets control of it:
+//! RA components keep their last command: OpenJAUS's primitive driver resumes the last effort as
+//! soon as its controller reports ready, its waypoint driver the last speed. A killed gateway
+//! therefore leaves components behind that obey its successor with the same id. So each driver is
+//! reclaimed when it appears, before a JAUS client gets control of it:
 //!
-//! 1. Query Component Control asks who controls it.
+//! 1. Query Component Control reads the controller.
 //! 2. OpenJAUS does not answer that. Request Component Control with authority 0 then takes control
-//!    from nobody: another controller makes the component reject it, a free component and one that is
-//!    held in our id confirm it.
-//! 3. A component that is held in our id is stopped and released. The rounds are repeated until Report
-//!    Component Control names another controller or none; a component that does not report it gets
+//!    from no other controller: a component with another controller rejects it; a free component
+//!    and one held in our id confirm it.
+//! 3. A component held in our id is stopped and released. The rounds are repeated until Report
+//!    Component Control shows another controller or none; a component that does not report it gets
 //!    [`ROUNDS`](Release::ROUNDS) of them.
 
 use std::time::{Duration, Instant};
@@ -23,24 +23,24 @@ use crate::RaId;
 /// Code and data of a message for the RA component.
 type Command = (u16, Bytes);
 
-/// How an RA driver is stopped.
+/// Stop procedure of an RA driver.
 #[derive(Debug, Clone, Default)]
 pub(in crate::gateway::proxy) struct Halt {
-    /// The command that stops it, if there is one that says nothing besides. Standby does without.
+    /// Its stop command, if one works without context. Otherwise Standby stops it.
     pub(in crate::gateway::proxy) command: Option<(u16, Bytes)>,
 }
 
 /// Stops and releases one RA component.
 #[derive(Debug)]
 pub(super) struct Release {
-    /// The gateway among RA systems.
+    /// The gateway's RA id.
     own: RaId,
     ra: RaId,
     halt: Option<Halt>,
     state: State,
-    /// Whether no client may have control before this is done.
+    /// Whether no client may have control until this is done.
     reclaims: bool,
-    /// Whether it reports who controls it.
+    /// Whether the component reports its controller.
     reports_control: bool,
     commands: Vec<Command>,
 }
@@ -48,12 +48,12 @@ pub(super) struct Release {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Done,
-    /// The component is asked who controls it.
+    /// The controller is queried.
     Asking {
         next: Instant,
         asked: u32,
     },
-    /// It is stopped and released.
+    /// The component is stopped and released.
     Releasing {
         next: Instant,
         rounds: u32,
@@ -64,25 +64,25 @@ enum State {
 /// Whether a driver is also sent to Standby.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Standby {
-    /// It was held by us.
+    /// We had control.
     Send,
-    /// It may have been free, and may be wanted ready by others: only if nothing else stops it.
+    /// It may have been free, and ready for others: only if nothing else stops it.
     Spare,
 }
 
 impl Release {
-    /// Between two questions or rounds.
+    /// Interval of queries or rounds.
     const INTERVAL: Duration = Duration::from_millis(300);
-    /// Query Component Control is sent so often before Request Component Control.
+    /// Number of Query Component Control messages before Request Component Control.
     const QUERIES: u32 = 2;
-    /// Rounds for a component that does not report who controls it.
+    /// Rounds for a component that does not report its controller.
     const ROUNDS: u32 = 3;
-    /// After so many questions or rounds a warning is logged, and they become rare.
+    /// Number of queries or rounds before a warning is logged and the interval grows.
     const PATIENCE: u32 = 10;
-    /// Between two questions or rounds after that.
+    /// Interval of queries or rounds after that.
     const SLOW: Duration = Duration::from_secs(5);
 
-    /// Nothing to do yet. `halt` stops the component; without it, it drives nothing.
+    /// An idle release. `halt` stops the component; `None` if it is no driver.
     pub(super) const fn new(own: RaId, ra: RaId, halt: Option<Halt>) -> Self {
         Self {
             own,
@@ -95,8 +95,8 @@ impl Release {
         }
     }
 
-    /// Finds out whether the component is held in our id, and stops and releases it if so. One that
-    /// drives nothing is released without a question.
+    /// Determines whether the component is held in our id, and stops and releases it if so. A
+    /// component that is no driver is released without a query.
     pub(super) fn reclaim(&mut self, now: Instant) {
         if self.halt.is_none() {
             return self.begin(now, Standby::Spare);
@@ -119,23 +119,23 @@ impl Release {
         self.handle_timeout(now);
     }
 
-    /// A client asks for control of a component that is being released for another one: it has been
-    /// stopped already.
+    /// Cancels the release: a client requests control of a component that is being released for
+    /// another one, and has been stopped already.
     pub(super) const fn cancel(&mut self) {
         self.state = State::Done;
     }
 
-    /// Whether the component is being reclaimed: no client may have it yet.
+    /// Whether the component is being reclaimed: no client may have control yet.
     pub(super) const fn is_reclaiming(&self) -> bool {
         self.reclaims
     }
 
-    /// Whether rounds are still to come.
+    /// Whether no rounds are left.
     pub(super) fn is_done(&self) -> bool {
         self.state == State::Done
     }
 
-    /// The component has reported who controls it.
+    /// Handles a report of the component's controller.
     pub(super) fn handle_report(&mut self, now: Instant, controller: RaId) {
         self.reports_control = true;
         match self.state {
@@ -148,8 +148,8 @@ impl Release {
         }
     }
 
-    /// The component has granted control to us (0), or has refused with a code. Says whether that was
-    /// the answer to a question of the release.
+    /// Handles a grant of control (0) or a refusal with its code. Returns whether it answers a
+    /// request of the release.
     pub(super) fn handle_confirm(&mut self, now: Instant, code: u8) -> bool {
         match (self.state, code) {
             // It may have been free before.
@@ -161,7 +161,7 @@ impl Release {
         true
     }
 
-    /// The component has refused control or taken it back: we do not hold it.
+    /// Handles a rejection: we do not have control.
     pub(super) fn handle_reject(&mut self) {
         self.end();
     }
@@ -171,7 +171,7 @@ impl Release {
         self.reclaims = false;
     }
 
-    /// Sends the next question or round, if it is due.
+    /// Sends the next query or round, if it is due.
     pub(super) fn handle_timeout(&mut self, now: Instant) {
         match self.state {
             State::Asking { next, asked } if next <= now => self.ask(now, asked),
@@ -208,7 +208,7 @@ impl Release {
         };
     }
 
-    /// The time until the next question or round; logs `why` it becomes longer.
+    /// The interval to the next query or round; logs `why` it grows.
     fn interval(&self, made: u32, why: &str) -> Duration {
         if made == Self::PATIENCE {
             tracing::warn!(component = %self.ra, "the RA component {why}");
@@ -231,7 +231,7 @@ impl Release {
         self.commands.push((QUERY_CONTROL, Bytes::new()));
     }
 
-    /// Messages for the RA component.
+    /// Takes the queued messages to the RA component.
     pub(super) fn take_commands(&mut self) -> Vec<Command> {
         std::mem::take(&mut self.commands)
     }

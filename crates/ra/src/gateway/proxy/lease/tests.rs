@@ -1,4 +1,4 @@
-//! Tests of the lease and of the release.
+//! Tests of lease and release.
 
 use super::super::codes::{QUERY_CONTROL, RELEASE_CONTROL, SET_SPEED, STANDBY};
 use super::*;
@@ -26,7 +26,7 @@ fn lease() -> (Lease, Instant) {
     (Lease::new(OWN, RA, Some(halt), terms), now)
 }
 
-/// Who was told what: the client, the code of the message, its response code.
+/// The answers to clients: client, message code, response code.
 fn told(said: &Effects) -> Vec<(JausId, u16, u8)> {
     let told = |(to, it): &(JausId, Bytes)| (*to, u16::from_le_bytes([it[0], it[1]]), it[2]);
     said.to_clients.iter().map(told).collect()
@@ -77,7 +77,7 @@ fn whoever_has_more_authority_takes_over_and_no_more_than_the_most_is_claimed() 
     let said = lease.take_said();
     assert_eq!(told(&said), [(CLIENT, 0x0010, 0)]);
     assert_eq!(said.to_ra, [(REQUEST_CONTROL, Bytes::from_static(&[200]))]);
-    // OpenJAUS rejects the hold that we had, and then confirms.
+    // OpenJAUS rejects our previous control, and then confirms.
     lease.handle_reject();
     assert!(told(&lease.take_said()).is_empty());
     lease.handle_confirm(now, 0);
@@ -97,12 +97,12 @@ fn a_client_that_raises_its_own_authority_keeps_control() {
     assert!(lease.obeys(CLIENT));
 }
 
-/// The codes of the messages for the RA component.
+/// Codes of the messages to the RA component.
 fn codes(said: &Effects) -> Vec<u16> {
     said.to_ra.iter().map(|it| it.0).collect()
 }
 
-/// Lets time pass until a moment; all that was said meanwhile.
+/// Runs timers until a moment; collects all messages.
 fn run(lease: &mut Lease, until: Instant) -> Effects {
     let mut all = Effects::default();
     while let Some(wake) = lease.poll_timeout().filter(|&wake| wake <= until) {
@@ -114,7 +114,7 @@ fn run(lease: &mut Lease, until: Instant) -> Effects {
     all
 }
 
-/// A stop, Standby, a release, and a question whether that was enough.
+/// Stop, Standby, release, and a query of the result.
 const ROUND: [u16; 4] = [SET_SPEED, STANDBY, RELEASE_CONTROL, QUERY_CONTROL];
 
 #[test]
@@ -172,7 +172,7 @@ fn a_release_is_repeated_until_the_component_reports_that_it_is_free() {
     };
     let after = now + Duration::from_secs(60);
     let many = releases(&run(&mut lease, after));
-    // Ten at first, and then one every five seconds.
+    // Ten at first, then one every five seconds.
     assert!((18..=24).contains(&many), "{many}");
     lease.handle_controller(after, RaId::new(0, 0, 0, 0));
     assert_eq!(lease.poll_timeout(), None);

@@ -1,4 +1,4 @@
-//! What is known of a peer while it is examined, and the questions that are put to it.
+//! State of a peer during its examination, and the queries to it.
 
 use std::collections::VecDeque;
 use std::net::SocketAddr;
@@ -14,54 +14,54 @@ use super::seen::{Heard, Reserved, Seen};
 use super::target::Target;
 use super::transfer::Transfer;
 
-/// The code of messages that nobody acts on: user-defined (AS5710 leaves D000h and above to users).
+/// Code of messages without effect: user-defined (AS5710 leaves D000h and above to users).
 pub(super) const PADDING: u16 = 0xD7F0;
 
-/// Who asks whom, and how.
+/// Parameters of an examination.
 #[derive(Clone, Debug)]
 pub(super) struct Settings {
     pub(super) target: Target,
-    /// The id that asks.
+    /// Our own id.
     pub(super) own: JausId,
-    /// The id that our node is to have, if one is chosen.
+    /// The intended id of our node, if one is chosen.
     pub(super) wanted: Option<JausId>,
-    /// The port that we ask from.
+    /// Our port.
     pub(super) port: u16,
-    /// Why there is no multicast group to speak to and to hear, if there is none.
+    /// Why there is no multicast group, if so.
     pub(super) no_group: Option<String>,
-    /// How long to wait for a first sign.
+    /// Timeout of the first sign of life.
     pub(super) listen: Duration,
-    /// Whether control may be taken.
+    /// Whether the examination may take control.
     pub(super) control: bool,
-    /// The most octets of payload in one packet.
+    /// Maximum octets of payload per packet.
     pub(super) payload_limit: usize,
 }
 
-/// Something to do on the network.
+/// A network action.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Send {
-    /// A message to one address, on the interface that leads there.
+    /// A message to one address, on its interface.
     To(SocketAddr, Frame),
     /// A message to the multicast group, on the peer's interface or on all.
     Group(Frame),
-    /// A message from a passing socket, which hears whether the port refuses.
+    /// A message from a temporary socket that detects a refused port.
     Probe(SocketAddr, Frame),
-    /// A TCP connection, which is closed as soon as it is open.
+    /// A TCP connection, closed as soon as it is open.
     Connect(SocketAddr),
 }
 
-/// What is asked, and for how long.
+/// A query with its timing.
 #[derive(Clone, Debug)]
 pub(super) struct Question {
     pub(super) sends: Vec<Send>,
-    /// When they are sent again while no answer comes.
+    /// Interval of repetitions without an answer.
     pub(super) again: Option<Duration>,
-    /// How long to wait for an answer.
+    /// Timeout of the answer.
     pub(super) patience: Duration,
 }
 
 impl Question {
-    /// Asked three times within a second.
+    /// A query, repeated up to three times within a second.
     pub(super) fn new(send: Send) -> Self {
         Self {
             sends: vec![send],
@@ -70,7 +70,7 @@ impl Question {
         }
     }
 
-    /// Nothing is asked; what comes is looked at.
+    /// No query; only received messages are evaluated.
     pub(super) const fn silence(patience: Duration) -> Self {
         Self {
             sends: Vec::new(),
@@ -79,7 +79,7 @@ impl Question {
         }
     }
 
-    /// Asked once: what is done twice would be something else.
+    /// Sends it only once: a repetition would have an effect of its own.
     pub(super) const fn once(mut self) -> Self {
         self.again = None;
         self
@@ -91,7 +91,7 @@ impl Question {
     }
 }
 
-/// A service that the component lists.
+/// A service from the component's list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Offer {
     pub(super) urn: String,
@@ -105,32 +105,32 @@ pub(super) struct OpenEvent {
     pub(super) id: u8,
 }
 
-/// The peer, as far as it is known.
+/// The peer, as far as known.
 #[derive(Debug)]
 pub(super) struct Case {
     pub(super) settings: Settings,
-    /// Where it is.
+    /// Its address.
     pub(super) address: Option<SocketAddr>,
-    /// The component that is asked.
+    /// The examined component.
     pub(super) id: Option<JausId>,
-    /// The interface that leads there.
+    /// The interface that leads to it.
     pub(super) link: Option<usize>,
     pub(super) seen: Seen,
     pub(super) trials: Vec<Trial>,
-    /// The services that the component lists, once it has.
+    /// The services of the component, once reported.
     pub(super) services: Option<Vec<Offer>>,
-    /// How many services the first report of a list has.
+    /// Number of services in the first report of a list.
     pub(super) listed: usize,
-    /// What the component is called.
+    /// Name of the component.
     pub(super) name: Option<String>,
-    /// What has to be undone before we go.
+    /// Events to cancel before the end.
     pub(super) open_events: Vec<OpenEvent>,
     pub(super) in_control: bool,
-    /// A large message on its way to the peer.
+    /// A large message in transfer to the peer.
     pub(super) transfer: Option<Transfer>,
-    /// What it does with what is reserved.
+    /// Its reaction to reserved values.
     pub(super) reserved: Reserved,
-    /// Whether somebody there sends back what nobody acts on.
+    /// Whether a program there echoes messages without effect.
     pub(super) echoes: bool,
     pub(super) unsent: VecDeque<Send>,
     sequence: u16,
@@ -158,8 +158,8 @@ impl Case {
         }
     }
 
-    /// The id under which the port is probed: a neighbour of ours, so that nobody learns a wrong
-    /// address of ours.
+    /// The id for port probes: a neighbour of ours, so that no peer learns a wrong address for our
+    /// id.
     pub(super) fn probe_id(&self) -> JausId {
         let own = self.settings.own;
         let next = own.component() % (JausId::ANY_COMPONENT - 1) + 1;
@@ -171,7 +171,7 @@ impl Case {
         self.sequence
     }
 
-    /// A message to somebody.
+    /// A message to a destination.
     pub(super) fn frame(&mut self, destination: JausId, payload: Bytes) -> Frame {
         let sequence = self.next_sequence();
         Frame {
@@ -181,18 +181,18 @@ impl Case {
         }
     }
 
-    /// A message to the peer's component alone.
+    /// A message to the peer's component only.
     pub(super) fn ask_peer(&mut self, message: &impl Message) -> Option<Send> {
         let (id, address) = (self.id?, self.address?);
         Some(Send::To(address, self.frame(id, octets(message))))
     }
 
-    /// A message to everybody, by multicast.
+    /// A multicast to all components.
     pub(super) fn ask_everybody(&mut self, message: &impl Message) -> Send {
         Send::Group(self.global(JausId::EVERYONE, message))
     }
 
-    /// A message to everybody who reads it, sent to one address.
+    /// A message to all components, sent to one address.
     pub(super) fn ask_all_at(&mut self, address: SocketAddr, message: &impl Message) -> Send {
         Send::To(address, self.global(JausId::EVERYONE, message))
     }
@@ -203,23 +203,24 @@ impl Case {
         frame
     }
 
-    /// A short message that nobody acts on, and that whoever has the id acknowledges.
+    /// A short message without effect that requests an acknowledgement from the component with this
+    /// id.
     pub(super) fn wanting_acknowledgement(&mut self, id: JausId) -> Frame {
         let mut frame = self.frame(id, PADDING.to_le_bytes().to_vec().into());
         frame.flags = frame.flags.with_acknowledgement(Acknowledgement::Request);
         frame
     }
 
-    /// The same to everybody, as Junior calls whose address it does not know: who has no Discovery
-    /// acknowledges.
+    /// The same as a multicast, as Junior sends it to unknown addresses: peers without Discovery
+    /// acknowledge it.
     pub(super) fn call_alone(&mut self) -> Option<Send> {
         let mut frame = self.wanting_acknowledgement(self.id?);
         frame.flags = frame.flags.with_broadcast(Broadcast::Global);
         Some(Send::Group(frame))
     }
 
-    /// The same questions once more, with numbers of their own: one that was heard before is taken
-    /// for a duplicate.
+    /// The same messages with new sequence numbers: receivers treat a repeated number as a
+    /// duplicate.
     pub(super) fn anew(&mut self, sends: &[Send]) -> Vec<Send> {
         let mut sends = sends.to_vec();
         for send in &mut sends {
@@ -230,7 +231,7 @@ impl Case {
         sends
     }
 
-    /// The acknowledgement that somebody wants.
+    /// The acknowledgement that a message requests.
     pub(super) fn acknowledge(&mut self, heard: &Heard) -> Option<Send> {
         let wanted = heard.frame.flags.acknowledgement() == Acknowledgement::Request;
         let for_us = heard.frame.destination == self.settings.own;
@@ -246,7 +247,7 @@ impl Case {
         Some(Send::To(heard.from, frame))
     }
 
-    /// What the peer's component has said to us behind a mark.
+    /// Messages from the peer's component to us since a mark.
     pub(super) fn told(&self, mark: usize) -> impl DoubleEndedIterator<Item = &Heard> {
         let (own, id) = (self.settings.own, self.id);
         self.seen.since(mark).iter().filter(move |heard| {
@@ -256,13 +257,13 @@ impl Case {
         })
     }
 
-    /// The first report of a kind that the peer's component has sent us behind a mark.
+    /// The first report of a kind from the peer's component since a mark.
     pub(super) fn report<M: Message>(&self, mark: usize) -> Option<M> {
         let mut all = self.reports(mark);
         all.next()
     }
 
-    /// All of them, as far as they can be read.
+    /// All decodable reports of a kind.
     pub(super) fn reports<M: Message>(&self, mark: usize) -> impl Iterator<Item = M> {
         let of_kind = self
             .told(mark)
@@ -270,7 +271,7 @@ impl Case {
         of_kind.filter_map(|heard| M::decode(&heard.frame.payload).ok())
     }
 
-    /// Whether something of the kind came that cannot be read.
+    /// The error of the first malformed report of a kind.
     pub(super) fn unreadable<M: Message>(&self, mark: usize) -> Option<String> {
         let mut of_kind = self
             .told(mark)
@@ -280,7 +281,7 @@ impl Case {
             .map(|error| error.to_string())
     }
 
-    /// What became of an exchange that was tried before.
+    /// The result of an earlier exchange.
     pub(super) fn mark_of(&self, exchange: Exchange) -> Option<Mark> {
         let mut trials = self.trials.iter();
         let trial = trials.find(|trial| trial.exchange == exchange)?;
@@ -291,7 +292,7 @@ impl Case {
         self.mark_of(exchange) == Some(Mark::Ok)
     }
 
-    /// Why nothing can be asked: something without which nothing works has failed.
+    /// The reason to skip everything: a basic exchange has failed.
     pub(super) fn cut_off(&self) -> Option<Verdict> {
         let mut basic = self
             .trials
@@ -301,7 +302,7 @@ impl Case {
         Some(Verdict::cut_off(format!("not without \"{failed}\"")))
     }
 
-    /// Why nobody can be asked: that, or the id is not known.
+    /// The reason to skip queries: a basic exchange has failed, or the id is unknown.
     pub(super) fn nobody(&self) -> Option<Verdict> {
         if let Some(skip) = self.cut_off() {
             return Some(skip);
@@ -313,7 +314,7 @@ impl Case {
         })
     }
 
-    /// Why questions to services need not be asked: none was answered so far.
+    /// The reason to skip queries to services: none was answered so far.
     pub(super) fn mute(&self) -> Option<Verdict> {
         const BEFORE: [Exchange; 3] = [
             Exchange::Identification,
@@ -327,7 +328,7 @@ impl Case {
             .then(|| Verdict::skipped("it answers no questions: it has no services"))
     }
 
-    /// Why a service need not be asked: the component lists its services, and not this one.
+    /// The reason to skip a service: the component's list does not have it.
     pub(super) fn lacks(&self, service: &str) -> Option<Verdict> {
         let listed = self.services.as_ref()?;
         let has = listed
@@ -339,6 +340,6 @@ impl Case {
 
 /// A message's octets.
 pub(super) fn octets(message: &impl Message) -> Bytes {
-    // Nothing that is asked here is longer than its definition allows.
+    // No query here exceeds the limits of its definition.
     message.encode().unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! The trials of Discovery: who it is, whether multicast passes, and what it lists.
+//! Discovery exchanges: identification, multicast and service lists.
 
 use std::time::Duration;
 
@@ -75,7 +75,7 @@ pub(super) fn not_identified(case: &Case, mark: usize) -> Verdict {
     )
 }
 
-/// A report that is there and cannot be read.
+/// The verdict on a malformed report.
 pub(super) fn malformed(report: &str, error: &str) -> Verdict {
     Verdict::failed(
         format!("its {report} cannot be read: {error}"),
@@ -142,7 +142,7 @@ pub(super) fn multicast_unanswered(case: &Case) -> Verdict {
     )
 }
 
-/// Judged by all that was heard since the beginning; waits if that is not long ago.
+/// Evaluates all messages since the beginning; waits if that is too recent.
 pub(super) fn multicast_back(case: &mut Case, now: Duration) -> Begin {
     if let Some(skip) = case.nobody() {
         return Begin::Over(skip);
@@ -174,7 +174,7 @@ pub(super) fn heard_by_multicast(case: &mut Case) -> Judgement {
     }
 }
 
-/// Not everybody speaks to everybody, so silence is no proof.
+/// Not every peer multicasts, so silence is no proof.
 pub(super) fn nothing_by_multicast(case: &Case) -> Verdict {
     let seconds = case.settings.listen.as_secs_f64();
     Verdict::skipped(format!("it said nothing to everybody within {seconds} s"))
@@ -243,7 +243,7 @@ pub(super) fn not_configured(case: &Case, mark: usize) -> Verdict {
     )
 }
 
-/// Asks for services, by one of the three ways that there are.
+/// Queries services in one of the three ways.
 pub(super) fn services(case: &mut Case, way: Exchange) -> Begin {
     if let Some(skip) = case.nobody().or_else(|| case.mute()) {
         return Begin::Over(skip);
@@ -278,10 +278,10 @@ pub(super) fn node_seq(node: u8, components: Vec<u8>) -> query_services::NodeSeq
     }
 }
 
-/// How long the other reports of a list may take, behind the first.
+/// Timeout of further reports of a list after the first.
 const MORE: Duration = Duration::from_millis(150);
 
-/// A long list comes in several reports.
+/// A long list spans several reports.
 pub(super) fn serves(case: &mut Case, way: Exchange, mark: usize, stage: u8) -> Judgement {
     if stage > 0 {
         return Judgement::Wait;
@@ -304,7 +304,7 @@ fn services_in(reports: &[ReportServices]) -> usize {
     components.map(|c| c.service_list.len()).sum()
 }
 
-/// The time for the list, or for its first report, is over.
+/// Timeout of the list, or of its first report.
 pub(super) fn all_listed(case: &mut Case, way: Exchange, mark: usize, stage: u8) -> Verdict {
     if stage == 0 {
         return no_services(case, way, mark);
@@ -314,7 +314,7 @@ pub(super) fn all_listed(case: &mut Case, way: Exchange, mark: usize, stage: u8)
     Verdict::ok(counted(case.listed + services_in(&more), "service"))
 }
 
-/// Keeps what the component itself offers.
+/// Stores the services of the component itself.
 fn note_services(case: &mut Case, reports: &[ReportServices]) {
     let Some(id) = case.id else {
         return;

@@ -1,4 +1,4 @@
-//! The trials of Events: create, hear, cancel, and the same on change.
+//! Events exchanges: create, receive, cancel, and the same on change.
 
 use std::time::Duration;
 
@@ -13,18 +13,18 @@ use super::exchange::{Exchange, Mark, Verdict};
 use super::judgement::{Begin, Judgement};
 use super::standing::answered_query;
 
-/// The rate that is asked for, in hertz.
+/// Requested rate, in hertz.
 const RATE: f64 = 5.0;
-/// How many reports show a rate.
+/// Number of reports that show a rate.
 const ENOUGH: usize = 4;
-/// How long nothing more may come after a cancellation.
+/// Required silence after a cancellation.
 const QUIET: Duration = Duration::from_millis(700);
 
 const PERIODIC: u8 = 1;
 const CANCEL: u8 = 2;
 const ON_CHANGE: u8 = 3;
 
-/// A Create Event with that number of request.
+/// A Create Event with this request id.
 pub(super) fn create(request_id: u8, query: Bytes, periodic: bool) -> CreateEvent {
     let mut create = CreateEvent {
         request_id,
@@ -37,7 +37,7 @@ pub(super) fn create(request_id: u8, query: Bytes, periodic: bool) -> CreateEven
         ..CreateEvent::default()
     };
     if periodic {
-        // Within the range of the field.
+        // The rate is within the field's range.
         let _ = create.set_requested_periodic_rate_hz(RATE);
     }
     create
@@ -56,13 +56,13 @@ fn subscribe(case: &mut Case, request_id: u8) -> Begin {
     };
     let create = create(request_id, query, request_id == PERIODIC);
     match case.ask_peer(&create) {
-        // What is asked twice may be there twice.
+        // A repeated request may create the event twice.
         Some(send) => Begin::Ask(Question::new(send).once()),
         None => Begin::Over(Verdict::skipped("no id is known there")),
     }
 }
 
-/// What became of a request.
+/// Answer to a request.
 pub(super) enum Reply {
     Confirmed(ConfirmEventRequest),
     Rejected(RejectEventRequest),
@@ -155,8 +155,8 @@ pub(super) fn arrived(case: &mut Case, mark: usize) -> Judgement {
     Judgement::Over(Verdict::ok(format!("{rate:.1} Hz")))
 }
 
-/// When the reports of the first open event came; several that come at once are one, which JAUS++
-/// sends up to four times.
+/// Times of the reports of the first open event; simultaneous ones count once, as JAUS++ sends up
+/// to four copies.
 fn times(case: &Case, mark: usize) -> Vec<Duration> {
     use jaus::codec::Message;
 
@@ -219,7 +219,7 @@ fn cancellation(case: &mut Case, event: OpenEvent) -> Option<Send> {
     })
 }
 
-/// First the confirmation; then nothing more may come.
+/// First the confirmation; then no further report may arrive.
 pub(super) fn cancelled(case: &mut Case, mark: usize, stage: u8) -> Judgement {
     if stage > 0 {
         return Judgement::Wait;
@@ -239,7 +239,7 @@ pub(super) fn after_cancel(case: &mut Case, mark: usize, stage: u8) -> Verdict {
             "cancel again; an event that is not wanted any more may go on",
         );
     }
-    // One may have been on its way.
+    // One may have been in transit.
     let late = times(case, mark).len();
     if late > 1 {
         return Verdict::failed(
@@ -298,7 +298,7 @@ pub(super) fn not_on_change(case: &Case, mark: usize, stage: u8) -> Verdict {
     )
 }
 
-/// Cancels whatever is still open.
+/// Cancels all open events.
 pub(super) fn cancel_all(case: &mut Case) -> Vec<Send> {
     let open = std::mem::take(&mut case.open_events);
     let cancel = |event| cancellation(case, event);

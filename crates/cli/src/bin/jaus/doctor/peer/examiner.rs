@@ -1,5 +1,5 @@
-//! The examination: one exchange after the other is asked, judged and noted. Fed with datagrams
-//! and time, it says what is to be sent; no sockets here, and no clock.
+//! Runs an examination: sends, evaluates and records one exchange after the other. Driven by
+//! datagrams and time; it has no sockets and no clock.
 
 use std::time::Duration;
 
@@ -9,13 +9,13 @@ use super::judgement::{Begin, Judgement};
 use super::seen::{Arrival, Refusal, TcpAnswer};
 use super::{discovery, events, large, manners, ra, reach, reserved, standing};
 
-/// An exchange while it goes on.
+/// An active exchange.
 struct Running {
     exchange: Exchange,
     began: Duration,
-    /// How much had been heard when its question was asked.
+    /// Number of messages received before its query.
     mark: usize,
-    /// Which of its questions it is.
+    /// Index of its query.
     stage: u8,
     question: Question,
     next: Option<Duration>,
@@ -27,7 +27,7 @@ pub(super) struct Examiner {
     case: Case,
     plan: std::array::IntoIter<Exchange, 33>,
     running: Option<Running>,
-    /// Trials that were given out.
+    /// Number of trials returned so far.
     told: usize,
     done: bool,
 }
@@ -43,7 +43,7 @@ impl Examiner {
         }
     }
 
-    /// Asks the first question. `now` is the time since the examination began.
+    /// Sends the first query. `now` is the time since the examination began.
     pub(super) fn start(&mut self, now: Duration) {
         self.go_on(now);
     }
@@ -58,7 +58,7 @@ impl Examiner {
         self.judge(now);
     }
 
-    /// The system says that the peer's port or host is not there.
+    /// Handles a refusal: the system reports that the peer's port or host is unreachable.
     pub(super) fn handle_refusal(&mut self, now: Duration, refusal: Refusal) {
         self.case.seen.refused.get_or_insert(refusal);
         self.judge(now);
@@ -88,7 +88,7 @@ impl Examiner {
         }
     }
 
-    /// When [`handle_timeout`](Self::handle_timeout) is to be called.
+    /// When to call [`handle_timeout`](Self::handle_timeout).
     pub(super) fn poll_timeout(&self) -> Option<Duration> {
         let running = self.running.as_ref()?;
         let next = running.next.unwrap_or(running.deadline);
@@ -99,7 +99,7 @@ impl Examiner {
         self.case.unsent.pop_front()
     }
 
-    /// The next exchange that has come to its end, and the one before it.
+    /// The next completed exchange, and the one before it.
     pub(super) fn poll_trial(&mut self) -> Option<(&Trial, Option<&Trial>)> {
         let trial = self.case.trials.get(self.told)?;
         let before = self.told.checked_sub(1);
@@ -110,7 +110,7 @@ impl Examiner {
         ))
     }
 
-    /// Whether all exchanges have come to their ends.
+    /// Whether all exchanges are complete.
     pub(super) const fn is_done(&self) -> bool {
         self.done
     }
@@ -119,14 +119,14 @@ impl Examiner {
         &self.case
     }
 
-    /// Undoes what is still held at the peer, for whoever stops before the end.
+    /// Releases everything held at the peer, for an early end.
     pub(super) fn leave(&mut self) {
         let mut sends = events::cancel_all(&mut self.case);
         sends.extend(standing::release(&mut self.case));
         self.case.unsent.extend(sends);
     }
 
-    /// Begins exchanges until one has to wait.
+    /// Starts exchanges until one has to wait.
     fn go_on(&mut self, now: Duration) {
         while self.running.is_none() {
             let Some(exchange) = self.plan.next() else {
@@ -156,7 +156,7 @@ impl Examiner {
         }
     }
 
-    /// Looks whether what was heard decides the exchange.
+    /// Checks whether the received messages decide the exchange.
     fn judge(&mut self, now: Duration) {
         let Some(running) = &mut self.running else {
             return;
@@ -258,7 +258,7 @@ fn judge(exchange: Exchange, case: &mut Case, mark: usize, stage: u8, now: Durat
     }
 }
 
-/// The time for an answer is over.
+/// The verdict after the timeout of an answer.
 fn at_the_end(exchange: Exchange, case: &mut Case, mark: usize, stage: u8) -> Verdict {
     match exchange {
         Exchange::Find => reach::not_found(case),

@@ -1,4 +1,4 @@
-//! The exchanges that are tried, in the order in which integrations fail, and what becomes of them.
+//! The exchanges of an examination, in the order in which integrations fail, and their results.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use serde_json::{Value as Json, json};
 /// One exchange with a peer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Exchange {
-    /// Where is it? For a peer that is named by its id alone.
+    /// Locate a peer that is named by its id only.
     Find,
     /// Does its host refuse datagrams at that port?
     Reach,
@@ -15,13 +15,13 @@ pub(super) enum Exchange {
     Answer,
     /// In which framing?
     Framing,
-    /// From the port that was asked?
+    /// Does it answer from the queried port?
     SourcePort,
-    /// Query Identification, asked of it alone.
+    /// Query Identification by unicast.
     Identification,
-    /// The same, asked of everybody.
+    /// Query Identification by multicast.
     Multicast,
-    /// Does what it says to everybody arrive here?
+    /// Do its multicasts arrive here?
     MulticastBack,
     Heartbeat,
     Acknowledgement,
@@ -35,13 +35,13 @@ pub(super) enum Exchange {
     Authority,
     Status,
     Control,
-    /// Request and Release Control, if that is wanted.
+    /// Request and Release Control, if permitted.
     TakeControl,
     EventPeriodic,
     EventArrives,
     EventCancel,
     EventOnChange,
-    /// A message of so many octets to the peer.
+    /// A message of this size in octets to the peer.
     Large(u32),
     /// A message of several fragments from the peer.
     LargeBack,
@@ -50,12 +50,12 @@ pub(super) enum Exchange {
     Stacks,
     Ids,
     Rate,
-    /// What does it do with a message type that the standard reserves?
+    /// Reaction to a message type that the standard reserves.
     Reserved,
 }
 
 impl Exchange {
-    /// All of them, in the order of the trials.
+    /// All exchanges, in order.
     pub(super) const ALL: [Self; 33] = [
         Self::Find,
         Self::Reach,
@@ -92,7 +92,7 @@ impl Exchange {
         Self::Ids,
     ];
 
-    /// What it is called in the report.
+    /// Name in the report.
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Find => "finding it",
@@ -133,7 +133,7 @@ impl Exchange {
         }
     }
 
-    /// Whether nothing at all works without it.
+    /// Whether everything else depends on it.
     pub(super) const fn is_basic(self) -> bool {
         matches!(
             self,
@@ -142,7 +142,7 @@ impl Exchange {
     }
 }
 
-/// What became of an exchange.
+/// Result of an exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mark {
     Ok,
@@ -160,17 +160,17 @@ impl Mark {
     }
 }
 
-/// The judgement on an exchange, with what to say about it.
+/// The verdict on an exchange, with explanations.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Verdict {
     pub(super) mark: Mark,
-    /// What was seen.
+    /// The observation.
     pub(super) what: String,
-    /// Why that probably is, if it failed.
+    /// The probable cause of a failure.
     pub(super) cause: Option<String>,
-    /// What to do about it.
+    /// The remedy.
     pub(super) remedy: Option<String>,
-    /// Whether it was left out because nothing works without what failed before.
+    /// Whether it was skipped because a basic exchange has failed.
     pub(super) cut_off: bool,
 }
 
@@ -183,7 +183,7 @@ impl Verdict {
         Self::new(Mark::Skipped, why)
     }
 
-    /// Left out, as is all that follows.
+    /// Skipped, like everything that follows.
     pub(super) fn cut_off(why: impl Into<String>) -> Self {
         Self {
             cut_off: true,
@@ -203,7 +203,7 @@ impl Verdict {
         }
     }
 
-    /// Adds what is worth doing although nothing failed.
+    /// Adds a recommendation, although nothing failed.
     pub(super) fn advice(mut self, remedy: impl Into<String>) -> Self {
         self.remedy = Some(remedy.into());
         self
@@ -220,12 +220,12 @@ impl Verdict {
     }
 }
 
-/// An exchange that has come to its end.
+/// A completed exchange.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Trial {
     pub(super) exchange: Exchange,
     pub(super) verdict: Verdict,
-    /// From the first question to the judgement.
+    /// From the first query to the verdict.
     pub(super) took: Duration,
 }
 

@@ -1,19 +1,19 @@
-//! What each exchange answers when it is its turn: what to ask, whether to wait, or what came of it.
+//! Decisions of an exchange: send a query, wait, or finish.
 
 use super::case::Question;
 use super::exchange::Verdict;
 
-/// What an exchange begins with.
+/// Start of an exchange.
 pub(super) enum Begin {
     Ask(Question),
-    /// It is judged by what is known already, or left out.
+    /// Decided by what is known already, or skipped.
     Over(Verdict),
 }
 
-/// What is made of what was heard.
+/// Evaluation of the received messages.
 pub(super) enum Judgement {
     Wait,
-    /// A next question of the same exchange.
+    /// Another query of the same exchange.
     Ask(Question),
     Over(Verdict),
 }

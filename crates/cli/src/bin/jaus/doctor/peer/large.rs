@@ -1,5 +1,5 @@
-//! The trials of large messages: to the peer, packet by packet acknowledged; and from it, by having
-//! it list events whose queries are long.
+//! Large message exchanges: to the peer, with an acknowledgement per packet; and from the peer, by
+//! a list of events with long queries.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ use super::exchange::{Exchange, Mark, Verdict};
 use super::judgement::{Begin, Judgement};
 use super::transfer::Transfer;
 
-/// How long nothing may be acknowledged.
+/// Maximum time without an acknowledgement.
 const PATIENCE: Duration = Duration::from_millis(1500);
 
 pub(super) fn to_peer(case: &mut Case, size: u32, now: Duration) -> Begin {
@@ -49,7 +49,7 @@ fn question(sends: Vec<Send>) -> Question {
     }
 }
 
-/// The packets of a padded message, each of which wants an acknowledgement.
+/// The packets of a padded message, each with a request for an acknowledgement.
 fn fragments(case: &mut Case, size: usize) -> Vec<Frame> {
     let Some(id) = case.id else {
         return Vec::new();
@@ -85,7 +85,7 @@ fn fragments(case: &mut Case, size: usize) -> Vec<Frame> {
     frames.collect()
 }
 
-/// A message that nobody acts on, whose octets show whether all of them arrive in their places.
+/// A message without effect, whose octets reveal missing or misplaced parts.
 fn padded(size: usize) -> Bytes {
     let mut message: Vec<u8> = (0..size).map(|at| (at * 7 + at / 251) as u8).collect();
     message[..large::CODE_LEN].copy_from_slice(&PADDING.to_le_bytes());
@@ -107,7 +107,7 @@ fn due(case: &mut Case, now: Duration) -> Vec<Send> {
     frames.map(|frame| Send::To(address, frame)).collect()
 }
 
-/// What is to be sent again.
+/// The fragments to retransmit.
 pub(super) fn again(case: &mut Case, now: Duration) -> Vec<Send> {
     due(case, now)
 }
@@ -139,7 +139,7 @@ pub(super) fn acknowledged(case: &mut Case, size: u32, mark: usize, now: Duratio
     if done < all {
         return Judgement::Ask(question(due(case, now)));
     }
-    // Perhaps somebody there sends back what he gets, and has done so.
+    // A program at the peer may echo messages, and may have done so already.
     if is_back(case, size) {
         return Judgement::Over(came_whole(case, size));
     }
@@ -151,16 +151,16 @@ pub(super) fn acknowledged(case: &mut Case, size: u32, mark: usize, now: Duratio
     Judgement::Ask(Question::silence(patience))
 }
 
-/// How long a short message that is sent back may take, and how long a large one.
+/// Timeout of a short echo and of a large one.
 const ECHO: Duration = Duration::from_millis(200);
 const LONG_ECHO: Duration = Duration::from_secs(2);
 
-/// Whether a message of that size goes in one packet.
+/// Whether a message of that size fits one packet.
 fn whole(size: u32, case: &Case) -> bool {
     size as usize <= case.settings.payload_limit
 }
 
-/// Whether the message has come back since it was begun.
+/// Whether the message has been echoed since its start.
 fn is_back(case: &Case, size: u32) -> bool {
     let mark = case.transfer.as_ref().map_or(0, |transfer| transfer.since);
     let message = padded(size as usize);
@@ -183,7 +183,7 @@ fn arrived(case: &mut Case, size: u32) -> Verdict {
     })
 }
 
-/// What is sent back has arrived as a whole.
+/// The echo has arrived completely.
 fn came_whole(case: &mut Case, size: u32) -> Verdict {
     case.echoes = true;
     let mut verdict = arrived(case, size);
@@ -224,12 +224,12 @@ pub(super) fn unacknowledged(case: &mut Case, size: u32) -> Verdict {
     )
 }
 
-/// How many events are created to make a list that takes several fragments from everybody.
+/// Number of events that make a list of several fragments on any peer.
 const EVENTS: u8 = 5;
-/// The first of their numbers of request.
+/// The first of their request ids.
 const FIRST: u8 = 16;
 
-/// Four nodes with 220 components each: 891 octets, which is a long query but a correct one.
+/// Four nodes with 220 components each: 891 octets, a long but valid query.
 fn long_query(which: u8) -> Bytes {
     let components: Vec<u8> = (1..=220).collect();
     let node = |node| node_seq(node, components.clone());
@@ -239,8 +239,8 @@ fn long_query(which: u8) -> Bytes {
     })
 }
 
-/// There is no echo in JAUS (although a test program at the peer may send back what it gets): but a
-/// list of events tells their queries.
+/// JAUS has no echo (although a test program at the peer may provide one), but a list of events
+/// repeats their queries.
 pub(super) fn from_peer(case: &mut Case) -> Begin {
     if let Some(verdict) = echoed(case) {
         return Begin::Over(verdict);
@@ -311,7 +311,7 @@ fn judge_large(message: &Bytes, fragments: usize, repeats: bool) -> Verdict {
     }
 }
 
-/// Waits until all are confirmed, then asks for the list.
+/// Waits until all are confirmed, then queries the list.
 fn subscribed(case: &mut Case, mark: usize) -> Judgement {
     let mut confirmed = Vec::new();
     for number in FIRST..FIRST + EVENTS {

@@ -1,5 +1,5 @@
-//! The last trials: the TCP port, many questions at once, and what the messages heard so far tell
-//! about numbers, stacks and ids.
+//! Final exchanges: the TCP port, a burst of queries, and the sequence numbers, stacks and ids seen
+//! so far.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::IpAddr;
@@ -46,7 +46,7 @@ pub(super) fn tcp_silent(case: &Case) -> Verdict {
     ))
 }
 
-/// Questions that are asked at once.
+/// Number of simultaneous queries.
 const BURST: usize = 32;
 
 pub(super) fn rate(case: &mut Case) -> Begin {
@@ -89,13 +89,13 @@ pub(super) fn some_answered(case: &Case, mark: usize) -> Verdict {
     )
 }
 
-/// What the sequence numbers of its messages to us tell.
+/// Evaluates the sequence numbers of its messages to us.
 pub(super) fn sequence(case: &Case) -> Verdict {
     if let Some(skip) = case.nobody() {
         return skip;
     }
     let mut messages: Vec<&Heard> = case.told(0).collect();
-    // Acknowledgements have the number of what they acknowledge.
+    // Acknowledgements repeat the number of the acknowledged message.
     messages.retain(|heard| !heard.frame.flags.acknowledgement().is_answer());
     if messages.len() < 3 {
         return Verdict::skipped("too few messages came");
@@ -150,7 +150,7 @@ fn judge_numbers(count: usize, twice: usize, shared: usize) -> Verdict {
     Verdict::ok(format!("{count} messages, none twice, no number shared"))
 }
 
-/// Which programs speak JAUS on its host.
+/// The JAUS stacks on its host.
 pub(super) fn stacks(case: &Case) -> Verdict {
     if let Some(skip) = case.cut_off() {
         return skip;
@@ -185,7 +185,7 @@ pub(super) fn stacks(case: &Case) -> Verdict {
     }
 }
 
-/// Whether ids are where they should be, once each.
+/// Checks that each id is unique and in the right place.
 pub(super) fn ids(case: &Case) -> Verdict {
     if let Some(skip) = case.nobody() {
         return skip;
@@ -215,7 +215,7 @@ pub(super) fn ids(case: &Case) -> Verdict {
     Verdict::ok(format!("{} has its id alone", shown(case)))
 }
 
-/// The hosts that an id speaks from.
+/// The hosts that send with an id.
 fn places(case: &Case, id: JausId) -> BTreeSet<IpAddr> {
     let all = case.seen.all().iter();
     let of_it =

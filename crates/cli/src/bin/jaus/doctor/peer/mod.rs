@@ -1,8 +1,8 @@
-//! `jaus doctor --peer`: one peer is recognised, and the exchanges are tried with it one by one, so
-//! that the first that fails can be named with its likely cause.
+//! `jaus doctor --peer`: recognises one peer and tries the exchanges with it one by one, to name
+//! the first failure with its likely cause.
 //!
-//! [`examiner`] decides what is asked and judges what comes, without sockets and clock;
-//! [`sockets`] carries it.
+//! [`examiner`] decides what to send and evaluates the answers, without sockets and clock;
+//! [`sockets`] does the I/O.
 
 mod case;
 mod discovery;
@@ -41,21 +41,21 @@ pub(super) use self::sockets::RA_GROUP;
 use self::sockets::{Happening, Sockets};
 pub(super) use self::target::Target;
 
-/// How long to wait for a first sign if nobody says: JAUS++ speaks to everybody every 5 s.
+/// Default timeout of the first sign of life: JAUS++ multicasts every 5 s.
 const LISTEN: Duration = Duration::from_secs(6);
 
-/// Options of an examination, and how its result is shown.
+/// Options of an examination and its report.
 pub(super) struct Options {
     pub(super) target: Target,
-    /// How long to wait for a first sign.
+    /// Timeout of the first sign of life.
     pub(super) listen: Option<Duration>,
-    /// Whether control may be taken.
+    /// Whether the examination may take control.
     pub(super) control: bool,
     pub(super) json: bool,
     pub(super) colours: bool,
 }
 
-/// Examines the peer. `wanted` is the id that our node is to have.
+/// Examines the peer. `wanted` is the intended id of our node.
 pub(super) async fn examine(
     options: Options,
     wanted: Option<JausId>,
@@ -95,8 +95,7 @@ pub(super) async fn examine(
     Ok(report::outcome(case, whole))
 }
 
-/// The interfaces on which the peer may be: the one that leads to its address, or else all that are
-/// chosen.
+/// The interfaces of the peer: the one that leads to its address, or all chosen ones.
 fn interfaces(config: &Config, target: Target) -> Result<Vec<Interface>, Failure> {
     let chosen = config.interfaces.choose(config.ip).map_err(Failure::of)?;
     let Some(address) = target.address() else {
@@ -107,7 +106,7 @@ fn interfaces(config: &Config, target: Target) -> Result<Vec<Interface>, Failure
     }
     let own = interface::local_address_for(address);
     let leads = |one: &&Interface| Some(one.address) == own;
-    // Without flags, any interface of the host will do: loopback is not chosen by itself.
+    // Without flags, any interface of the host is possible: loopback is not chosen by default.
     let all = interface::list().unwrap_or_default();
     let any = if config.interfaces == Interfaces::All {
         &all
@@ -127,7 +126,7 @@ fn interfaces(config: &Config, target: Target) -> Result<Vec<Interface>, Failure
     })
 }
 
-/// Carries the examination; says whether it came to its end.
+/// Runs the examination; returns whether it was completed.
 #[expect(clippy::disallowed_methods, reason = "an examination has its time")]
 async fn go_on(
     examiner: &mut Examiner,
@@ -162,7 +161,7 @@ async fn go_on(
     }
 }
 
-/// Sends what is to be sent.
+/// Sends the queued messages.
 fn send(examiner: &mut Examiner, sockets: &mut Sockets, begun: Instant) {
     while let Some(send) = examiner.poll_send() {
         if let Some(happening) = sockets.send(&send) {

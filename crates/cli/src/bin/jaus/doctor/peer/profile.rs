@@ -1,4 +1,4 @@
-//! Which known peer it is, and how that was seen.
+//! Recognises known peers, with the evidence.
 
 use jaus::peer::{Certainty, LargeStyle, Peer, Recogniser, Verdict};
 use jaus::wire::{Version, ra::RaId};
@@ -7,19 +7,19 @@ use serde_json::{Value as Json, json};
 use super::case::Case;
 use super::seen::Listener;
 
-/// What a peer is taken for.
+/// Recognised kind of a peer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Profile {
     /// It speaks AS5669A.
     As5669a(Verdict),
-    /// It speaks the Reference Architecture alone: its subsystem's number there.
+    /// It speaks only the Reference Architecture: its subsystem number there.
     Ra(u8),
-    /// Too little was heard.
+    /// Not enough messages received.
     Unknown,
 }
 
 impl Case {
-    /// Who it is, by all that was heard of it and what it did with what was sent to find out.
+    /// Recognises the peer by all its messages and its reactions to probes.
     pub(super) fn recognise(&self) -> Verdict {
         let mut recogniser = self.unprovoked();
         if self.reserved.misreads_type {
@@ -31,7 +31,7 @@ impl Case {
         recogniser.verdict()
     }
 
-    /// What a node would learn of it too, which provokes nothing.
+    /// Recognises the peer without probes, as a node does.
     fn unprovoked(&self) -> Recogniser {
         let mut recogniser = Recogniser::new();
         let all = self.seen.all().iter();
@@ -48,14 +48,14 @@ impl Case {
         recogniser
     }
 
-    /// Whether the fragments of what we send are each to begin with the message code.
+    /// Whether each fragment to the peer must begin with the message code.
     pub(super) fn repeats_code(&self) -> bool {
         let verdict = self.recognise();
         let sure = verdict.certainty >= Certainty::Likely;
         sure && verdict.peer.large_style() == Some(LargeStyle::RepeatedCode)
     }
 
-    /// What it is taken for at the end.
+    /// The profile at the end.
     pub(super) fn profile(&self) -> Profile {
         let of_it = |version: Version| {
             let all = self
@@ -77,7 +77,7 @@ impl Case {
 }
 
 impl Profile {
-    /// What is said of it, line by line.
+    /// The profile as text, line by line.
     pub(super) fn in_words(&self, case: &Case) -> Vec<String> {
         let verdict = match self {
             Self::Unknown => return vec!["not recognised: too little was heard".to_owned()],

@@ -1,5 +1,5 @@
-//! Peers of the Reference Architecture (OpenJAUS 3.x and its like): they are recognised and asked
-//! for their name, and that is all that can be tried without a gateway.
+//! Peers of the Reference Architecture (OpenJAUS 3.x and similar): they are recognised and queried
+//! for their name. Anything more needs a gateway.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -13,11 +13,11 @@ use super::exchange::Verdict;
 use super::judgement::{Begin, Judgement};
 use super::seen::{Heard, Listener};
 
-/// Who speaks for the subsystem: the communicator.
+/// The communicator, which represents the subsystem.
 const COMMUNICATOR: u8 = 35;
 const REPORT_IDENTIFICATION: u16 = 0x4B00;
 
-/// Asks the communicator that was heard for its subsystem's name.
+/// Queries the communicator for its subsystem's name.
 pub(super) fn ask(case: &mut Case, address: SocketAddr) -> Begin {
     let Some(heard) = of_ra(case, address).next() else {
         return Begin::Over(verdict(case, address, None));
@@ -38,12 +38,12 @@ pub(super) fn ask(case: &mut Case, address: SocketAddr) -> Begin {
             Bytes::from_static(&[0x00, 0x2B, 2]),
         )
     };
-    // It answers to 3794 of our host, wherever we asked from.
+    // It answers to port 3794 of our host, whatever our source port.
     let to = SocketAddr::new(address.ip(), judp::PORT);
     Begin::Ask(Question::new(Send::To(to, question)).patience(Duration::from_millis(1500)))
 }
 
-/// An id of ours there: whoever asks is somebody, and ids have one octet for each number.
+/// Our RA id: the source needs an id, with one octet per number.
 fn own(case: &Case) -> RaId {
     RaId {
         subsystem: 200 + (case.settings.own.subsystem() % 55) as u8,
@@ -69,7 +69,7 @@ pub(super) fn named(case: &mut Case) -> Judgement {
     Judgement::Over(verdict(case, address, Some(&name)))
 }
 
-/// The text behind code, kind of query, authority and type: 80 octets, filled up with zeros.
+/// The text after code, query type, authority and type: 80 octets, padded with zeros.
 fn name_in(heard: &Heard) -> Option<String> {
     let text = heard.frame.payload.get(6..)?;
     let end = text
@@ -79,7 +79,7 @@ fn name_in(heard: &Heard) -> Option<String> {
     Some(String::from_utf8_lossy(&text[..end]).into_owned())
 }
 
-/// What is said of it when the time is over, too.
+/// The verdict, also after the timeout.
 pub(super) fn verdict(case: &Case, address: SocketAddr, name: Option<&str>) -> Verdict {
     let mut all = of_ra(case, address);
     let framing = match all.next().map(|heard| heard.frame.version) {

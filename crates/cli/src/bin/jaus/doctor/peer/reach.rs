@@ -1,4 +1,4 @@
-//! The first trials: is anybody there, in which framing, and from which port does it answer?
+//! First exchanges: presence of the peer, its framing and its source port.
 
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
@@ -23,7 +23,7 @@ pub(super) fn query_identification() -> QueryIdentification {
     }
 }
 
-/// Looks for a peer that is named by its id alone.
+/// Locates a peer that is named by its id only.
 pub(super) fn find(case: &mut Case) -> Begin {
     let Some(id) = case.settings.target.id else {
         return Begin::Over(Verdict::skipped("its address is given"));
@@ -38,7 +38,7 @@ pub(super) fn find(case: &mut Case) -> Begin {
             "name the address too: --peer ID@ADDRESS",
         ));
     }
-    // Who has no Discovery acknowledges, at least.
+    // A peer without Discovery acknowledges at least.
     let mut sends = vec![case.ask_everybody(&query_identification())];
     sends.extend(case.call_alone());
     Begin::Ask(Question {
@@ -79,7 +79,7 @@ pub(super) fn not_found(case: &Case) -> Verdict {
     )
 }
 
-/// Who was heard besides, with where.
+/// Other peers, with their addresses.
 fn others(case: &Case) -> Vec<String> {
     const SOME: usize = 6;
     let all = case
@@ -102,7 +102,7 @@ fn others(case: &Case) -> Vec<String> {
         .collect()
 }
 
-/// Asks whether the port refuses, from a passing socket, so that no answer is expected there.
+/// Probes for a refused port, from a temporary socket that expects no answer.
 pub(super) fn reach(case: &mut Case) -> Begin {
     if let Some(skip) = case.cut_off() {
         return Begin::Over(skip);
@@ -131,7 +131,7 @@ pub(super) fn reached(case: &mut Case, stage: u8) -> Judgement {
     if case.seen.refused.is_none() {
         return Judgement::Wait;
     }
-    // Perhaps it speaks from another port.
+    // It may use another port.
     let sends = match case.settings.no_group {
         None => vec![case.ask_everybody(&query_identification())],
         Some(_) => Vec::new(),
@@ -176,7 +176,7 @@ pub(super) fn not_refused(case: &Case, stage: u8) -> Verdict {
     }
 }
 
-/// The places at the host, other than the one that is asked, that JAUS messages come from.
+/// Other sources of JAUS messages at the host.
 fn other_ports(case: &Case, address: SocketAddr) -> Vec<SocketAddr> {
     let others = case.seen.of_host(address.ip());
     let others = others
@@ -185,7 +185,7 @@ fn other_ports(case: &Case, address: SocketAddr) -> Vec<SocketAddr> {
     others.collect::<BTreeSet<_>>().into_iter().collect()
 }
 
-/// Asks for any sign of life: by unicast, so that whatever comes back is due to that.
+/// Requests any sign of life by unicast, so that any message in return is an answer.
 pub(super) fn answer(case: &mut Case) -> Begin {
     if let Some(skip) = case.cut_off() {
         return Begin::Over(skip);
@@ -200,13 +200,13 @@ fn any_sign(case: &mut Case, address: SocketAddr) -> Question {
     let query = query_identification();
     let sends = match case.id {
         Some(id) => {
-            // Who has no Discovery acknowledges, at least.
+            // A peer without Discovery acknowledges at least.
             let query = case.frame(id, octets(&query));
             let padding = case.wanting_acknowledgement(id);
             vec![Send::To(address, query), Send::To(address, padding)]
         }
         None => {
-            // Junior, whose components have no id that we know, acknowledges even that.
+            // Junior acknowledges even that; the ids of its components are unknown.
             let padding = case.wanting_acknowledgement(JausId::EVERYONE);
             vec![case.ask_all_at(address, &query), Send::To(address, padding)]
         }
@@ -241,8 +241,8 @@ pub(super) fn answered(case: &mut Case, mark: usize) -> Judgement {
     )))
 }
 
-/// Nothing was said to us. Who speaks to others tells an id by which to ask; and who beats in an
-/// older framing, and does not answer meanwhile, speaks that alone.
+/// No message to us. Messages to other peers reveal an id to query; heartbeats in an older framing
+/// without an answer mean that the peer uses only that framing.
 fn overheard(case: &mut Case, address: SocketAddr) -> Judgement {
     const ENOUGH: usize = 3;
     let there = case.seen.of_host(address.ip());
@@ -262,12 +262,12 @@ fn overheard(case: &mut Case, address: SocketAddr) -> Judgement {
     }
 }
 
-/// What it is, the next trial tells.
+/// The next exchange finds out which one.
 fn only_older(address: SocketAddr) -> Verdict {
     Verdict::ok(format!("{} was heard, but not in AS5669A", address.ip()))
 }
 
-/// Nothing came by unicast; perhaps something came to the groups.
+/// No answer by unicast; there may be messages in the groups.
 pub(super) fn unanswered(case: &mut Case) -> Verdict {
     let Some(address) = case.address else {
         return not_refused(case, 0);
@@ -298,7 +298,7 @@ pub(super) fn unanswered(case: &mut Case) -> Verdict {
     silent(case, address, seconds)
 }
 
-/// It speaks to everybody, and does not answer us.
+/// It multicasts, but does not answer us.
 fn heard_only(case: &mut Case, address: SocketAddr, heard: &Heard) -> Verdict {
     let (id, from) = (heard.frame.source, heard.from);
     if let Some(named) = case.settings.target.id.filter(|named| *named != id) {
@@ -366,7 +366,7 @@ fn silent(case: &Case, address: SocketAddr, seconds: f64) -> Verdict {
     )
 }
 
-/// Which framings its host speaks.
+/// The framings that its host uses.
 pub(super) fn framing(case: &mut Case) -> Begin {
     if let Some(skip) = case.cut_off() {
         return Begin::Over(skip);
@@ -387,7 +387,7 @@ pub(super) fn framing(case: &mut Case) -> Begin {
     ra::ask(case, address)
 }
 
-/// Whether what it says comes from where it is asked.
+/// Checks whether its source port is the queried port.
 pub(super) fn source_port(case: &mut Case) -> Begin {
     if let Some(skip) = case.cut_off() {
         return Begin::Over(skip);
@@ -410,7 +410,7 @@ pub(super) fn source_port(case: &mut Case) -> Begin {
     if from.ip() != address.ip() {
         return Begin::Over(other_address(address, from, id));
     }
-    // Does it listen where it speaks from?
+    // Does it receive at its source port?
     let frame = case.frame(id, octets(&query_identification()));
     Begin::Ask(Question::new(Send::To(from, frame)))
 }
@@ -444,7 +444,7 @@ pub(super) fn asked_at_its_source(case: &mut Case, mark: usize) -> Judgement {
     ))
 }
 
-/// It sends from a port at which it does not listen.
+/// It sends from a port that does not receive.
 pub(super) fn deaf_source(case: &Case) -> Verdict {
     let (Some(address), Some(id)) = (case.address, case.id) else {
         return Verdict::skipped("nobody answered");

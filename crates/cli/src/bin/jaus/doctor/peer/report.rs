@@ -1,4 +1,4 @@
-//! The report of an examination, in words and as JSON.
+//! Report of an examination, as text and as JSON.
 
 use jaus_cli::failure::Outcome;
 use serde_json::{Value as Json, json};
@@ -8,11 +8,10 @@ use super::case::Case;
 use super::discovery::counted;
 use super::exchange::{Mark, Trial};
 
-/// Columns before the words: the mark, and what was tried.
+/// Columns before the text: mark and exchange.
 const INDENT: usize = 28;
 
-/// A trial, over as many lines as it needs. Where nothing works any more, the first line speaks for
-/// all that is left, and the others say nothing.
+/// A trial, wrapped. After a basic failure, the first line stands for all remaining trials.
 pub(super) fn line(trial: &Trial, before: Option<&Trial>, colours: bool) -> Option<String> {
     let cut_off = trial.verdict.cut_off;
     if cut_off && before.is_some_and(|before| before.verdict.cut_off) {
@@ -40,7 +39,7 @@ pub(super) fn line(trial: &Trial, before: Option<&Trial>, colours: bool) -> Opti
     Some(text)
 }
 
-/// How long it took, if anything was waited for.
+/// Its duration, if it waited.
 fn time(trial: &Trial) -> String {
     let asked = trial.verdict.mark != Mark::Skipped && !trial.took.is_zero();
     let milliseconds = trial.took.as_secs_f64() * 1e3;
@@ -59,7 +58,7 @@ const fn colour(mark: Mark) -> &'static str {
     }
 }
 
-/// Which profile applies, and why.
+/// The recognised profile, with the evidence.
 pub(super) fn profile(case: &Case) -> String {
     let lines = case.profile().in_words(case);
     let mut text = String::new();
@@ -71,7 +70,7 @@ pub(super) fn profile(case: &Case) -> String {
     text
 }
 
-/// What follows from all of it.
+/// The conclusion.
 pub(super) fn conclusion(case: &Case, whole: bool) -> String {
     let count = |mark| {
         case.trials
@@ -117,7 +116,7 @@ pub(super) fn to_json(case: &Case, whole: bool) -> Json {
     })
 }
 
-/// How a script is told.
+/// The exit status.
 pub(super) fn outcome(case: &Case, whole: bool) -> Outcome {
     let mut failed = case.trials.iter().filter(|trial| trial.failed());
     if failed.clone().any(|trial| trial.exchange.is_basic()) {

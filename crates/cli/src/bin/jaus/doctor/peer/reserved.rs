@@ -1,10 +1,10 @@
-//! What the peer does with a message type that the standard reserves. That gives Junior away where
-//! it says nothing by itself.
+//! Tests the peer's reaction to a reserved message type. This reveals Junior even if it sends
+//! nothing by itself.
 //!
-//! Who keeps to the standard drops what is not of type 0. Junior takes the two lowest bits of that
-//! octet for those of header compression and passes the others over: it acknowledges type 4, and
-//! loses type 1. Of its forks, that of the JAUS Tool Set takes a 0 in an id for "all". Seen of all
-//! three forks; JAUS++ and our own nodes drop both. Nobody acts on what is sent here.
+//! A compliant peer drops every type except 0. Junior takes the two lowest bits of that octet for
+//! the header compression flags and ignores the others: it acknowledges type 4, and loses type 1.
+//! Of its forks, that of the JAUS Tool Set takes a 0 in an id for "all". Observed on all three
+//! forks; JAUS++ and our own nodes drop both. The messages sent here have no effect.
 
 use std::time::Duration;
 
@@ -15,13 +15,13 @@ use super::case::{Case, Question, Send};
 use super::exchange::{Exchange, Verdict};
 use super::judgement::{Begin, Judgement};
 
-/// A type of which Junior passes all bits over.
+/// A type whose bits Junior ignores.
 const PASSED_OVER: Kind = Kind(4);
 /// A type that Junior takes for header compression.
 const TAKEN_FOR_COMPRESSION: Kind = Kind(1);
-/// The priority of what goes to an id with a 0: acknowledgements have that of their request.
+/// Priority of messages to an id with a 0: acknowledgements repeat the priority of their request.
 const TO_ZERO: Priority = Priority::SafetyCritical;
-/// How long to wait for acknowledgements.
+/// Timeout of acknowledgements.
 const PATIENCE: Duration = Duration::from_millis(700);
 
 pub(super) fn begin(case: &mut Case) -> Begin {
@@ -52,7 +52,7 @@ fn question(sends: Vec<Send>) -> Question {
     }
 }
 
-/// Type 4 is acknowledged: is type 1, and what is for an id with a 0?
+/// After an acknowledgement of type 4: tests type 1, and an id with a 0.
 pub(super) fn acknowledged(case: &mut Case, mark: usize, stage: u8) -> Judgement {
     let (Some(id), Some(address)) = (case.id, case.address) else {
         return Judgement::Wait;
@@ -75,14 +75,14 @@ pub(super) fn acknowledged(case: &mut Case, mark: usize, stage: u8) -> Judgement
     ]))
 }
 
-/// The number and the priority of each acknowledgement behind a mark.
+/// Number and priority of each acknowledgement since a mark.
 fn answers(case: &Case, mark: usize) -> impl Iterator<Item = (u16, Priority)> {
     let told = case.told(mark).map(|heard| &heard.frame);
     let answers = told.filter(|frame| frame.flags.acknowledgement().is_answer());
     answers.map(|frame| (frame.sequence, frame.flags.priority()))
 }
 
-/// No more acknowledgements come.
+/// The verdict after the timeout.
 pub(super) fn over(case: &mut Case, mark: usize, stage: u8) -> Verdict {
     if stage == 0 {
         return Verdict::ok("a message of a reserved type is dropped");

@@ -1,5 +1,4 @@
-//! What was heard while the peer was examined: every message with its way here, and what could not
-//! be read.
+//! Records the messages of an examination with their origin, and unreadable datagrams.
 
 use std::collections::BTreeSet;
 use std::net::{IpAddr, SocketAddr};
@@ -9,33 +8,33 @@ use bytes::Bytes;
 use jaus::address::JausId;
 use jaus::wire::{DataControl, Frame, Version, judp, large};
 
-/// Messages that are kept. More are counted; a report is no recording.
+/// Maximum number of stored messages. Further ones are only counted.
 const MOST: usize = 16_384;
 
-/// At which of our sockets something arrives.
+/// The receiving socket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Listener {
-    /// The one that speaks.
+    /// The query socket.
     Unicast,
     /// The multicast group of AS5669A.
     Group,
     /// The multicast group of the Reference Architecture.
     RaGroup,
-    /// A passing one that asks whether the port refuses.
+    /// The temporary socket that detects a refused port.
     Probe,
 }
 
-/// A datagram that arrived.
+/// A received datagram.
 #[derive(Clone, Debug)]
 pub(super) struct Arrival {
     pub(super) listener: Listener,
-    /// On which of our interfaces.
+    /// Index of the receiving interface.
     pub(super) link: usize,
     pub(super) from: SocketAddr,
     pub(super) datagram: Bytes,
 }
 
-/// One message.
+/// A received message.
 #[derive(Clone, Debug)]
 pub(super) struct Heard {
     pub(super) at: Duration,
@@ -43,12 +42,12 @@ pub(super) struct Heard {
     pub(super) link: usize,
     pub(super) from: SocketAddr,
     pub(super) frame: Frame,
-    /// Octets that lay behind the messages of its datagram.
+    /// Surplus octets after the messages of its datagram.
     pub(super) stale: usize,
 }
 
 impl Heard {
-    /// The code of a whole message; an acknowledgement and a fragment have none.
+    /// The code of a complete message; acknowledgements and fragments have none.
     pub(super) fn code(&self) -> Option<u16> {
         let whole = self.frame.flags.data() == DataControl::Single;
         self.frame
@@ -57,40 +56,40 @@ impl Heard {
     }
 }
 
-/// All that was heard.
+/// All received messages.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
     heard: Vec<Heard>,
-    /// Beyond [`MOST`].
+    /// Messages beyond [`MOST`].
     dropped: u64,
-    /// Datagrams of no JAUS framing, with the beginning of the first.
+    /// Datagrams without a JAUS framing, with the beginning of the first.
     unreadable: Vec<(SocketAddr, String)>,
-    /// Why the system says that nobody is there.
+    /// Why the destination is unreachable, according to the system.
     pub(super) refused: Option<Refusal>,
-    /// What became of the TCP connection.
+    /// Result of the TCP connection.
     pub(super) tcp: Option<TcpAnswer>,
 }
 
-/// What the operating system says about a destination.
+/// Error of the operating system about a destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Refusal {
-    /// The host answers that nobody listens at the port.
+    /// The host answers that the port is closed.
     Port,
-    /// There is no way to the host, or it does not answer on its network.
+    /// There is no route to the host, or it does not answer on its network.
     Host,
 }
 
-/// What became of a TCP connection.
+/// Result of a TCP connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TcpAnswer {
     Open,
     Refused,
-    /// Neither; the system's own patience was shorter than ours.
+    /// Neither; the system's timeout was shorter than ours.
     Failed,
 }
 
 impl Seen {
-    /// Takes a datagram in; gives how many messages were in it.
+    /// Processes a datagram; returns the number of its messages.
     pub(super) fn take(&mut self, now: Duration, arrival: &Arrival) -> usize {
         let before = self.heard.len();
         let Ok(mut frames) = judp::frames(arrival.datagram.clone()) else {
@@ -131,45 +130,45 @@ impl Seen {
         }
     }
 
-    /// How much was heard so far: a mark to look [`since`](Self::since).
+    /// Number of messages so far: a mark for [`since`](Self::since).
     pub(super) fn len(&self) -> usize {
         self.heard.len()
     }
 
-    /// What was heard behind a mark.
+    /// Messages since a mark.
     pub(super) fn since(&self, mark: usize) -> &[Heard] {
         self.heard.get(mark..).unwrap_or_default()
     }
 
-    /// All of it.
+    /// All messages.
     pub(super) fn all(&self) -> &[Heard] {
         &self.heard
     }
 
-    /// How many messages there was no room for.
+    /// Number of messages that were not stored.
     pub(super) const fn dropped(&self) -> u64 {
         self.dropped
     }
 
-    /// What came from a host.
+    /// Messages from a host.
     pub(super) fn of_host(&self, ip: IpAddr) -> impl Iterator<Item = &Heard> {
         self.heard.iter().filter(move |heard| heard.from.ip() == ip)
     }
 
-    /// How the first unreadable datagram of a host begins.
+    /// The beginning of a host's first unreadable datagram.
     pub(super) fn unreadable_from(&self, ip: IpAddr) -> Option<&str> {
         let mut all = self.unreadable.iter();
         all.find(|(from, _)| from.ip() == ip)
             .map(|(_, beginning)| beginning.as_str())
     }
 
-    /// The framings that a host was heard with.
+    /// The framings used by a host.
     pub(super) fn framings(&self, ip: IpAddr) -> BTreeSet<Version> {
         self.of_host(ip).map(|heard| heard.frame.version).collect()
     }
 
-    /// The large messages that one sender sent behind a mark, put together, with the number of
-    /// their fragments and whether each of these repeats the message code.
+    /// The large message of a sender since a mark, reassembled, with the number of its fragments
+    /// and whether each of them repeats the message code.
     pub(super) fn large_from(&self, source: JausId, mark: usize) -> Option<(Bytes, usize, bool)> {
         let mut pieces: Vec<(u16, DataControl, Bytes)> = Vec::new();
         for heard in self.since(mark) {
@@ -200,13 +199,13 @@ impl Seen {
     }
 }
 
-/// What the peer does with what the standard reserves.
+/// The peer's reaction to reserved values.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Reserved {
-    /// The first number of the second question.
+    /// The first sequence number of the second query.
     pub(super) second: u16,
-    /// It takes bits of the message type for header compression.
+    /// It takes message type bits for header compression.
     pub(super) misreads_type: bool,
-    /// It acknowledges what is for an id with a 0.
+    /// It acknowledges messages to an id with a 0.
     pub(super) answers_for_zero: bool,
 }

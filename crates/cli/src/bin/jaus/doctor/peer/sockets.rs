@@ -1,5 +1,5 @@
-//! The sockets of an examination: on each interface one that speaks and one for each multicast
-//! group; a passing one that hears refusals; and a TCP connection.
+//! Sockets of an examination: on each interface one for queries and one per multicast group, a
+//! temporary one that detects refusals, and a TCP connection.
 #![expect(
     clippy::disallowed_types,
     clippy::disallowed_methods,
@@ -28,18 +28,18 @@ use tokio::time::timeout;
 use super::case::Send;
 use super::seen::{Arrival, Listener, Refusal, TcpAnswer};
 
-/// The group of the Reference Architecture.
+/// Multicast group of the Reference Architecture.
 pub(in crate::doctor) const RA_GROUP: SocketAddrV4 =
     SocketAddrV4::new(Ipv4Addr::new(224, 1, 0, 1), judp::PORT);
 
-/// Something that happened.
+/// A network event.
 pub(super) enum Happening {
     Arrived(Arrival),
     Refused(Refusal),
     Tcp(TcpAnswer),
 }
 
-/// The sockets of one interface.
+/// Sockets of one interface.
 struct Link {
     interface: Interface,
     unicast: UdpSocket,
@@ -50,12 +50,12 @@ struct Link {
 
 type Dialling = Pin<Box<dyn Future<Output = TcpAnswer>>>;
 
-/// All of them.
+/// All sockets.
 pub(super) struct Sockets {
     links: Vec<Link>,
-    /// Why there is no group, if there is none on any interface.
+    /// Why there is no group, if no interface has one.
     pub(super) no_group: Option<String>,
-    /// Which interface leads where, as far as was heard.
+    /// The interface of each host heard so far.
     routes: BTreeMap<IpAddr, usize>,
     probe: Option<UdpSocket>,
     dialling: Option<Dialling>,
@@ -63,7 +63,7 @@ pub(super) struct Sockets {
 }
 
 impl Sockets {
-    /// Opens what can be opened on each interface.
+    /// Opens all possible sockets on each interface.
     pub(super) fn open(interfaces: Vec<Interface>, config: &Config) -> Result<Self, Failure> {
         let mut no_group = None;
         let mut links = Vec::new();
@@ -83,12 +83,12 @@ impl Sockets {
         })
     }
 
-    /// Where the questions come from.
+    /// Our source address.
     pub(super) fn local(&self) -> Option<SocketAddr> {
         self.links.first().map(|link| link.local)
     }
 
-    /// The interfaces' names.
+    /// The names of the interfaces.
     pub(super) fn names(&self) -> String {
         let names: Vec<&str> = self
             .links
@@ -98,7 +98,7 @@ impl Sockets {
         names.join(", ")
     }
 
-    /// Does what is asked for; what the system refuses comes back as a happening.
+    /// Executes an action; a refusal by the system is returned as an event.
     pub(super) fn send(&mut self, send: &Send) -> Option<Happening> {
         match send {
             Send::To(address, frame) => {
@@ -109,7 +109,7 @@ impl Sockets {
             Send::Group(frame) => {
                 for link in &self.links {
                     if let Some((_, group)) = &link.group {
-                        // Who cannot be called there may be called elsewhere.
+                        // Another interface may reach the peer.
                         let _ = send_to(&link.unicast, *group, frame);
                     }
                 }
@@ -144,7 +144,7 @@ impl Sockets {
         refusal(SockRef::from(self.probe.as_ref()?).send(&encoded(frame)))
     }
 
-    /// Waits for the next thing to happen.
+    /// Waits for the next event.
     pub(super) async fn next(&mut self) -> Happening {
         poll_fn(|cx| self.poll_next(cx)).await
     }
@@ -157,7 +157,7 @@ impl Sockets {
             return Poll::Ready(Happening::Tcp(answer));
         }
         if let Some(probe) = &self.probe {
-            // The runtime wakes nobody for an error alone.
+            // The runtime does not wake a task for an error alone.
             let error = SockRef::from(probe).take_error().ok().flatten();
             if let Some(happening) = error.and_then(|error| refusal::<()>(Err(error))) {
                 self.probe = None;
@@ -199,7 +199,7 @@ impl Sockets {
             for (listener, socket) in doors.into_iter().flatten() {
                 while let Poll::Ready(received) = receive(socket, &mut self.buffer, cx) {
                     let Ok((from, datagram)) = received else {
-                        // An ICMP answer to what was sent before.
+                        // An ICMP error caused by an earlier datagram.
                         continue;
                     };
                     if own.contains(&from) {
@@ -222,7 +222,7 @@ impl Sockets {
 }
 
 impl Link {
-    /// Opens the sockets of one interface; says why it has no group, if it has none.
+    /// Opens the sockets of one interface; returns why it has no group, if so.
     fn open(interface: Interface, config: &Config) -> Result<(Self, Option<String>), Failure> {
         let refused = |error: io::Error| Failure::new(format!("{interface}: {error}"));
         let unicast = unicast(&interface, config).map_err(refused)?;
@@ -269,7 +269,7 @@ fn group_of(interface: &Interface, config: &Config) -> Option<SocketAddr> {
     }
 }
 
-/// The socket that speaks: from the node's port if that is free, else from any.
+/// The query socket: from the node's port if that is free, otherwise from any port.
 fn unicast(interface: &Interface, config: &Config) -> io::Result<UdpSocket> {
     let socket = new(interface.at(0))?;
     let wanted = interface.at(config.port);
@@ -291,12 +291,12 @@ fn unicast(interface: &Interface, config: &Config) -> io::Result<UdpSocket> {
             socket.set_multicast_loop_v6(true)?;
         }
     }
-    // More may be asked for than is given.
+    // The system may grant less than requested.
     let _ = socket.set_recv_buffer_size(config.receive_buffer);
     UdpSocket::from_std(socket.into())
 }
 
-/// A socket that hears a group on one interface, beside other programs.
+/// A socket that shares a group on one interface with other programs.
 fn joined(interface: &Interface, group: SocketAddr) -> io::Result<UdpSocket> {
     let socket = new(group)?;
     socket.set_reuse_address(true)?;
@@ -324,7 +324,7 @@ fn connected(own: IpAddr, to: SocketAddr) -> io::Result<UdpSocket> {
     UdpSocket::from_std(socket.into())
 }
 
-/// Lets the socket hear that nobody has the address: without this the system keeps it to itself.
+/// Makes the socket report unreachable hosts, which the system otherwise hides.
 #[cfg(target_os = "linux")]
 fn hear_of_hosts(socket: &Socket, to: SocketAddr) -> io::Result<()> {
     use nix::sys::socket::{setsockopt, sockopt};
@@ -349,7 +349,7 @@ fn new(like: SocketAddr) -> io::Result<Socket> {
 }
 
 fn encoded(frame: &Frame) -> Bytes {
-    // What is asked here fits its header.
+    // Every message here fits its header.
     let plain = Frame {
         kind: Kind::default(),
         ..frame.clone()
@@ -358,7 +358,7 @@ fn encoded(frame: &Frame) -> Bytes {
     if frame.kind == plain.kind {
         return datagram;
     }
-    // A type that nothing else here ever sends.
+    // A type used only here.
     let mut typed = BytesMut::from(&datagram[..]);
     if let Some(kind) = typed.get_mut(1) {
         *kind = frame.kind.0;
@@ -366,7 +366,7 @@ fn encoded(frame: &Frame) -> Bytes {
     typed.freeze()
 }
 
-/// Sends at once: a fresh socket's readiness is not known to the runtime yet.
+/// Sends at once: the runtime does not know a new socket's readiness yet.
 fn send_to(socket: &UdpSocket, address: SocketAddr, frame: &Frame) -> io::Result<usize> {
     SockRef::from(socket).send_to(&encoded(frame), &address.into())
 }
@@ -382,14 +382,14 @@ fn receive(
         .map(|received| received.map(|from| (from, Bytes::copy_from_slice(room.filled()))))
 }
 
-/// What the system's error says about the peer.
+/// Interprets a system error as a refusal by the peer.
 fn refusal<T>(sent: io::Result<T>) -> Option<Happening> {
     let refusal = match sent.err()?.kind() {
         io::ErrorKind::ConnectionRefused => Refusal::Port,
         io::ErrorKind::HostUnreachable
         | io::ErrorKind::NetworkUnreachable
         | io::ErrorKind::AddrNotAvailable => Refusal::Host,
-        // A full queue, say: what was asked is asked again.
+        // For example a full queue: the query is repeated anyway.
         _ => return None,
     };
     Some(Happening::Refused(refusal))

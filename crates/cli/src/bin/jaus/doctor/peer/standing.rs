@@ -1,5 +1,5 @@
-//! The trials of Liveness, of the transport's acknowledgement, and of Access Control and
-//! Management. Nothing is commanded, and control is taken only if that is wanted.
+//! Exchanges of Liveness, transport acknowledgement, Access Control and Management. They send no
+//! commands, and take control only if permitted.
 
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ fn ask(case: &mut Case, message: &impl jaus::codec::Message) -> Begin {
     }
 }
 
-/// Why a service need not be asked.
+/// The reason to skip a service.
 fn nobody_with(case: &Case, service: &str) -> Option<Verdict> {
     let nobody = case.nobody().or_else(|| case.mute());
     nobody.or_else(|| case.lacks(service))
@@ -143,7 +143,7 @@ pub(super) fn control(case: &mut Case) -> Begin {
     }
 }
 
-/// Who is in control, if anybody.
+/// The client in control, if any.
 fn controller(report: &ReportControl) -> Option<String> {
     let (subsystem, node, component) = (report.subsystem_id, report.node_id, report.component_id);
     (subsystem != 0).then(|| format!("{subsystem}.{node}.{component}"))
@@ -159,7 +159,7 @@ pub(super) fn is_controlled(case: &mut Case, mark: usize) -> Judgement {
     }))
 }
 
-/// Nothing came to a query of a service.
+/// The verdict on an unanswered query.
 pub(super) fn silent(case: &Case, query: &str, service: &str) -> Verdict {
     let id = shown(case);
     if case.services.is_some() {
@@ -176,7 +176,7 @@ pub(super) fn silent(case: &Case, query: &str, service: &str) -> Verdict {
     )
 }
 
-/// Control is taken if that is wanted, with no more authority than it needs, and from nobody.
+/// Takes control, if permitted, with the least necessary authority, and only if no client has it.
 pub(super) fn take_control(case: &mut Case) -> Begin {
     if let Some(skip) = nobody_with(case, "AccessControl") {
         return Begin::Over(skip);
@@ -235,7 +235,7 @@ pub(super) fn taking_control(case: &mut Case, mark: usize, stage: u8) -> Judgeme
 
 pub(super) fn control_unanswered(case: &mut Case, stage: u8) -> Verdict {
     if stage == 0 {
-        // It may have been granted, and the answer lost.
+        // Control may have been granted, and the answer lost.
         let send = release(case);
         case.unsent.extend(send);
         return Verdict::failed(
@@ -251,13 +251,13 @@ pub(super) fn control_unanswered(case: &mut Case, stage: u8) -> Verdict {
     )
 }
 
-/// Gives back what may have been taken.
+/// Releases control that may have been granted.
 pub(super) fn release(case: &mut Case) -> Option<Send> {
     let held = std::mem::take(&mut case.in_control);
     held.then(|| case.ask_peer(&ReleaseControl)).flatten()
 }
 
-/// The queries that are known to be answered, the best to subscribe to first.
+/// The answered queries, the best one for a subscription first.
 pub(super) fn answered_query(case: &Case) -> Option<(Bytes, u16, &'static str)> {
     use jaus::codec::Message;
 

@@ -1,4 +1,4 @@
-//! Who is to be examined, as people write it: an id, an address, or both.
+//! Parses the target of an examination: an id, an address, or both.
 
 use std::fmt;
 use std::net::SocketAddr;
@@ -10,13 +10,13 @@ use jaus::node;
 /// `77.1.1`, `10.0.0.2`, `10.0.0.2:3795` or `77.1.1@10.0.0.2:3795`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::doctor) struct Target {
-    /// Its id, if one is named.
+    /// Its id, if given.
     pub(super) id: Option<JausId>,
     place: Option<node::Peer>,
 }
 
 impl Target {
-    /// Where it is, if that is named. Without a port it is 3794.
+    /// Its address, if given. The default port is 3794.
     pub(super) fn address(&self) -> Option<SocketAddr> {
         self.place.map(node::Peer::address)
     }
@@ -44,7 +44,7 @@ impl FromStr for Target {
     }
 }
 
-/// An id that one component has.
+/// Requires the id of a single component.
 fn of_one(id: JausId) -> Result<JausId, String> {
     if id.is_unicast() {
         return Ok(id);

@@ -1,23 +1,23 @@
-//! A large message on its way to the peer, fragment by fragment.
+//! A large message in transfer to the peer, fragment by fragment.
 
 use std::time::Duration;
 
 use jaus::wire::Frame;
 
-/// Fragments that may be on their way: what the smallest known receive buffers hold.
+/// Maximum fragments in transit: the capacity of the smallest known receive buffers.
 const WINDOW: usize = 8;
-/// When a fragment that was not acknowledged is sent again.
+/// Retransmission timeout of a fragment.
 const AGAIN: Duration = Duration::from_millis(250);
 
-/// A large message on its way to the peer.
+/// A large message in transfer to the peer.
 #[derive(Debug)]
 pub(super) struct Transfer {
     pub(super) parts: Vec<Part>,
-    /// How much had been heard when it began.
+    /// Number of messages received before its start.
     pub(super) since: usize,
 }
 
-/// One fragment of it.
+/// One of its fragments.
 #[derive(Debug)]
 pub(super) struct Part {
     pub(super) frame: Frame,
@@ -38,7 +38,7 @@ impl Transfer {
         }
     }
 
-    /// How many parts have been acknowledged.
+    /// Number of acknowledged fragments.
     pub(super) fn done(&self) -> usize {
         self.parts.iter().filter(|part| part.acknowledged).count()
     }
@@ -53,7 +53,7 @@ impl Transfer {
         }
     }
 
-    /// What is to be sent now: the next ones, and those that were not acknowledged in time.
+    /// The fragments to send now: new ones, and retransmissions.
     pub(super) fn due(&mut self, now: Duration) -> Vec<Frame> {
         let open = self.parts.iter_mut().filter(|part| !part.acknowledged);
         let mut due = Vec::new();

@@ -1,4 +1,4 @@
-//! Part B, steps 1, 2 and 11: who is there, and what it offers.
+//! Part B, steps 1, 2 and 11: identification and services.
 
 use jaus::messages::core::query_identification::QueryType;
 use jaus::messages::core::query_services::{ComponentId, ComponentRec, NodeId, NodeRec, NodeSeq};
@@ -98,7 +98,7 @@ fn identify(
     )
 }
 
-/// For all components of all nodes.
+/// Addresses all components of all nodes.
 fn query_services() -> Exchange {
     let everything = NodeSeq {
         node_rec: NodeRec {

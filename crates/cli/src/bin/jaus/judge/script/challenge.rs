@@ -1,4 +1,4 @@
-//! Part A, tasks 1 to 5: the challenges of 2010 to 2013, to which one component is enough.
+//! Part A, tasks 1 to 5: the challenges of 2010 to 2013 for a single component.
 
 use std::time::Duration;
 
@@ -22,12 +22,12 @@ use super::super::step::{
 use super::VELOCITY_STATE_SENSOR;
 use super::{ACCESS_CONTROL, AUTHORITY, DISCOVERY, LOCAL_POSE_SENSOR, MANAGEMENT};
 
-/// How long a subject may take until it asks who the judge is: the rules want it every 5 s.
+/// Timeout of the subject's query to the judge: the rules require one every 5 s.
 const QUERY_INTERVAL: Duration = Duration::from_secs(6);
 
-/// Where the subject is told that it is: X, Y (m) and yaw (rad).
+/// The pose set at the subject: X, Y (m) and yaw (rad).
 const SET_POSE: [f64; 3] = [12.0, -7.0, 0.5];
-/// How far a report may be from what was set: the widest step of the fields, and a little.
+/// Tolerance of a reported pose: the coarsest field resolution, plus a margin.
 const POSE_SLACK: f64 = 0.01;
 
 pub(super) fn steps() -> Vec<Step> {
@@ -124,7 +124,7 @@ pub(super) fn steps() -> Vec<Step> {
     ]
 }
 
-/// Query Services for the subject's component alone.
+/// Query Services for the subject's component only.
 fn services_of_the_subject() -> Exchange {
     let query = |memory: &Memory| {
         let node_id = NodeId(memory.subject.node());
@@ -143,14 +143,14 @@ fn services_of_the_subject() -> Exchange {
     )
 }
 
-/// Takes control with the usual authority.
+/// Requests control with the usual authority.
 pub(super) const fn request_control() -> RequestControl {
     RequestControl {
         authority_code: AUTHORITY,
     }
 }
 
-/// Tells the subject its position (m) and yaw (rad).
+/// Sets the subject's position (m) and yaw (rad).
 pub(super) fn set_pose([x, y, yaw]: [f64; 3]) -> Exchange {
     Exchange::with(Main, move |_| {
         let mut pose = SetLocalPose::default();
@@ -180,7 +180,7 @@ fn later(before: Option<u32>, now: Option<u32>) -> Check {
     }
 }
 
-/// A subsystem says what kind it is, and what it is called.
+/// Checks that a subsystem reports its kind and name.
 pub(super) fn identifies_a_subsystem(report: &ReportIdentification, _: &mut Memory) -> Check {
     equal("the query type", report.query_type.0, 2)?;
     let kinds = [Type::VEHICLE, Type::OCU, Type::OTHER_SUBSYSTEM];
@@ -193,7 +193,7 @@ pub(super) fn identifies_a_subsystem(report: &ReportIdentification, _: &mut Memo
     is_named(report)
 }
 
-/// An identification has a name.
+/// Checks that an identification has a name.
 pub(super) fn is_named(report: &ReportIdentification) -> Check {
     if report.identification.is_empty() {
         return Err("the name is empty".to_owned());
@@ -201,7 +201,7 @@ pub(super) fn is_named(report: &ReportIdentification) -> Check {
     Ok(())
 }
 
-/// A list of services has the subject's component in it, with those that every component has.
+/// Checks that a list of services has the subject's component with the mandatory services.
 pub(super) fn lists_services(report: &ReportServices, memory: &mut Memory) -> Check {
     let subject = memory.subject;
     let nodes = report.node_list.iter();
@@ -230,7 +230,7 @@ pub(super) fn accepted(report: &ConfirmControl, _: &mut Memory) -> Check {
     responds(report, ResponseCode::CONTROL_ACCEPTED)
 }
 
-/// Whether a request for control is answered in this way.
+/// Checks the answer to a control request.
 pub(super) fn responds(report: &ConfirmControl, must_be: ResponseCode) -> Check {
     equal("the response code", report.response_code.0, must_be.0)
 }
@@ -258,7 +258,7 @@ pub(super) fn is_in_standby(report: &ReportStatus, _: &mut Memory) -> Check {
     is_in(report, Status::STANDBY)
 }
 
-/// Whether the subject is in this state.
+/// Checks the subject's state.
 pub(super) fn is_in(report: &ReportStatus, must_be: Status) -> Check {
     let named = |status: Status| match status {
         Status::INITIALIZE => "0 (initialize)".to_owned(),

@@ -1,4 +1,4 @@
-//! Part B, steps 12 to 26: who is in control, and the states.
+//! Part B, steps 12 to 26: control and states.
 
 use std::time::Duration;
 
@@ -150,7 +150,7 @@ fn management() -> Vec<Step> {
         management(26, "Release Control in an emergency, which then is cleared")
             .tell(Fourth, set_emergency())
             .ask(First, QueryStatus, "5, emergency", is_in_emergency)
-            // Nobody is in control since the reset, and then the standard says 0; the contests'
+            // After the reset no client is in control; the standard then requires 0, the contests'
             // tool expects 1.
             .ask(
                 First,

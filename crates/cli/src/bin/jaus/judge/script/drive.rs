@@ -1,4 +1,4 @@
-//! Part A, task 6: four waypoints, for real.
+//! Part A, task 6: a drive along four waypoints.
 
 use std::time::Duration;
 
@@ -21,15 +21,15 @@ use super::super::step::{
 use super::challenge::{accepted, query_pose, released, request_control, set_pose};
 use super::{ACCESS_CONTROL, LOCAL_POSE_SENSOR, LOCAL_WAYPOINT_LIST_DRIVER, MANAGEMENT};
 
-/// The waypoints, X and Y in metres; the drive begins at 0, 0, looking along X.
+/// The waypoints, X and Y in metres; the drive starts at 0, 0, heading along X.
 const WAYPOINTS: [[f64; 2]; 4] = [[2.0, 0.0], [4.0, 1.0], [6.0, 1.0], [8.0, 0.0]];
-/// How near a waypoint is near enough, in metres.
+/// Tolerance of a waypoint, in metres.
 const TOLERANCE: f64 = 1.0;
-/// In metres a second.
+/// In m/s.
 const SPEED: f64 = 1.0;
-/// Time for 9 m at that speed, and for subjects that turn on the spot before they go.
+/// Time for 9 m at that speed, with a turn on the spot.
 const DRIVE: Duration = Duration::from_secs(60);
-/// How often the subject is asked where it is.
+/// Interval of position queries.
 const ROUND: Duration = Duration::from_millis(250);
 /// Deletes the whole list.
 const WHOLE_LIST: u16 = u16::MAX;
@@ -85,7 +85,7 @@ pub(super) fn steps() -> Vec<Step> {
         )
         .act(Act::Until(Until {
             words: "the four waypoints are reached in their order",
-            // Some subjects take control away from who does not renew it.
+            // Some subjects revoke control that is not renewed.
             exchanges: vec![
                 Exchange::new(Main, request_control()).expect(Main, "control accepted", accepted),
                 Exchange::new(Main, query_pose(0x0003)).expect(
@@ -152,14 +152,14 @@ pub(super) fn waypoint([x, y]: [f64; 2]) -> Result<SetLocalWaypoint, String> {
     Ok(waypoint)
 }
 
-/// The same as it stands in a list.
+/// The same as list element data.
 pub(super) fn element_data(position: [f64; 2]) -> Result<FormattedBlob<ElementDataFormat>, String> {
     let octets = waypoint(position)?.encode();
     let octets = octets.map_err(|error| error.to_string())?;
     Ok(FormattedBlob::new(ElementDataFormat::JAUS_MESSAGE, octets))
 }
 
-/// Sets off, from the first element.
+/// Executes the list from the first element.
 fn execute() -> Exchange {
     Exchange::with(Main, |_| {
         let mut message = ExecuteList {
@@ -181,7 +181,7 @@ fn delete_list() -> DeleteElement {
     }
 }
 
-/// Whether a list is as it must be.
+/// Checks the order of a list.
 pub(super) fn list_is(uids: &[u16], must_be: &[u16]) -> Check {
     if uids == must_be {
         Ok(())
@@ -190,7 +190,7 @@ pub(super) fn list_is(uids: &[u16], must_be: &[u16]) -> Check {
     }
 }
 
-/// Whether a waypoint is the one that was set, within one step of its fields.
+/// Checks a waypoint, within one step of its fields.
 pub(super) fn is_waypoint(report: &ReportLocalWaypoint, [x, y]: [f64; 2]) -> Check {
     /// 200 km in 2³² steps.
     const STEP: f64 = 200_000.0 / (u32::MAX as f64);
@@ -198,7 +198,7 @@ pub(super) fn is_waypoint(report: &ReportLocalWaypoint, [x, y]: [f64; 2]) -> Che
     near("Y", report.y_m(), y, STEP)
 }
 
-/// Notes which waypoint has been reached.
+/// Notes a reached waypoint.
 fn takes_position(report: &ReportLocalPose, memory: &mut Memory) -> Check {
     let (x, y) = (present("X", report.x_m())?, present("Y", report.y_m())?);
     if let Some([to_x, to_y]) = WAYPOINTS.get(memory.reached)

@@ -21,7 +21,7 @@ use super::super::step::{
 use super::VELOCITY_STATE_SENSOR;
 use super::{ACCESS_CONTROL, EVENTS, LIVENESS, LOCAL_POSE_SENSOR, MANAGEMENT};
 
-/// How far a confirmed rate may be from the wanted one, in hertz: one step of the field.
+/// Tolerance of a confirmed rate, in hertz: one step of the field.
 const RATE_STEP: f64 = 1092.0 / u16::MAX as f64;
 
 const SECOND: Duration = Duration::from_secs(1);
@@ -96,7 +96,7 @@ pub(super) fn steps() -> Vec<Step> {
     ]
 }
 
-/// Step 36: what the operator's picture subscribes to, all at the same time.
+/// Step 36: all subscriptions of the operator's display at the same time.
 pub(super) fn observer() -> Vec<Step> {
     let heartbeat = subscribe(21, QueryHeartbeatPulse, ReportHeartbeatPulse::CODE);
     let control = subscribe(22, QueryControl, ReportControl::CODE);
@@ -257,7 +257,7 @@ fn cancel_the_oldest(request_id: u8) -> Exchange {
     )
 }
 
-/// A request for a periodic event.
+/// Creates a periodic event.
 fn create(request_id: u8, hertz: f64, query: &impl Message) -> Result<CreateEvent, String> {
     let mut message = CreateEvent {
         request_id,

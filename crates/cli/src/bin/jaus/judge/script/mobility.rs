@@ -18,16 +18,16 @@ use super::drive::{element_data, is_waypoint, list_is, waypoint};
 use super::{ACCESS_CONTROL, LOCAL_POSE_SENSOR, LOCAL_WAYPOINT_DRIVER};
 use super::{LOCAL_WAYPOINT_LIST_DRIVER, VELOCITY_STATE_SENSOR};
 
-/// The waypoint that is set, X and Y in metres.
+/// The waypoint, X and Y in metres.
 const WAYPOINT: [f64; 2] = [1.0, 1.0];
 /// The request id of the element.
 const REQUEST: u8 = 0x2C;
-/// Where the pose is set to, on both axes, in metres.
+/// The pose to set, on both axes, in metres.
 const FAR_AWAY: f64 = -1000.0;
-/// How far a pose may be from what was set, in metres: one step of its fields, and a little for a
-/// subject that computes in single precision.
+/// Tolerance of a pose, in metres: one step of its fields, plus a margin for subjects that compute
+/// in single precision.
 const POSE_SLACK: f64 = 0.01;
-/// How far a pose of a subject that stands still may wander, in metres.
+/// Tolerated drift of a standing subject's pose, in metres.
 const WANDERING: f64 = 1.0;
 
 pub(super) fn steps() -> Vec<Step> {

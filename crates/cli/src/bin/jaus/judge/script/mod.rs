@@ -1,8 +1,8 @@
-//! The script: every step of the two rule books, in order, and what their judges look at besides.
+//! Script of the judge: every step of the two rule books, in order, and additional checks.
 //!
-//! The requests and their order are those of the public rules of the 2010 challenge (part A) and
-//! those seen from the judging tool of the 2015 one (part B), whose octets the tests replay. The
-//! answers that are required are those of the standard's definitions.
+//! The requests and their order come from the public rules of the 2010 challenge (part A) and from
+//! observations of the judging tool of 2015 (part B), whose octets the tests replay. The required
+//! answers follow the standard's definitions.
 
 mod asking;
 mod challenge;
@@ -19,7 +19,7 @@ use jaus::messages::{core, mobility as jss};
 
 use super::step::{Name, Step};
 
-/// The services that steps need.
+/// Services required by steps.
 const DISCOVERY: &str = core::discovery::URN;
 const EVENTS: &str = core::events::URN;
 const LIVENESS: &str = core::liveness::URN;
@@ -31,10 +31,10 @@ const LOCAL_POSE_SENSOR: &str = jss::local_pose_sensor::URN;
 const LOCAL_WAYPOINT_DRIVER: &str = jss::local_waypoint_driver::URN;
 const LOCAL_WAYPOINT_LIST_DRIVER: &str = jss::local_waypoint_list_driver::URN;
 
-/// The authority with which the judge takes control where nothing else is said.
+/// Default authority of the judge's control requests.
 const AUTHORITY: u8 = 220;
 
-/// All steps, in the order in which they are carried out.
+/// All steps, in execution order.
 pub(super) fn steps() -> Vec<Step> {
     let parts = [
         challenge::steps(),
@@ -50,10 +50,10 @@ pub(super) fn steps() -> Vec<Step> {
     parts.into_iter().flatten().collect()
 }
 
-/// The steps to carry out for a selection, with those that they rest on.
+/// The selected steps, with the steps that they depend on.
 pub(super) fn selected(steps: Vec<Step>, chosen: impl Fn(Name) -> bool) -> Vec<Step> {
     let mut wanted: Vec<Name> = Vec::new();
-    // Backwards, because a step rests on earlier ones only.
+    // In reverse, because a step depends on earlier ones only.
     for step in steps.iter().rev() {
         if chosen(step.name) || wanted.contains(&step.name) {
             let part = step.name.part;

@@ -1,5 +1,5 @@
-//! Part C: what the contests' judges look for besides answers. A vehicle moves only for the client
-//! in control and only when it is ready, and stops when either ends, or in an emergency.
+//! Part C: safety checks of the contests' judges. A vehicle moves only for the client in control
+//! and only in the ready state; it stops when either ends, or in an emergency.
 
 use std::time::Duration;
 
@@ -18,16 +18,16 @@ use super::super::step::{
 use super::challenge::{accepted, released, request_control};
 use super::{ACCESS_CONTROL, MANAGEMENT, PRIMITIVE_DRIVER, VELOCITY_STATE_SENSOR};
 
-/// The effort forwards, in percent: enough to move, not to rush.
+/// Forward effort, in percent: enough for a slow motion.
 const EFFORT: f64 = 30.0;
-/// In metres a second: below it, a vehicle stands.
+/// Speed of a standing vehicle, in m/s at most.
 const STANDING: f64 = 0.05;
-/// How long efforts go on while the vehicle must not move. An effort may expire by itself, after
-/// 500 ms in this stack: only a vehicle that gets new ones all the time shows that it ignores them.
+/// Duration of efforts that must have no effect. An effort may expire by itself, after 500 ms in
+/// this stack: only a vehicle under constant efforts shows that it ignores them.
 const PROVOCATION: Duration = Duration::from_secs(3);
-/// How long a vehicle may take to move, or to stop.
+/// Time limit for a vehicle to move or stop.
 const RESPONSE: Duration = Duration::from_secs(4);
-/// Efforts are repeated, and control is renewed, as often.
+/// Repetition interval of efforts and control requests.
 const ROUND: Duration = Duration::from_millis(100);
 
 pub(super) fn steps() -> Vec<Step> {
@@ -71,7 +71,7 @@ fn safety(number: u8, title: &'static str) -> Step {
     ])
 }
 
-/// A step that begins with control, and ends without it, in standby.
+/// A step that starts in control, and ends without control, in standby.
 fn in_control(number: u8, title: &'static str) -> Step {
     safety(number, title)
         .ask::<ConfirmControl>(Main, request_control(), "control accepted", accepted)
@@ -79,7 +79,7 @@ fn in_control(number: u8, title: &'static str) -> Step {
         .afterwards::<RejectControl>(Main, ReleaseControl)
 }
 
-/// A step that begins with a vehicle that moves.
+/// A step that starts with a moving vehicle.
 fn driving(number: u8, title: &'static str) -> Step {
     let mut step = in_control(number, title).tell(Main, Resume);
     step.acts.push(Act::Until(Until {
@@ -95,7 +95,7 @@ fn driving(number: u8, title: &'static str) -> Step {
     step
 }
 
-/// The vehicle comes to rest although the commands go on.
+/// The vehicle stops although the commands continue.
 fn until_it_stands(commands: fn() -> Vec<Exchange>) -> Act {
     Act::Until(Until {
         words: "the vehicle stands although efforts go on",
@@ -106,7 +106,7 @@ fn until_it_stands(commands: fn() -> Vec<Exchange>) -> Act {
     })
 }
 
-/// The vehicle never moves while the commands go on.
+/// The vehicle does not move while the commands continue.
 fn stands_throughout(commands: fn() -> Vec<Exchange>) -> Act {
     Act::Throughout(Throughout {
         words: "the vehicle stands although efforts go on",
@@ -123,12 +123,12 @@ fn and_velocity(commands: fn() -> Vec<Exchange>) -> Vec<Exchange> {
     exchanges
 }
 
-/// Keeps control: some subjects take it away from a client that does not renew it.
+/// Renews control: some subjects revoke it otherwise.
 fn renew() -> Exchange {
     Exchange::new(Main, request_control()).expect(Main, "control accepted", accepted)
 }
 
-/// Pushes forwards.
+/// Sends a forward effort.
 fn effort(from: super::super::step::Speaker) -> Exchange {
     Exchange::with(from, |_| {
         let mut message = SetWrenchEffort::default();

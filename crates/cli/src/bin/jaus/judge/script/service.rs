@@ -1,4 +1,4 @@
-//! Steps made from a service's definition: its queries, and its commands without control.
+//! Generates steps from a service's definition: its queries, and its commands without control.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -25,14 +25,14 @@ use super::super::step::{
 };
 use super::{specimen, transitions};
 
-/// How long nothing must come of something that is to be ignored.
+/// Required silence after a message that must be ignored.
 const IGNORED: Duration = Duration::from_millis(300);
-/// How far a number in a report may move by itself, of its value …
+/// Tolerated drift of a number in a report, relative to its value …
 const WANDERING: f64 = 0.02;
-/// … and at least, in whatever unit it has.
+/// … and its minimum, in the number's unit.
 const LEAST_WANDERING: f64 = 0.1;
 
-/// Commands that anybody may give, whoever is in control.
+/// Commands that do not require control.
 const ANYBODYS: [u16; 9] = [
     CancelEvent::CODE,
     ClearEmergency::CODE,
@@ -44,7 +44,7 @@ const ANYBODYS: [u16; 9] = [
     SetEmergency::CODE,
     UpdateEvent::CODE,
 ];
-/// Queries for something that a client must have set before it can be reported.
+/// Queries for something that a client must set first.
 const OF_SOMETHING: [u16; 9] = [
     QueryElement::CODE,
     QueryLocalWaypoint::CODE,
@@ -57,7 +57,7 @@ const OF_SOMETHING: [u16; 9] = [
     QueryGlobalPathSegmentExt::CODE,
 ];
 
-/// The URN of a service, by its URN or its name.
+/// The URN of a service, from its URN or name.
 pub(in super::super) fn known(text: &str) -> Result<&'static str, String> {
     let is_it = |info: &&ServiceInfo| info.id.urn == text || info.name == text;
     if let Some(info) = services().find(is_it) {
@@ -71,7 +71,7 @@ pub(in super::super) fn known(text: &str) -> Result<&'static str, String> {
     ))
 }
 
-/// The steps that walk through services, each in the version that is offered, or else the newest.
+/// Steps for services, each in the offered version, or else the newest.
 pub(in super::super) fn steps(
     urns: &[&'static str],
     offered: impl Fn(&str) -> Option<(u8, u8)>,
@@ -87,7 +87,7 @@ pub(in super::super) fn steps(
             continue;
         };
         for (title, acts) in walk(service) {
-            // More than 255 messages are in no service.
+            // No service has more than 255 messages.
             let Some(number) = numbers.next() else { break };
             let mut step = step(Part::S, number, title).needs(&[urn]);
             step.acts = acts;
@@ -104,7 +104,7 @@ pub(in super::super) fn steps(
     steps
 }
 
-/// The titles and acts of the steps of one service.
+/// Titles and acts of the steps of one service.
 fn walk(service: &ServiceInfo) -> Vec<(Cow<'static, str>, Vec<Act>)> {
     let inputs = service.inputs.iter();
     let inputs: Vec<_> = inputs
@@ -156,12 +156,12 @@ fn report_of(query: &MessageInfo) -> Option<&'static MessageInfo> {
     registry().by_code(report_code(query.code)?).next()
 }
 
-/// Asks a query, which need not be answered: that is another step's business.
+/// Sends a query that may remain unanswered: another step checks that.
 fn perhaps(query: &MessageInfo, look: fn(u16, &Json, &mut Memory) -> Check) -> Option<Act> {
     asked(query, look, true).map(Act::Exchange)
 }
 
-/// Asks a query in its shortest form, and looks at the report if it is readable.
+/// Sends a query in its shortest form, and checks the report if it is readable.
 fn asked(
     query: &MessageInfo,
     look: fn(u16, &Json, &mut Memory) -> Check,
@@ -181,8 +181,8 @@ fn asked(
     Some(exchange)
 }
 
-/// Asks a query without its last octet, if it has a body; and then the whole query, which must be
-/// answered still.
+/// Sends a query without its last octet, if it has a body, and then the whole query, which must
+/// still be answered.
 fn cut(query: &MessageInfo, is_optional: bool) -> Vec<Act> {
     let Some(octets) = specimen::shortest(query).filter(|octets| octets.len() > 2) else {
         return Vec::new();
@@ -195,7 +195,7 @@ fn cut(query: &MessageInfo, is_optional: bool) -> Vec<Act> {
     std::iter::once(ignored).chain(whole).collect()
 }
 
-/// Gives a command without control. The reports before and after must be the same.
+/// Sends a command without control. The reports before and after must be equal.
 fn without_control(command: &MessageInfo, queries: &[&MessageInfo]) -> Vec<Act> {
     let before = queries
         .iter()
@@ -215,7 +215,7 @@ fn without_control(command: &MessageInfo, queries: &[&MessageInfo]) -> Vec<Act> 
     acts
 }
 
-/// A report as people see it.
+/// The JSON view of a report.
 fn read(octets: &Bytes) -> Result<Json, String> {
     let message = registry().decode(octets).ok_or("it is no known message")?;
     let message = message.map_err(|error| error.to_string())?;
@@ -228,7 +228,7 @@ fn takes_report(code: u16, report: &Json, memory: &mut Memory) -> Check {
 }
 
 fn is_unchanged(code: u16, report: &Json, memory: &mut Memory) -> Check {
-    // Without a report before there is nothing to compare with.
+    // Without an earlier report, nothing can be compared.
     let before = memory.reports.get(&code).unwrap_or(report);
     if is_same(before, report) {
         return Ok(());
@@ -236,7 +236,7 @@ fn is_unchanged(code: u16, report: &Json, memory: &mut Memory) -> Check {
     Err(format!("it was {before} before, and is {report} now"))
 }
 
-/// Whether two reports say the same, but for time stamps and for what wanders by itself.
+/// Whether two reports are equal, except for time stamps and tolerated drift.
 fn is_same(one: &Json, other: &Json) -> bool {
     match (one, other) {
         (Json::Object(one), Json::Object(other)) => {

@@ -1,23 +1,23 @@
-//! One valid message of each type, made of nothing but its decoder.
+//! Generates a valid message of each type with nothing but its decoder.
 
 use bytes::Bytes;
 use jaus::codec::{Message, MessageInfo};
 use jaus::messages::core::{QueryConfiguration, QueryIdentification};
 use jaus::messages::mobility::QueryAccelerationLimit;
 
-/// Octets of a body that are tried at most.
+/// Maximum octets of a body.
 const LONGEST: usize = 96;
-/// What fields are filled with: valid in most, and far from where things stand by themselves.
+/// Fill value of fields: valid in most, and far from typical values.
 const FILLING: u8 = 0x40;
-/// Queries whose last octet says what is meant, and may not be zero: a subsystem, and a limit for
-/// speeding up.
+/// Queries whose last octet must not be zero, as it selects the subject of the query: a subsystem,
+/// and an acceleration limit.
 const NOT_ZERO: [(u16, u8); 3] = [
     (QueryIdentification::CODE, 2),
     (QueryConfiguration::CODE, 2),
     (QueryAccelerationLimit::CODE, 1),
 ];
 
-/// The shortest message of this type, all zeros where that is possible.
+/// The shortest message of this type, all zeros if possible.
 pub(super) fn shortest(info: &MessageInfo) -> Option<Bytes> {
     let mut octets = info.code.to_le_bytes().to_vec();
     while !is_valid(info, &octets) {
@@ -33,14 +33,14 @@ pub(super) fn shortest(info: &MessageInfo) -> Option<Bytes> {
     Some(octets.into())
 }
 
-/// A message of this type that would change something: with its first optional field, if its
-/// fields are optional, and with values that are not zero.
+/// A message of this type with an effect: with its first optional field, if its fields are
+/// optional, and with nonzero values.
 pub(super) fn telling(info: &MessageInfo) -> Option<Bytes> {
     let mut octets = shortest(info)?.to_vec();
     if octets.len() > 2 {
         octets = with_first_field(info, &octets).unwrap_or(octets);
     }
-    // The first octet of the body may be a presence vector, which is as it shall be.
+    // The first octet of the body may be a presence vector, which is set already.
     for at in 3..octets.len() {
         let before = std::mem::replace(&mut octets[at], FILLING);
         if !is_valid(info, &octets) {

@@ -1,8 +1,9 @@
-//! Steps made from a service's state machine: in each state that messages lead to, everything that
-//! can be said about control and about the state, by the client in control and by another.
+//! Generates steps from a service's state machine: in each reachable state, every message about
+//! control and state, by the client in control and by another one.
 //!
-//! What must come is what the machine's transitions send, or nothing; and the state afterwards must
-//! be the one that they lead to. The subject is brought into a state by the shortest way there.
+//! The required answers are the messages that the machine's transitions send, or none; the state
+//! afterwards must be the transition's target. The subject is brought into a state by the shortest
+//! path.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -26,15 +27,15 @@ use super::super::step::{
     equal,
 };
 
-/// How long nothing must come where nothing is sent.
+/// Required silence where no message is sent.
 const NOTHING: Duration = Duration::from_millis(100);
-/// What a reset may take, through initialization.
+/// Time limit of a reset, including initialization.
 const RESET: Duration = Duration::from_millis(1500);
-/// The authority of whoever asks for control, which also the client in control sets.
+/// Authority of every control request, also set by the client in control.
 const STRONG: u8 = 200;
 const WEAK: u8 = 100;
 
-/// What is said to the subject.
+/// A message to the subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Saying {
     RequestControl,
@@ -78,7 +79,7 @@ impl Saying {
             Self::RequestControl => Exchange::new(speaker, RequestControl { authority_code }),
             Self::ReleaseControl => Exchange::new(speaker, ReleaseControl),
             Self::SetAuthority => {
-                // What it has already: so the machine need not count.
+                // Unchanged, so that the machine need not track it.
                 let authority_code = STRONG;
                 Exchange::new(speaker, SetAuthority { authority_code })
             }
@@ -97,32 +98,32 @@ impl Saying {
     }
 }
 
-/// The subject, as far as the machine's guards ask.
+/// The subject's state, as far as the machine's guards depend on it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Situation {
     state: StateIndex,
-    /// Where a pop leads back to.
+    /// Target of a pop.
     pushed: Option<StateIndex>,
     controller: Option<Speaker>,
-    /// Who has set an emergency.
+    /// The client that has set an emergency.
     emergency: Option<Speaker>,
 }
 
-/// What a saying leads to.
+/// Result of a message.
 struct Reaction {
     after: Situation,
     answers: Vec<Answer>,
 }
 
-/// A message that must come.
+/// A required message.
 struct Answer {
     to: Speaker,
     message: String,
     code: String,
 }
 
-/// The titles and acts of the steps of a service's machine; none if it says nothing of its own about
-/// states, but leaves that to the services that it inherits from, which can be walked through, too.
+/// Titles and acts of the steps of a service's machine; none if the service declares no states of
+/// its own and leaves them to its bases, which can be tested separately.
 pub(super) fn walk(service: ServiceId) -> Vec<(String, Vec<Act>)> {
     let mut loader = Loader::new();
     loader.catalogue();
@@ -144,7 +145,7 @@ pub(super) fn walk(service: ServiceId) -> Vec<(String, Vec<Act>)> {
     steps(machine, tells_status)
 }
 
-/// Whether the machine knows who is in control.
+/// Whether the machine tracks the controller.
 fn is_about_control(machine: &Machine<'_>) -> bool {
     let request = Stimulus::received(RequestControl::NAME);
     !machine.candidates(machine.start(), request).is_empty()
@@ -178,7 +179,7 @@ fn steps(machine: &Machine<'_>, tells_status: bool) -> Vec<(String, Vec<Act>)> {
                 let acts = acts(machine, &way, tells_status);
                 steps.push((title, acts));
                 let after = reaction.after;
-                // One client in control and one emergency at a time are enough to see everything.
+                // One controller and one emergency at a time cover all transitions.
                 let further = after.controller != Some(Fourth)
                     && (situation.emergency.is_none() || after.emergency.is_none());
                 if further && !seen.contains(&after) {
@@ -210,7 +211,7 @@ fn title(machine: &Machine<'_>, from: Situation, saying: Saying, speaker: Speake
     format!("{} when {state}{whose}", saying.name())
 }
 
-/// Everything that is said on the way, and what must come of it; the last is what the step is about.
+/// All messages on the way, with the required answers; the last one is under test.
 fn acts(
     machine: &Machine<'_>,
     way: &[(Situation, Saying, Speaker)],
@@ -241,7 +242,7 @@ fn acts(
     acts
 }
 
-/// Asks for the state that the subject must have now.
+/// Queries the state that the subject must have now.
 fn look(machine: &Machine<'_>, after: Situation, tells_status: bool) -> Vec<Act> {
     let controller = after.controller;
     let asked = Exchange::new(Main, QueryControl).expect(
@@ -277,8 +278,8 @@ fn look(machine: &Machine<'_>, after: Situation, tells_status: bool) -> Vec<Act>
     acts
 }
 
-/// What is said at the end of each step, however it went. Releases are answered, and waited for, so
-/// that no answer comes into the next step.
+/// Messages at the end of each step, whatever its result. Releases are answered; waiting for the
+/// answer keeps it out of the next step.
 pub(super) fn afterwards() -> Vec<Exchange> {
     let clear = [First, Fourth].map(|speaker| Saying::ClearEmergency.by(speaker));
     let release = [First, Fourth].map(|speaker| {
@@ -312,7 +313,7 @@ fn expectation(answer: &Answer) -> Expectation {
     }
 }
 
-/// What the machine does with a saying; `None` if a guard asks what is not known.
+/// The machine's reaction to a message; `None` if a guard is undecidable.
 fn react(
     machine: &Machine<'_>,
     from: Situation,
@@ -344,7 +345,7 @@ fn react(
     Some(Reaction { after, answers })
 }
 
-/// What is true of the situation and the speaker.
+/// Evaluates a guard for the situation and the speaker.
 fn answer(question: &Guard, from: Situation, speaker: Speaker) -> Option<bool> {
     let Guard::Call(call) = question else {
         return None;
@@ -356,10 +357,10 @@ fn answer(question: &Guard, from: Situation, speaker: Speaker) -> Option<bool> {
         "isCurrentAuthorityLess" => from
             .controller
             .is_some_and(|controller| authority(controller) < authority(speaker)),
-        // Both ask with more than any known component wants at least.
+        // Both request with more authority than any known component requires.
         "isDefaultAuthorityGreater" => false,
         "isAuthorityValid" => true,
-        // A subject that takes its time is given it.
+        // The judge waits for subjects that initialize slowly.
         "initializes" => false,
         _ => return None,
     })
@@ -395,8 +396,8 @@ fn follow(
     Some(after)
 }
 
-/// A message that an action sends: to the speaker if it is given the message's envelope, else to the
-/// client that has been in control.
+/// A message sent by an action: to the speaker if the action takes the message's envelope,
+/// otherwise to the previous controller.
 fn sent(action: &Action, from: Situation, speaker: Speaker) -> Option<Answer> {
     let message = action.sent()?.to_owned();
     let texts: Vec<_> = action.arguments.iter().filter_map(|it| it.text()).collect();

@@ -1,4 +1,4 @@
-//! What lies between an examination and a scripted peer: virtual time, and what is on its way.
+//! Simulated network between an examination and a scripted peer, in virtual time.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -10,20 +10,20 @@ use super::super::case::{Send, Settings};
 use super::super::examiner::Examiner;
 use super::super::seen::{Arrival, Listener, Refusal, TcpAnswer};
 
-/// How long everything is under way.
+/// Transit time.
 const WAY: Duration = Duration::from_millis(1);
-/// How often a peer may do something by itself.
+/// Interval of spontaneous actions of a peer.
 const BEAT: Duration = Duration::from_millis(100);
 
-/// A peer that does as it is told.
+/// A scripted peer.
 pub(super) trait Scripted {
-    /// Something was sent, to it or to somebody else.
+    /// Handles a message, to the peer or to others.
     fn hear(&mut self, send: &Send, air: &mut Air);
-    /// A tenth of a second has passed.
+    /// Called every 100 ms.
     fn beat(&mut self, _air: &mut Air) {}
 }
 
-/// What happens to the examination.
+/// An event of the examination.
 #[derive(Debug)]
 enum Happening {
     Arrived(Arrival),
@@ -31,7 +31,7 @@ enum Happening {
     Tcp(TcpAnswer),
 }
 
-/// What is on its way, and the time.
+/// Messages in transit, and the time.
 pub(super) struct Air {
     pub(super) now: Duration,
     next_beat: Duration,
@@ -71,7 +71,7 @@ impl Air {
         self.flying.push((self.now + WAY, Happening::Tcp(answer)));
     }
 
-    /// Lets time pass until the examination is done, or `go_on` says otherwise.
+    /// Advances time until the examination is done or `go_on` returns false.
     pub(super) fn run(
         &mut self,
         examiner: &mut Examiner,
@@ -95,7 +95,7 @@ impl Air {
         }
     }
 
-    /// The next thing that happens.
+    /// Processes the next event.
     fn step(&mut self, examiner: &mut Examiner, peer: &mut dyn Scripted) {
         self.flying.sort_by_key(|(at, _)| *at);
         let arrival = self.flying.first().map(|(at, _)| *at);
@@ -120,14 +120,14 @@ impl Air {
     }
 }
 
-/// A whole examination.
+/// Runs a whole examination.
 pub(super) fn examine(settings: Settings, peer: &mut dyn Scripted) -> Examiner {
     let mut examiner = Examiner::new(settings);
     Air::new().run(&mut examiner, peer, |_| true);
     examiner
 }
 
-/// Answers whatever comes with rubbish.
+/// Answers every message with garbage.
 pub(super) struct Noise(pub(super) Box<dyn FnMut() -> Vec<u8>>);
 
 impl Scripted for Noise {

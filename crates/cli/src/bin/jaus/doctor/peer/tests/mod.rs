@@ -1,5 +1,5 @@
-//! Examinations of scripted peers, in virtual time: for each thing that goes wrong, all that is
-//! printed. The texts lie beside this file.
+//! Examinations of scripted peers, in virtual time: the complete output for each kind of failure.
+//! The expected texts are in files beside this one.
 
 mod air;
 mod scripted;
@@ -31,7 +31,7 @@ fn settings(target: &str) -> Settings {
     }
 }
 
-/// What is printed of an examination, and how it ends.
+/// Output and exit status of an examination.
 fn printed(settings: Settings, peer: &mut dyn air::Scripted) -> (String, Outcome) {
     let examiner = examine(settings, peer);
     let case = examiner.case();
@@ -50,7 +50,7 @@ fn printed(settings: Settings, peer: &mut dyn air::Scripted) -> (String, Outcome
     (text, report::outcome(case, true))
 }
 
-/// The same in one line, to look for a sentence in it.
+/// The same in one line, to search for a sentence.
 fn words(settings: Settings, peer: &mut dyn air::Scripted) -> (String, Outcome) {
     let (text, outcome) = printed(settings, peer);
     (
@@ -59,7 +59,7 @@ fn words(settings: Settings, peer: &mut dyn air::Scripted) -> (String, Outcome) 
     )
 }
 
-/// Compares what is printed with the text of that name.
+/// Compares the output with the text of this name.
 #[track_caller]
 fn check(name: &str, settings: Settings, peer: &mut dyn air::Scripted) -> Outcome {
     let (text, outcome) = printed(settings, peer);
@@ -67,7 +67,7 @@ fn check(name: &str, settings: Settings, peer: &mut dyn air::Scripted) -> Outcom
     outcome
 }
 
-/// With `JAUS_BLESS` set, the text of that name becomes what is printed.
+/// With `JAUS_BLESS` set, replaces the text of this name by the output.
 #[track_caller]
 fn check_text(name: &str, text: &str) {
     let file = format!(
@@ -81,7 +81,7 @@ fn check_text(name: &str, text: &str) {
     assert_eq!(text, expected, "{file}");
 }
 
-/// The first exchange that fails.
+/// The first failed exchange.
 fn first_failure(settings: Settings, peer: &mut dyn air::Scripted) -> Option<Exchange> {
     let examiner = examine(settings, peer);
     let mut trials = examiner.case().trials.iter();
@@ -213,13 +213,12 @@ fn junior_without_services_acknowledges_and_no_more() {
         &mut Vehicle::junior(),
     );
     assert_eq!(outcome, Outcome::Incomplete);
-    // Its acknowledgement tells its id.
+    // Its acknowledgement reveals its id.
     let first = first_failure(settings("10.0.0.2"), &mut Vehicle::junior());
     assert_eq!(first, Some(Exchange::Identification));
 }
 
-/// As seen of the three forks, of JAUS++ and our own, and as somebody might who does not look at the
-/// type at all.
+/// As observed on the three forks, JAUS++ and our own, and for a peer that ignores the type.
 #[test]
 fn junior_is_told_by_the_message_types_that_it_takes_and_its_fork_by_zeros() {
     type Knob = fn(&mut Vehicle);
@@ -326,7 +325,7 @@ fn an_id_that_is_there_twice_or_that_our_node_is_to_have_is_noticed() {
 fn nothing_is_commanded_and_no_control_taken_without_leave() {
     let mut peer = Vehicle::sound();
     examine(settings("10.0.0.2"), &mut peer);
-    // Events are created and cancelled; that is all that looks like a command.
+    // Events are created and cancelled; nothing else resembles a command.
     assert!(
         peer.heard_codes
             .iter()

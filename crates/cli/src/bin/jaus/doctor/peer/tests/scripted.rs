@@ -1,5 +1,4 @@
-//! Scripted peers: a sound one with a knob for each thing that may be wrong, and three of which
-//! there is little to say.
+//! Scripted peers: a correct one with an option for each possible fault, and three simple ones.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -14,7 +13,7 @@ use super::super::case::Send;
 use super::super::seen::{Listener, Refusal, TcpAnswer};
 use super::air::{Air, Scripted};
 
-/// An event that the vehicle has for its client.
+/// An event of the vehicle's client.
 #[derive(Clone, Debug)]
 pub(super) struct Subscription {
     client: JausId,
@@ -23,7 +22,7 @@ pub(super) struct Subscription {
     query: Bytes,
 }
 
-/// A peer with all that is asked for, unless a knob is turned.
+/// A peer that passes everything, unless an option makes it fail.
 pub(super) struct Vehicle {
     pub(super) id: JausId,
     pub(super) address: SocketAddr,
@@ -54,15 +53,15 @@ pub(super) struct Vehicle {
     pub(super) doubles: bool,
     pub(super) twin: Option<SocketAddr>,
     pub(super) old_services: bool,
-    /// Sends back what nobody acts on, of up to so many fragments.
+    /// Maximum number of fragments of an echoed message without effect.
     pub(super) echoes_up_to: usize,
-    /// The message types that it takes.
+    /// The accepted message types.
     pub(super) takes_type: fn(u8) -> bool,
     /// Takes a 0 in an id for "all".
     pub(super) zero_is_all: bool,
-    /// How often it sends the first report of an event besides, at once.
+    /// Number of additional copies of an event's first report.
     pub(super) first_copies: usize,
-    /// Octets that stay behind its messages.
+    /// Surplus octets after its messages.
     pub(super) stale: usize,
     pub(super) events: BTreeMap<u8, Subscription>,
     pub(super) heard_codes: Vec<u16>,
@@ -120,7 +119,7 @@ impl Vehicle {
         }
     }
 
-    /// With the ways of JAUS++: empty lists, old services, stale octets.
+    /// Behaves like JAUS++: empty lists, old services, surplus octets.
     pub(super) fn jauspp() -> Self {
         Self {
             wildcard: false,
@@ -133,7 +132,7 @@ impl Vehicle {
         }
     }
 
-    /// A client of Junior that has no services, but sends back what it gets.
+    /// A client of Junior without services that echoes messages.
     pub(super) fn junior() -> Self {
         Self {
             echoes_up_to: 50,
@@ -392,7 +391,7 @@ impl Vehicle {
         }
     }
 
-    /// Puts a large message together, if it is not too long, and sends it back.
+    /// Reassembles a large message, within the limit, and echoes it.
     fn collect(&mut self, data: DataControl, frame: &Frame, air: &mut Air) {
         if data == DataControl::First {
             self.pieces.clear();
@@ -463,7 +462,7 @@ impl Scripted for Vehicle {
     }
 }
 
-/// A host that says nothing, or that nobody listens at the port, or that is not there.
+/// A silent host, a closed port, or an absent host.
 #[derive(Default)]
 pub(super) struct Silent {
     pub(super) refuses: bool,
@@ -474,7 +473,7 @@ impl Scripted for Silent {
     fn hear(&mut self, send: &Send, air: &mut Air) {
         match send {
             Send::Probe(..) if self.refuses => air.refuse(Refusal::Port),
-            // The system has looked for the host meanwhile.
+            // The system has searched for the host meanwhile.
             Send::To(..) if self.gone => air.refuse(Refusal::Host),
             _ => {}
         }
@@ -484,13 +483,13 @@ impl Scripted for Silent {
 /// A node manager of the Reference Architecture.
 #[derive(Default)]
 pub(super) struct Ra {
-    /// Its answers go to a port that somebody else has.
+    /// Its answers go to a port in use by another program.
     goes_astray: bool,
     ticks: u64,
 }
 
 impl Ra {
-    /// One whose answers do not reach us.
+    /// A peer whose answers do not reach us.
     pub(super) fn astray() -> Self {
         Self {
             goes_astray: true,
